@@ -1,0 +1,238 @@
+"""MATLAB files of PASCAL3D+ and ObjectNet3D: what a picture shows and from where, and the CAD models that it shows.
+
+Pixels are MATLAB's: the centre of the first pixel is (1, 1), so that half a pixel is added to ours. A model's origin is the
+centre of its box.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.errors import MissingExtraError, UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._refusals import pinhole, plain_names
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Dataset, ModelInfo
+
+NAMES = r"[A-Za-z][A-Za-z0-9_]{0,62}"
+"""Of variables and fields in MATLAB."""
+
+OWN = ("vertices", "faces", "pnames")
+"""Fields of a CAD model that are no points."""
+
+HEAD = b"MATLAB 5.0 MAT-file Platform: posix, Created by: viewsphere"
+HEAD_BYTES = 116
+
+STATUS = {0: 1, 1: 2, 2: 4, 3: 4}
+"""Of anchors by the states of keypoints: visible, occluded, outside, behind."""
+
+TRUNCATED, OCCLUDED = 0.15, 0.05
+"""Shares above which an object is so, as the annotators of PASCAL VOC were told."""
+
+SQUARE = 1e-9
+"""Share by which the sides of pixels may differ."""
+
+
+class Options(Frozen):
+    """What is told of objects."""
+
+    anchors: bool = Field(default=True, description="the models' named points (the label `keypoints`) as anchors")
+
+
+def no_viewpoints(scope: Scope) -> Iterator[str]:
+    """Viewpoints of other cameras than pinholes with square pixels, and names that are none in MATLAB."""
+    if scope.rig is None:
+        yield "expected pictures of known cameras; found imported ones"
+    yield from pinhole(scope)
+    for sensor in scope.rig.sensors if scope.rig else ():
+        lens = sensor.intrinsics
+        if sensor.lidar is None and (lens.skew or not math.isclose(lens.fx, lens.fy, rel_tol=SQUARE)):
+            yield f"expected square pixels; found fx {lens.fx:g}, fy {lens.fy:g}, skew {lens.skew:g} of {sensor.name}"
+    yield from plain_names(scope, NAMES)
+
+
+def scipy_io(name: str) -> Any:
+    """What writes .mat files; raises MissingExtraError, for a format of this name, where it is not installed."""
+    try:
+        from scipy import io
+    except ImportError:
+        raise MissingExtraError(f"format {name}: expected scipy, found none: pip install 'viewsphere[mat]'") from None
+    return io
+
+
+def mat(**variables: Any) -> bytes:
+    """A MATLAB 5 file of these variables, of equal bytes at all times."""
+    file = BytesIO()
+    scipy_io("mat").savemat(file, variables, long_field_names=True, oned_as="row")
+    data = file.getvalue()
+    return HEAD.ljust(HEAD_BYTES) + data[HEAD_BYTES:]
+
+
+def structs(rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]:
+    """A struct array (1, N) of rows with the same fields."""
+    fields = list(rows[0]) if rows else ["class"]
+    found = np.empty((1, len(rows)), [(name, object) for name in fields])
+    for i, row in enumerate(rows):
+        for name in fields:
+            found[name][0, i] = row[name]
+    return found
+
+
+def nothing() -> NDArray[np.float64]:
+    """MATLAB's []."""
+    return np.zeros((0, 0))
+
+
+def box(o: ObjectAnnotation) -> NDArray[np.float64]:
+    """Its first and last pixels, counted from 1: x1, y1, x2, y2."""
+    assert o.box2d is not None
+    x0, y0, x1, y1 = o.box2d
+    return np.array([[math.floor(x0) + 1, math.floor(y0) + 1, math.ceil(x1), math.ceil(y1)]], np.float64)
+
+
+class Cads:
+    """The models of a data set by their categories, and the names of their points as MATLAB has them."""
+
+    def __init__(self, dataset: Dataset, options: Options, name: str) -> None:
+        self._dataset = dataset
+        self._has_anchors = options.anchors
+        self.by_category: dict[str, list[ModelInfo]] = {category.name: [] for category in dataset.categories}
+        self._places = dict[str, int]()
+        for info in dataset.models:
+            self.by_category[info.category].append(info)
+            self._places[info.key] = len(self.by_category[info.category])
+        self._fields = {
+            category: _fields(infos, f"{name}: category {category}") for category, infos in self.by_category.items()
+        }
+
+    def record(self, sample: Sample, objects: Iterable[ObjectAnnotation], filename: str, *, masks: bool) -> bytes:
+        """The file of a picture."""
+        lens = sample.camera.K.copy()
+        lens[:2, 2] += 0.5
+        return mat(
+            record={
+                "filename": filename,
+                "imgsize": np.array([[sample.width, sample.height, 3]], np.float64),
+                "segmented": float(masks),
+                "objects": structs([self._object(o, sample) for o in objects]),
+                "K": lens,
+            }
+        )
+
+    def _object(self, o: ObjectAnnotation, sample: Sample) -> dict[str, Any]:
+        center = o.box3d_object.mean(axis=0)
+        motion = o.camera_from_object[:3].copy()
+        motion[:, 3] += motion[:, :3] @ center
+        anchors = self._anchors(o)
+        inside = 1 - o.truncation
+        return {
+            "class": o.category,
+            "bbox": box(o),
+            "truncated": float(o.truncation > TRUNCATED),
+            "occluded": float(inside > 0 and 1 - o.visibility / inside > OCCLUDED),
+            "difficult": 0.0,
+            "cad_index": np.int32(self._places[o.key]),
+            "anchors": anchors or nothing(),
+            "viewpoint": _viewpoint(o, sample, motion[:, 3], sum(anchor["status"] == 1 for anchor in anchors.values())),
+            "id": float(o.id),
+            "RT": motion,
+        }
+
+    def _anchors(self, o: ObjectAnnotation) -> dict[str, dict[str, Any]]:
+        """Anchors by their names; those that are not visible have no place."""
+        fields = self._fields[o.category]
+        if not self._has_anchors or not fields:
+            return {}
+        return {
+            fields[name]: {"location": place[None] + 0.5 if state == 0 else nothing(), "status": float(STATUS[int(state)])}
+            for name, place, state in zip(o.keypoint_names, o.keypoints, o.keypoint_states, strict=True)
+        }
+
+    def file(self, category: str) -> bytes:
+        """The file of a category's models: a struct array of its name."""
+        return mat(**{category: self.structs(category)})
+
+    def structs(self, category: str, *, has_points: bool = True) -> NDArray[Any]:
+        """The models of a category as MATLAB has them."""
+        fields = self._fields[category] if has_points else {}
+        rows: list[dict[str, Any]] = []
+        for info in self.by_category[category]:
+            vertices, triangles = self.shape(info)
+            row: dict[str, Any] = {"vertices": vertices, "faces": triangles + np.int32(1)}
+            if has_points:
+                points, center = info.keypoints.points if info.keypoints else {}, info.box3d_object.mean(axis=0)
+                row["pnames"] = np.array([list(fields.values())], object) if fields else nothing()
+                row |= {its: np.array([points[name]]) - center if name in points else nothing() for name, its in fields.items()}
+            rows.append(row)
+        return structs(rows)
+
+    def cells(self, categories: Sequence[str]) -> bytes:
+        """A file of all models: the categories' names, and a cell with the shapes of each."""
+        cells, names = np.empty((1, len(categories)), object), np.empty((1, len(categories)), object)
+        for i, category in enumerate(categories):
+            names[0, i], cells[0, i] = category, self.structs(category, has_points=False)
+        return mat(cads=cells, class_names=names)
+
+    def points(self, info: ModelInfo) -> Iterator[tuple[str, bytes]]:
+        """Each named point of a model, as MATLAB has its name, and as OFF text."""
+        for name, place in info.keypoints.points.items() if info.keypoints else ():
+            x, y, z = (np.array(place) - info.box3d_object.mean(axis=0)).tolist()
+            yield self._fields[info.category][name], f"OFF\n1 0 0\n{x!r} {y!r} {z!r}\n".encode()
+
+    def shape(self, info: ModelInfo) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """A model's vertices (V, 3), metres from the centre of its box, and triangles (T, 3)."""
+        mesh = self._dataset.mesh(info.key)
+        return mesh.vertices.astype(np.float64) - info.box3d_object.mean(axis=0), mesh.triangles
+
+    def off(self, info: ModelInfo) -> bytes:
+        """A model as OFF text."""
+        vertices, triangles = self.shape(info)
+        rows = [f"OFF\n{len(vertices)} {len(triangles)} 0"]
+        rows += [f"{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+        rows += [f"3 {a} {b} {c}" for a, b, c in triangles.tolist()]
+        return ("\n".join(rows) + "\n").encode()
+
+
+def _viewpoint(o: ObjectAnnotation, sample: Sample, place: NDArray[np.float64], anchors: int) -> dict[str, float]:
+    """How a camera sees a model's origin, which is at `place` in its axes; distance 0, as of what nobody has measured, of one
+    behind it.
+    """
+    ahead = bool(place[2] > 0)
+    x, y, z = (sample.camera.K @ place).tolist()
+    azimuth, elevation = o.view.azimuth_deg % 360, o.view.elevation_deg
+    return {
+        "azimuth_coarse": azimuth,
+        "elevation_coarse": elevation,
+        "azimuth": azimuth,
+        "elevation": elevation,
+        "distance": o.view.distance if ahead else 0.0,
+        "focal": 1.0,
+        "px": x / z + 0.5 if ahead else 0.0,
+        "py": y / z + 0.5 if ahead else 0.0,
+        "theta": o.view.tilt_deg,
+        "viewport": sample.camera.intrinsics.fx,
+        "num_anchor": float(anchors),
+    }
+
+
+def _fields(infos: Iterable[ModelInfo], where: str) -> dict[str, str]:
+    """Fields of MATLAB by the names of points; raises UserError where two names have one."""
+    names = dict.fromkeys(name for info in infos if info.keypoints for name in info.keypoints.points)
+    found = dict[str, str]()
+    for name in names:
+        field = re.sub(r"[^A-Za-z0-9_]", "_", name)
+        field = (field if field[0].isalpha() else f"p_{field}")[:63]
+        other = next((one for one, its in found.items() if its == field), field if field in OWN else None)
+        if other is not None:
+            raise UserError(f"{where}: expected names of points that differ in letters and digits; found {other!r}, {name!r}")
+        found[name] = field
+    return found

@@ -1,0 +1,99 @@
+"""ObjectNet3D: pictures whose objects are aligned with CAD models, in MATLAB files; read by its toolbox and by scipy.
+
+    Annotations/<index>.mat                      `record`: size, and of each object its box, CAD model, viewpoint and anchors
+    Images/<index>.JPEG                          the pictures
+    CAD/off/<category>/<number>.off              the models, numbers from 01
+    CAD/off/<category>/<number>_<point>.off      one of a model's named points, a single vertex
+    CAD/mat/<category>.mat                       a struct array: vertices, faces, and a field for each named point
+    CAD/cads.mat                                 `class_names`, and `cads`, a cell with vertices and faces for each of these
+    Image_sets/<split>.txt, classes.txt          names of the pictures, and of the categories
+
+Every picture has a record, of no objects if none is seen. `viewpoint` has azimuth (0 looks the model in the face, then
+counter-clockwise seen from above), elevation, and theta (the camera's roll, clockwise seen from behind it), all in degrees,
+distance (metres), focal (1), viewport (the focal length in pixels), and px, py: where the model's origin is seen. CAD models
+are in metres, front -Y, up +Z; their origin is the centre of their box. cad_index and faces count from 1; OFF files count from
+0. The first pixel's centre is (1, 1), and boxes (of the visible pixels) name the first and the last pixel.
+
+The format's projection takes the camera for one that looks at the model, and moves the picture to px, py: exact where the
+origin is on the optical axis, and near to it elsewhere. The true one is in fields that the format does not have: `record.K`
+(pixels as above) and, of each object, `RT`, 3 x 4, which takes points of its CAD model to the camera (x right, y down, z
+ahead); and `id`, the object's id. The rotation that the benchmark compares is that of `RT`, where the origin is on the axis. An
+object whose origin is behind the camera has distance 0, for which the toolbox draws nothing.
+
+Anchors are the model's named points; characters that names in MATLAB cannot have become `_`. status 1 and a location are those
+of visible ones. truncated: more than 15 % of the object lies outside of the picture; occluded: others hide more than 5 % of
+what lies inside.
+
+Lost: masks, sequences and sensors. `shapenet`, models of another collection that look alike, is left out: the models are the
+true ones; azimuth_coarse and elevation_coarse are exact. Not verified: that pixels count from 1, and status 2 (occluded) and 4
+(outside) of anchors. Writing needs the extra `mat`. Source: Y. Xiang et al., ObjectNet3D: A Large Scale Database for 3D Object
+Recognition, ECCV 2016, https://cvgl.stanford.edu/projects/objectnet3d/, and its toolbox,
+https://github.com/yuxng/ObjectNet3D_toolbox.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._tree import File, Piece, Tree, functions, line
+from viewsphere.formats._viewpoint_mat import Cads, Options, no_viewpoints, scipy_io
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("viewpoints", "CAD models", "boxes", "anchors")
+READ_BY = ("scipy", "MATLAB")
+
+
+def check() -> None:
+    """Raise MissingExtraError where there is no scipy."""
+    scipy_io("objectnet3d")
+
+
+def needs(options: Options) -> tuple[str, ...]:
+    """Labels on request."""
+    return ("keypoints",) if options.anchors else ()
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """What no viewpoint can tell."""
+    yield from no_viewpoints(scope)
+
+
+class ObjectNet3d(Tree):
+    """The tree of a release."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._cads = Cads(dataset, options, "objectnet3d")
+        if "classes" in dataset.splits:
+            raise UserError("objectnet3d: expected splits whose lists have other names than that of categories; found classes")
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture and its record."""
+        split, _, stem = self.stem(sample).partition("/")
+        name = stem.rpartition("/")[2]
+        seen = [o for o in sample.objects if o.box2d is not None]
+        yield File(f"Images/{name}.JPEG", picture(sample, ".jpg"))
+        yield File(f"Annotations/{name}.mat", self._cads.record(sample, seen, f"{name}.JPEG", masks=False))
+        yield line(f"Image_sets/{split}.txt", name)
+
+    def rest(self) -> Iterator[File]:
+        """The models, and the names of the categories."""
+        names = list(self._cads.by_category)
+        for category, infos in self._cads.by_category.items():
+            if infos:
+                yield File(f"CAD/mat/{category}.mat", self._cads.file(category))
+            for number, info in enumerate(infos, 1):
+                yield File(f"CAD/off/{category}/{number:02}.off", self._cads.off(info))
+                for point, text in self._cads.points(info):
+                    yield File(f"CAD/off/{category}/{number:02}_{point}.off", text)
+        yield File("CAD/cads.mat", self._cads.cells(names))
+        yield File("Image_sets/classes.txt", "".join(f"{name}\n" for name in names).encode())
+
+
+preparer, writer, verify = functions(ObjectNet3d)

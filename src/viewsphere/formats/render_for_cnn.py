@@ -1,0 +1,134 @@
+"""Render for CNN's training set of viewpoints: a small picture of each object, named by the angles that it is seen from.
+
+    syn_images_cropped_bkg_overlaid/<synset>/<md5>/    the pictures, each named
+        <synset>_<md5>_a<azimuth>_e<elevation>_t<tilt>_d<distance>_<index>_<object>.jpg
+    syn_lmdbs/<category>_<split>.txt, all_<split>.txt  a line a picture: path, number of the class, azimuth, elevation, tilt
+    view_distribution/<category>.txt                   a line a picture: azimuth, elevation, tilt, distance, not rounded
+    truncation_distribution/<category>.txt             a line a picture: left, top, right, bottom
+    synsets.txt                                        synset and name of each class, from number 0 on
+    models.txt                                         md5 and key of each model
+
+A picture is cut out around the object's visible pixels. Angles are whole degrees, the distance whole metres, as `%03d` writes
+them (`e-05`): azimuth 0 looks the model in the face and grows counter-clockwise seen from above, tilt is PASCAL3D+'s theta: the
+camera's roll, clockwise seen from behind it, 0 to 359. In the lists elevation, too, is from 0 to 359 (355 is -5), as the tools
+read names. In view_distribution the tilt has the other sign, by which the tools' renderer gives the same pictures (its models
+look along +x). A truncation is how far the sides of the visible pixels' box lie, right and down, of those of the box that the
+whole model would have, as a share of that one's width and height; none is written of a model that reaches behind the camera.
+
+synset: the twelve categories of PASCAL3D+ have their WordNet numbers (car: 02958343); others their name, `-` for what is no
+plain letter, digit or point. md5: of the model's key. The last two numbers of a name keep pictures of equal angles apart; the
+tools read no farther than the distance. Objects of which nothing is seen have no picture.
+
+Lost: what is around the objects, masks, cameras, sequences, sensors. The tools' own pictures are of one model without a
+background, which is laid under it later; these are cut out of the whole picture, so that others may hide a part of the object.
+Source: H. Su, C. R. Qi, Y. Li, L. J. Guibas, Render for CNN, ICCV 2015, https://github.com/ShapeNet/RenderForCNN.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewsphere.codecs.pictures import encode_picture
+from viewsphere.formats import Scope
+from viewsphere.formats._contents import Coded
+from viewsphere.formats._pictures import JPEG_QUALITY, opaque
+from viewsphere.formats._tree import File, Piece, Tree, functions, line
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("viewpoints", "pictures of objects", "truncations")
+READ_BY = ("RenderForCNN",)
+
+PICTURES = "syn_images_cropped_bkg_overlaid"
+SYNSETS = {
+    "aeroplane": "02691156", "bicycle": "02834778", "boat": "02858304", "bottle": "02876657", "bus": "02924116",
+    "car": "02958343", "chair": "03001627", "diningtable": "04379243", "motorbike": "03790512", "sofa": "04256520",
+    "train": "04468005", "tvmonitor": "03211117",
+}  # fmt: skip
+
+
+def refuses(scope: Scope) -> Iterator[str]:
+    """Pictures from nobody knows where, and names that the format cannot tell apart."""
+    if scope.rig is None:
+        yield "expected pictures of known cameras; found imported ones"
+    first = dict[str, str]()
+    for category in scope.categories:
+        other = first.setdefault(_word(category.name), category.name)
+        if other != category.name:
+            yield f"expected names of categories that differ in letters and digits; found {other!r}, {category.name!r}"
+
+
+def _word(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9.]", "-", name)
+
+
+class RenderForCnn(Tree):
+    """The tree of pictures and of their lists."""
+
+    def __init__(self, dataset: Dataset) -> None:
+        super().__init__(dataset)
+        self._numbers = {category.name: number for number, category in enumerate(dataset.categories)}
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """The pictures of a sample's objects, and their lines."""
+        split = sample.split or "all"
+        for o in sample.objects:
+            if o.box2d is None:
+                continue
+            path, name, view = self._path(sample, o), _word(o.category), o.view
+            angles = (round(angle) % 360 for angle in (view.azimuth_deg, view.elevation_deg, view.tilt_deg))
+            listed = (path, self._numbers[o.category], *angles)
+            yield File(path, _cut(sample, o))
+            yield line(f"syn_lmdbs/{name}_{split}.txt", *listed)
+            yield line(f"syn_lmdbs/all_{split}.txt", *listed)
+            seen_from = (view.azimuth_deg % 360, view.elevation_deg, -view.tilt_deg, view.distance)
+            yield line(f"view_distribution/{name}.txt", *map(float, seen_from))
+            if o.box2d_unclipped is not None:
+                yield line(f"truncation_distribution/{name}.txt", *_truncation(o.box2d, o.box2d_unclipped))
+
+    def rest(self) -> Iterator[File]:
+        """The names of classes and of models."""
+        synsets = "".join(f"{_synset(name)} {name}\n" for name in self._numbers)
+        yield File("synsets.txt", synsets.encode())
+        yield File("models.txt", "".join(f"{_md5(info.key)} {info.key}\n" for info in self.dataset.models).encode())
+
+    def _path(self, sample: Sample, o: ObjectAnnotation) -> str:
+        synset, md5, view = _synset(o.category), _md5(o.key), o.view
+        turned = f"a{round(view.azimuth_deg) % 360:03}_e{round(view.elevation_deg):03}_t{round(view.tilt_deg) % 360:03}"
+        name = f"{synset}_{md5}_{turned}_d{round(view.distance):03}_{sample.index:08}_{o.id}.jpg"
+        return f"{PICTURES}/{synset}/{md5}/{name}"
+
+
+def _synset(category: str) -> str:
+    return SYNSETS.get(category, _word(category))
+
+
+def _md5(key: str) -> str:
+    return hashlib.md5(key.encode(), usedforsecurity=False).hexdigest()
+
+
+def _cut(sample: Sample, o: ObjectAnnotation) -> Coded:
+    """The picture of an object's box."""
+    assert o.box2d is not None
+    x0, y0, x1, y1 = np.array([*np.floor(o.box2d[:2]), *np.ceil(o.box2d[2:])], int)
+
+    def make() -> bytes:
+        return encode_picture(np.ascontiguousarray(opaque(sample.picture)[y0:y1, x0:x1]), "jpeg", JPEG_QUALITY)
+
+    return Coded(sample.index, f"cut {o.id}.jpg", make)
+
+
+def _truncation(seen: tuple[float, ...], whole: tuple[float, ...]) -> Iterator[float]:
+    """The sides' distances, right and down, from those of the whole box, as shares of its size."""
+    width, height = whole[2] - whole[0], whole[3] - whole[1]
+    for side, other, size in zip(seen, whole, (width, height, width, height), strict=True):
+        yield float((side - other) / size) if size else 0.0
+
+
+preparer, writer, verify = functions(RenderForCnn)
