@@ -17,9 +17,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from viewsphere.aside import temporary
+from viewsphere.errors import UserError
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import Content, Expected, check_files, put, same_bytes
 from viewsphere.formats._paper import json_bytes
+from viewsphere.labels import channels
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
@@ -121,11 +123,12 @@ def functions(kind: type[Tree]) -> Functions:
 
         def prepare(sample: Sample) -> list[Piece]:
             pieces: list[Piece] = []
-            for one in tree.of(sample):
-                if isinstance(one, Piece):
-                    pieces.append(one)
-                else:
-                    put(dataset, one.content, folder / one.path)
+            with _lacking_told(tree, sample):
+                for one in tree.of(sample):
+                    if isinstance(one, Piece):
+                        pieces.append(one)
+                    else:
+                        put(dataset, one.content, folder / one.path)
             return pieces
 
         return prepare
@@ -152,6 +155,18 @@ def functions(kind: type[Tree]) -> Functions:
                 yield from _different(aside / path, folder / path)
 
     return Functions(preparer, writer, verify)
+
+
+@contextmanager
+def _lacking_told(tree: Tree, sample: Sample) -> Generator[None]:
+    """Raises UserError for a channel that the sample lacks, as those of imported data sets may."""
+    try:
+        yield
+    except KeyError as error:
+        if error.args and error.args[0] in channels():
+            lacking = f"expected channel {error.args[0]}, found none: leave this format out"
+            raise UserError(f"{tree.dataset.root}: frame {sample.index}: {lacking}") from None
+        raise
 
 
 def _nowhere(pieces: list[Piece]) -> None:
