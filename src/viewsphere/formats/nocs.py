@@ -43,6 +43,7 @@ from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import depth_png, picture
 from viewsphere.formats._refusals import most_objects
 from viewsphere.formats._tree import File, Piece, Tree, functions
+from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset, ModelInfo
@@ -104,7 +105,7 @@ def _mask(sample: Sample) -> NDArray[np.uint8]:
 def _coord(sample: Sample) -> NDArray[np.uint8]:
     """Places as colours (H, W, 3)."""
     shares = sample.channels["nocs"].astype(np.float64)
-    x, y, z = np.moveaxis((shares - 0.5) @ Y_UP.T + 0.5, -1, 0)
+    x, y, z = np.moveaxis(transform(Y_UP, shares - 0.5) + 0.5, -1, 0)
     colors = np.rint(np.clip(np.stack([x, y, 1 - z], axis=-1), 0, 1) * 255)
     return np.where(np.isfinite(colors), colors, 0).astype(np.uint8)
 
@@ -125,7 +126,7 @@ def _poses(sample: Sample) -> dict[str, Any]:
     diagonals = np.linalg.norm(sizes, axis=1)
     for pose, o, diagonal in zip(poses, seen, diagonals, strict=True):
         rotation, middle = o.camera_from_object[:3, :3], o.box3d_camera.mean(axis=0)
-        pose[:3, :3], pose[:3, 3] = diagonal * rotation @ Y_UP.T, middle
+        pose[:3, :3], pose[:3, 3] = diagonal * product(rotation, Y_UP.T), middle
     return {
         "gt_class_ids": np.array([o.category_id for o in seen], np.int64),
         "gt_bboxes": np.array([(y0, x0, y1, x1) for x0, y0, x1, y1 in boxes], np.int64).reshape(-1, 4),
@@ -155,9 +156,9 @@ def _portable(value: Any) -> bytes:
 def _mesh(dataset: Dataset, info: ModelInfo) -> bytes:
     """An OBJ of triangles alone."""
     mesh, middle = dataset.mesh(info.key), info.box3d_object.mean(axis=0)
-    corners = (mesh.vertices.astype(np.float64) - middle) @ Y_UP.T
-    points = (f"v {x:.7g} {y:.7g} {z:.7g}\n" for x, y, z in corners.tolist())
-    return "".join([*points, *(f"f {a} {b} {c}\n" for a, b, c in (mesh.triangles + 1).tolist())]).encode()
+    corners = transform(Y_UP, mesh.vertices - middle)
+    points = "v %.7g %.7g %.7g\n" * len(corners) % tuple(corners.ravel().tolist())
+    return (points + "f %d %d %d\n" * len(mesh.triangles) % tuple((mesh.triangles + 1).ravel().tolist())).encode()
 
 
 preparer, writer, verify = functions(Nocs)

@@ -36,6 +36,7 @@ from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._refusals import pinhole
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, item
 from viewsphere.geometry.box import clip_to_image
+from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 CHANNELS = ("rgb",)
@@ -113,11 +114,11 @@ def _annotation(sample: Sample, o: ObjectAnnotation) -> dict[str, Any]:
 def _box(sample: Sample, o: ObjectAnnotation) -> dict[str, Any]:
     """The box in 3D, and as the camera sees it."""
     width, height, length = o.size
-    rotation = o.camera_from_object[:3, :3] @ OBJECT_FROM_BOX
+    rotation = product(o.camera_from_object[:3, :3], OBJECT_FROM_BOX)
     center = o.box3d_camera.mean(axis=0)
-    corners = (CORNERS * [length, height, width]) @ rotation.T + center
+    corners = transform(rotation, CORNERS * [length, height, width]) + center
     is_behind = bool(corners[:, 2].min() <= 0)
-    around = None if is_behind else _bounds(corners @ sample.camera.K.T)
+    around = None if is_behind else _bounds(transform(sample.camera.K, corners))
     inside = around and clip_to_image(around, sample.width, sample.height)
     return {
         "bbox2D_proj": list(around or UNKNOWN),
