@@ -251,11 +251,17 @@ def test_quoted_and_foreign_names(tmp_path):
 
 
 def test_a_zoom_has_no_calibration(videos, tmp_path, monkeypatch):
-    from viewsphere.formats import kitti
+    from viewsphere.formats._timeline import Timeline
 
-    still = kitti.calibration
-    monkeypatch.setattr(kitti, "calibration", lambda *args: {**still(*args), "P2": still(*args)["P2"] * (1 + args[1])})
-    with pytest.raises(UserError, match="kitti: expected one lens all through a sequence; found another in frame 2"):
+    def zooming(timeline, course):
+        for shot in shots(timeline, course):
+            lens = shot.camera(0).intrinsics
+            other = lens.model_copy(update={"fx": 2 * lens.fx})
+            yield shot.model_copy(update={"instants": [now.model_copy(update={"intrinsics": other}) for now in shot.instants]})
+
+    shots = Timeline.shots
+    monkeypatch.setattr(Timeline, "shots", zooming)
+    with pytest.raises(UserError, match="kitti: expected one lens all through a sequence; found another in frame 0"):
         export(videos.root, [{"kitti": {"task": "tracking"}}], output=tmp_path)
     assert not (tmp_path / "kitti").exists()
 
@@ -286,6 +292,31 @@ def test_imported_boxes_have_unknown_values(stills, tmp_path):
             assert line[1:4] == ["-1", "3", "-10"] and line[8:] == ["-1"] * 3 + ["-1000"] * 3 + ["-10"]
             assert list(map(float, line[4:8])) == np.subtract(o.box2d, (0, 0, 1, 1)).tolist()
     assert not (tmp_path / "kitti/training/calib").exists()
+
+
+def test_merged_pictures(stills, poses, written, tmp_path):
+    """They have no shots, but cameras and boxes: all is as it was, but for the numbers of frames."""
+    from viewsphere.run.merging import merge
+
+    merge([stills.root, poses.root], tmp_path / "merged", mixed=True)
+    export(tmp_path / "merged", "kitti", output=tmp_path)
+    for sample in stills:
+        for kind in ("label_2", "calib"):
+            file = f"training/{kind}/{sample.index:06d}.txt"
+            assert (tmp_path / "kitti" / file).read_text() == (written("stills") / file).read_text()
+
+
+def test_merged_rigs_are_refused(videos, drives, tmp_path):
+    from viewsphere.run.merging import merge
+
+    merge([videos.root, drives.root], tmp_path / "merged", mixed=True)
+    told = "expected shots with their rigs, which imported and merged data sets do not have; found none"
+    for entry in ({"kitti": {"task": "tracking"}}, "kitti_odometry", "nuscenes"):
+        with pytest.raises(UserError, match=told):
+            export(tmp_path / "merged", [entry], output=tmp_path / "no")
+    with pytest.raises(UserError, match=f"frame 0: {told}"):
+        export(tmp_path / "merged", "kitti", output=tmp_path / "no")
+    assert not (tmp_path / "no" / "kitti").exists()
 
 
 def test_datumaro_reads_it(stills, written):

@@ -117,10 +117,16 @@ def test_refusals(stills, tmp_path):
 
 
 def test_a_zoom_has_no_calibration(videos, tmp_path, monkeypatch):
-    from viewsphere.formats import kitti_odometry
+    from viewsphere.formats._timeline import Timeline
 
-    still = kitti_odometry.calibration
-    monkeypatch.setattr(kitti_odometry, "calibration", lambda *args: {**still(*args), "P2": still(*args)["P2"] * (1 + args[1])})
-    with pytest.raises(UserError, match="kitti_odometry: expected one lens all through a sequence; found another in frame 2"):
+    def zooming(timeline, course):
+        for shot in shots(timeline, course):
+            lens = shot.camera(0).intrinsics
+            other = lens.model_copy(update={"fx": 2 * lens.fx})
+            yield shot.model_copy(update={"instants": [now.model_copy(update={"intrinsics": other}) for now in shot.instants]})
+
+    shots = Timeline.shots
+    monkeypatch.setattr(Timeline, "shots", zooming)
+    with pytest.raises(UserError, match="kitti_odometry: expected one lens all through a sequence; found another in frame 0"):
         export(videos.root, FORMAT, output=tmp_path)
     assert not (tmp_path / FORMAT).exists()

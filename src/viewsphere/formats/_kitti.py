@@ -1,4 +1,4 @@
-"""What KITTI's benchmarks share: which sensors a car has, how they are calibrated, upright boxes, and files of points."""
+"""What KITTI's benchmarks share: which sensors a car has, how they are calibrated, lines of labels, and files of points."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats._mounting import CAMERA_FROM_LIDAR, Float, centred, measured, mounted, pointless, unmoved
 from viewsphere.geometry.rotation import compose, product, transform
+from viewsphere.labels.occlusion_level import LARGELY, PARTLY, UNKNOWN
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 from viewsphere.model.shot import Shot
@@ -52,16 +54,16 @@ def car_in(shot: Shot, name: str) -> Car:
     return car
 
 
-def calibration(shot: Shot, instant: int, car: Car) -> Mapping[str, Float]:
+def calibration(rig: Rig, car: Car, intrinsics: Intrinsics) -> Mapping[str, Float]:
     """The four projections (3, 4), whose pixel (0, 0) is the centre of the first one, and `velo` (3, 4), from the LiDAR's axes
     to those of the left camera. The grey cameras, 0 and 1, stand where the coloured ones, 2 and 3, do; a right one that is not
-    there, where the left one is.
+    there, where the left one is. `intrinsics`: the left camera's lens then.
     """
-    left, right = mounted(shot.rig, car.left), mounted(shot.rig, car.left if car.right is None else car.right)
+    left, right = mounted(rig, car.left), mounted(rig, car.left if car.right is None else car.right)
     velo = CAMERA_FROM_LIDAR
     if car.lidar is not None:
-        velo = compose(compose(unmoved(left), mounted(shot.rig, car.lidar)), CAMERA_FROM_LIDAR)
-    lens = centred(shot.camera(instant, car.left).K)
+        velo = compose(compose(unmoved(left), mounted(rig, car.lidar)), CAMERA_FROM_LIDAR)
+    lens = centred(intrinsics.K)
     two, three = (product(lens, [[1, 0, 0, -along], [0, 1, 0, 0], [0, 0, 1, 0]]) for along in (0.0, _along(left, right)))
     return {"P0": two, "P1": three, "P2": two, "P3": three, "velo": velo[:3]}
 
@@ -86,6 +88,28 @@ def velodyne(sample: Sample) -> bytes:
     """The points of a LiDAR, four float32 each: x ahead, y left, z up (metres), and intensity."""
     points = measured(sample)
     return np.column_stack([points["xyz"], points["intensity"]]).astype("<f4").tobytes()
+
+
+NO_BOX = (-1.0, -1.0, -1.0, -1000.0, -1000.0, -1000.0, -10.0)
+NO_ANGLE, NO_SHARE = -10.0, -1
+"""What stands for values of imported objects that nobody knows."""
+
+
+def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
+    """A line of labels, without its end: of an object of this type, whose truncation is its share, or its grade."""
+    assert o.box2d is not None
+    alpha, box = upright(o) if o.is_placed else (NO_ANGLE, NO_BOX)
+    outside = NO_SHARE if math.isnan(o.truncation) else o.truncation_level if in_grades else o.truncation
+    start = f"{kind} {outside:.6g} {_hidden(o)}"
+    return " ".join([start, *(f"{number + 0.0:.9g}" for number in (alpha, *inclusive(o.box2d), *box))])
+
+
+def _hidden(o: ObjectAnnotation) -> int:
+    """KITTI's grade of occlusion, of merged objects too, of which no more than the shares is kept."""
+    if math.isnan(o.visibility):
+        return UNKNOWN
+    hidden = 1 - o.visibility / (1 - o.truncation)
+    return int(o.more.get("occlusion_level", (hidden > PARTLY) + (hidden > LARGELY)))
 
 
 def inclusive(box: Box) -> Box:

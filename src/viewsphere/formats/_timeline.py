@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 from viewsphere.errors import UserError
+from viewsphere.formats import Scope
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.store import Dataset, PlanRecord
 from viewsphere.store.index import Block
+
+KNOWN = "shots with their rigs, which imported and merged data sets do not have"
 
 SHOTS = 4
 """Shots that are kept for those who ask again."""
@@ -29,6 +32,12 @@ class Course:
     stop: int
     instants: int
     each: int
+
+
+def unknown_shots(scope: Scope) -> Iterator[str]:
+    """Of a format that has to know how sensors are mounted."""
+    if scope.rig is None:
+        yield f"expected {KNOWN}; found none"
 
 
 class Timeline:
@@ -59,8 +68,15 @@ class Timeline:
         return Course(number, first, stop, run.instants, run.block.each)
 
     def shot(self, sample: Sample) -> Shot | None:
-        """The shot that a sample is of; None for an imported picture."""
+        """The shot that a sample is of; None for an imported picture, or one of a merged data set."""
         return None if sample.taken is None else self._labelled(sample.taken.key)
+
+    def taken(self, sample: Sample) -> tuple[Shot, int, int]:
+        """The shot that a sample is of, and its instant and its sensor there; raises UserError where nobody knows it."""
+        shot = self.shot(sample)
+        if shot is None or sample.taken is None:
+            raise UserError(f"frame {sample.index}: expected {KNOWN}; found none")
+        return shot, sample.taken.instant, sample.taken.sensor
 
     def shots(self, course: Course) -> Iterator[Shot]:
         """The finished shots of a sequence, in order."""

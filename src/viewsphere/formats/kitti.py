@@ -48,18 +48,18 @@ from viewsphere.formats._kitti import (
     calibration,
     calibration_text,
     car_in,
-    inclusive,
     other_cars,
-    upright,
+    row,
     velodyne,
 )
 from viewsphere.formats._mounting import Float
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import pinhole, plain_names, sequences
-from viewsphere.formats._timeline import Timeline
+from viewsphere.formats._timeline import Timeline, unknown_shots
 from viewsphere.formats._tree import File, Piece, Tree, functions, line
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.rig import CAMERA, Rig
+from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
 CHANNELS = ("rgb",)
@@ -76,9 +76,6 @@ CALIBRATED = {
     "tracking": ("R_rect", "Tr_velo_cam", "Tr_imu_velo"),
 }
 """How the tasks begin the lines behind the projections: only one has colons."""
-
-NO_BOX = (-1.0, -1.0, -1.0, -1000.0, -1000.0, -1000.0, -10.0)
-NO_ANGLE, NO_SHARE, UNKNOWN = -10.0, -1, 3
 
 
 class Options(Frozen):
@@ -105,6 +102,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
         yield f"expected categories of different types; found {alike}, all of type {name}"
     if options.task == "tracking":
         yield from sequences(scope)
+        yield from unknown_shots(scope)
 
 
 class Kitti(Tree):
@@ -117,8 +115,7 @@ class Kitti(Tree):
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
         """What a sensor adds: its picture or points, and, of the left camera, all that is of the frame as a whole."""
-        shot = self._timeline.shot(sample)
-        car, place = (Car(0), 0) if shot is None or sample.taken is None else (car_in(shot, "kitti"), sample.taken.sensor)
+        rig, car, place = self._sensor(sample)
         name, image = f"{sample.index - place:06d}", "image_"
         if self._task == "tracking":
             name, image = f"{self._timeline.course(sample).number:04d}/{sample.instant:06d}", "image_0"
@@ -128,48 +125,36 @@ class Kitti(Tree):
             yield File(f"training/{image}{2 if place == car.left else 3}/{name}.png", picture(sample, ".png"))
         if place == car.left:
             yield line(f"ImageSets/{sample.split or 'all'}.txt", name)
-            yield from self._labels(sample, car, name)
+            yield from self._labels(sample, rig, car, name)
 
-    def _labels(self, sample: Sample, car: Car, name: str) -> Iterator[File | Piece]:
-        """The lines of a frame's objects, and how its cameras are calibrated."""
-        rows = [self._row(o) for o in sample.objects if o.box2d is not None]
-        calibrated = self._calibrated(sample, car)
+    def _sensor(self, sample: Sample) -> tuple[Rig | None, Car, int]:
+        """The rig, what it is to KITTI, and the sample's sensor by its place in it; of one camera, as imported and merged data
+        sets may have it, where the shot is not known. Raises UserError for another sensor there.
+        """
+        if sample.taken is not None or sample.sensor != CAMERA or self._task == "tracking":
+            shot, _, place = self._timeline.taken(sample)
+            return shot.rig, car_in(shot, "kitti"), place
+        return None if sample.known_camera is None else Rig.of(sample.known_camera.intrinsics), Car(0), 0
+
+    def _labels(self, sample: Sample, rig: Rig | None, car: Car, name: str) -> Iterator[File | Piece]:
+        """The lines of a frame's objects, and how its cameras are calibrated, where that is known."""
+        rows = [row(o, type_of(o.category), self._task == "tracking") for o in sample.objects if o.box2d is not None]
+        calibrated = None if rig is None else _text(calibration(rig, car, sample.camera.intrinsics), self._task)
         if self._task == "object":
             yield File(f"training/label_2/{name}.txt", "".join(f"{row}\n" for row in rows).encode())
             if calibrated:
                 yield File(f"training/calib/{name}.txt", calibrated)
             return
-        yield from self._of_sequence(sample, car, rows)
-
-    def _of_sequence(self, sample: Sample, car: Car, rows: list[str]) -> Iterator[File | Piece]:
-        """A frame's part of its sequence's files. Raises UserError for a lens that is not the sequence's."""
         course = self._timeline.course(sample)
-        start = next(self._timeline.shots(course))
-        calibrated = _text(calibration(start, 0, car), self._task)
-        if calibrated != self._calibrated(sample, car):
+        number, start = f"{course.number:04d}", next(self._timeline.shots(course))
+        if start.camera(next(start.samples)[1], car.left).intrinsics != sample.camera.intrinsics:
             raise UserError(f"kitti: expected one lens all through a sequence; found another in frame {sample.index}")
         ids = (o.id for o in sample.objects if o.box2d is not None)
-        lines = "".join(f"{sample.instant} {number} {row}\n" for number, row in zip(ids, rows, strict=True))
-        yield Piece(f"training/label_02/{course.number:04d}.txt", lines.encode())
-        if self._timeline.is_first(sample):
-            yield File(f"training/calib/{course.number:04d}.txt", calibrated)
-            yield line("evaluate_tracking.seqmap.training", f"{course.number:04d}", "empty", "000000", f"{course.instants:06d}")
-
-    def _calibrated(self, sample: Sample, car: Car) -> bytes:
-        """The text of a calibration; nothing where nobody knows the camera."""
-        shot = self._timeline.shot(sample)
-        return b"" if shot is None or sample.taken is None else _text(calibration(shot, sample.taken.instant, car), self._task)
-
-    def _row(self, o: ObjectAnnotation) -> str:
-        """A line of labels, without its end."""
-        assert o.box2d is not None
-        outside = o.truncation if o.is_placed else NO_SHARE
-        if self._task == "tracking":
-            outside = o.more.get("truncation_level", NO_SHARE)
-        alpha, box = upright(o) if o.is_placed else (NO_ANGLE, NO_BOX)
-        numbers = (alpha, *inclusive(o.box2d), *box)
-        start = f"{type_of(o.category)} {outside:.6g} {o.more.get('occlusion_level', UNKNOWN)}"
-        return " ".join([start, *(f"{number + 0.0:.9g}" for number in numbers)])
+        lines = "".join(f"{sample.instant} {own} {row}\n" for own, row in zip(ids, rows, strict=True))
+        yield Piece(f"training/label_02/{number}.txt", lines.encode())
+        if calibrated and self._timeline.is_first(sample):
+            yield File(f"training/calib/{number}.txt", calibrated)
+            yield line("evaluate_tracking.seqmap.training", number, "empty", "000000", f"{course.instants:06d}")
 
 
 def _text(calibrated: Mapping[str, Float], task: str) -> bytes:

@@ -22,7 +22,7 @@ for autonomous driving? The KITTI vision benchmark suite, CVPR 2012; https://www
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
@@ -38,7 +38,7 @@ from viewsphere.formats._kitti import (
 from viewsphere.formats._mounting import Float, mounted, unmoved
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import pinhole, sequences
-from viewsphere.formats._timeline import Timeline
+from viewsphere.formats._timeline import Timeline, unknown_shots
 from viewsphere.formats._tree import File, Piece, Tree, functions, line
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.sample import Sample
@@ -55,6 +55,7 @@ READ_BY = ("pykitti",)
 def refuses(scope: Scope) -> Iterator[str]:
     """Still pictures, lenses, and other cars than KITTI's."""
     yield from sequences(scope)
+    yield from unknown_shots(scope)
     yield from pinhole(scope)
     yield from other_cars(scope)
 
@@ -68,9 +69,8 @@ class KittiOdometry(Tree):
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
         """What a sensor adds: its picture or points, and, of the left camera, the pose."""
-        course, shot = self._timeline.course(sample), self._timeline.shot(sample)
-        assert shot is not None and sample.taken is not None
-        car, place = car_in(shot, "kitti_odometry"), sample.taken.sensor
+        course, (shot, instant, place) = self._timeline.course(sample), self._timeline.taken(sample)
+        car = car_in(shot, "kitti_odometry")
         number, frame = f"{course.number:02d}", f"{sample.instant:06d}"
         if place == car.lidar:
             yield File(f"sequences/{number}/velodyne/{frame}.bin", velodyne(sample))
@@ -79,14 +79,15 @@ class KittiOdometry(Tree):
         if place == car.left:
             start = next(self._timeline.shots(course))
             first = next(start.samples)[1]
-            calibrated = _text(calibration(start, first, car))
-            if calibrated != _text(calibration(shot, sample.taken.instant, car)):
+            lens = start.camera(first, car.left).intrinsics
+            if lens != sample.camera.intrinsics:
                 raise UserError(
                     f"kitti_odometry: expected one lens all through a sequence; found another in frame {sample.index}"
                 )
             if self._timeline.is_first(sample):
-                yield File(f"sequences/{number}/calib.txt", calibrated)
-            moved = compose(unmoved(_pose(start, first, car)), _pose(shot, sample.taken.instant, car))
+                calibrated = calibration(shot.rig, car, lens)
+                yield File(f"sequences/{number}/calib.txt", calibration_text(calibrated, ("Tr:", calibrated["velo"])))
+            moved = compose(unmoved(_pose(start, first, car)), _pose(shot, instant, car))
             yield line(f"sequences/{number}/times.txt", f"{sample.time:.6e}")
             yield line(f"poses/{number}.txt", printed(moved[:3]))
             yield line(f"ImageSets/{sample.split or 'all'}.txt", f"{number}/{frame}")
@@ -95,10 +96,6 @@ class KittiOdometry(Tree):
 def _pose(shot: Shot, instant: int, car: Car) -> Float:
     """The rigid matrix (4, 4) from the left camera's axes to the world's."""
     return compose(shot.instants[instant].world_from_rig, mounted(shot.rig, car.left))
-
-
-def _text(calibrated: Mapping[str, Float]) -> bytes:
-    return calibration_text(calibrated, ("Tr:", calibrated["velo"]))
 
 
 preparer, writer, verify = functions(KittiOdometry)

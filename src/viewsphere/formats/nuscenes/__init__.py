@@ -44,7 +44,7 @@ from viewsphere.formats._mounting import pointless
 from viewsphere.formats._paper import json_bytes
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import pinhole, sequences
-from viewsphere.formats._timeline import Timeline
+from viewsphere.formats._timeline import Timeline, unknown_shots
 from viewsphere.formats._tree import LIST, File, Layout, Piece, Tree, functions, item
 from viewsphere.formats.nuscenes import records
 from viewsphere.formats.nuscenes.names import LOG, MAP, alike, category_of, channels_of, modalities, token
@@ -73,6 +73,7 @@ class Options(Frozen):
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Still pictures, lenses, and names that would be one."""
     yield from sequences(scope)
+    yield from unknown_shots(scope)
     yield from pinhole(scope)
     yield from pointless(scope)
     yield from alike("categories", [(category.name, category_of(category.name)) for category in scope.categories])
@@ -94,10 +95,9 @@ class NuScenes(Tree):
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
         """What a sensor adds; the first one of an instant, all that is of the instant as a whole, too."""
-        shot, course = self._timeline.shot(sample), self._timeline.course(sample)
-        assert shot is not None and sample.taken is not None
-        start, story = sample.index - sample.taken.sensor, self._story(course)
-        view, channel = View(sample, shot, course, story), channels_of(shot.rig)[sample.taken.sensor]
+        course, (shot, instant, place) = self._timeline.course(sample), self._timeline.taken(sample)
+        start, story = sample.index - place, self._story(course)
+        view, channel = View(sample, shot, instant, place, course, story), channels_of(shot.rig)[place]
         if self._kinds.get(channel) != view.modality:
             raise UserError(f"nuscenes: expected the sensors {', '.join(self._kinds)} in all sequences; found {channel}")
         yield File(view.file(channel), points(sample) if view.modality == "lidar" else picture(sample, *KINDS))

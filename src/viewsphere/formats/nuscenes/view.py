@@ -30,10 +30,12 @@ Rows = Iterator[tuple[str, records.Record]]
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A sample, its shot, and its sequence."""
+    """A sample, its shot, its instant and its sensor there, and its sequence."""
 
     sample: Sample
     shot: Shot
+    instant: int
+    place: int
     course: Course
     story: Story
 
@@ -41,12 +43,6 @@ class View:
     def scene(self) -> str:
         """The name of its scene."""
         return f"scene-{self.course.number + 1:04d}"
-
-    @property
-    def place(self) -> int:
-        """Its sensor's place in the rig."""
-        assert self.sample.taken is not None
-        return self.sample.taken.sensor
 
     @property
     def modality(self) -> str:
@@ -102,9 +98,8 @@ class View:
 
     def of_instant(self) -> Rows:
         """The records of its instant, and, of the first one, of the scene."""
-        assert self.sample.taken is not None
         instant, instants = self.sample.instant, self.story.instants
-        ego = records.world_from_ego(np.array(self.shot.instants[self.sample.taken.instant].world_from_rig))
+        ego = records.world_from_ego(np.array(self.shot.instants[self.instant].world_from_rig))
         yield "ego_pose", {"token": self.token("ego_pose", instant), "timestamp": self.timestamp, **ego}
         own, scene = self.token("sample", instant), self.token("scene")
         beside = records.chain(instants, instant, lambda other: self.token("sample", other))
