@@ -17,6 +17,7 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import project
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
+from viewsphere.sampling.pose_files.colmap import read_colmap
 from viewsphere.store.choice import Choice
 
 
@@ -234,3 +235,13 @@ def test_what_is_broken_is_told(poses, tmp_path):
             file.write_bytes(whole)
     with pytest.raises(StoreError, match=r"expected sparse/0 with cameras and images as \.txt or \.bin; found none"):
         import_dataset("colmap", tmp_path, tmp_path / "in")
+
+
+def test_recipes_take_the_poses(stills, tmp_path):
+    folder = written(stills, tmp_path, "text")
+    read = read_colmap(folder / "scene-000001" / "sparse" / "0")
+    own = [sample for sample in stills if stills.plan.row_at(sample.index).subject == "scene-000001"]
+    assert read.intrinsics == own[0].camera.intrinsics
+    for entry, sample in zip(read.entries, own, strict=True):
+        close("colmap", "recipes: poses", entry.R, sample.camera.R, atol=1e-12)
+        close("colmap", "recipes: positions", entry.center, sample.camera.center, "m", atol=1e-12)
