@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 import pycolmap
 import pytest
@@ -11,9 +13,11 @@ from proven import close, equal
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
-from viewsphere.errors import UserError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import project
 from viewsphere.run.exporting import export
+from viewsphere.run.importing import import_dataset
+from viewsphere.sampling.pose_files.colmap import read_colmap
 from viewsphere.store.choice import Choice
 
 
@@ -174,3 +178,70 @@ def test_what_it_refuses(tmp_path):
     with pytest.raises(UserError, match=r"format colmap: expected cameras without skew; found 2.5 of camera"):
         written(dataset, tmp_path / "made", "text")
     assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize("kind", ["text", "binary"])
+def test_a_model_comes_in_as_it_went_out(videos, kind, tmp_path):
+    folder = written(videos, tmp_path, kind)
+    for world in videos.sequences:
+        import_dataset("colmap", folder / world, tmp_path / world)
+        own = sorted((sample for sample in videos if sample.sequence == world), key=lambda sample: sample.sensor)
+        for sample, was in zip(Dataset(tmp_path / world), own, strict=True):
+            close("colmap", "import: poses", sample.camera.R, was.camera.R, atol=1e-12)
+            close("colmap", "import: positions", sample.camera.t, was.camera.t, "m", atol=1e-12)
+            equal("colmap", "import: lenses", sample.camera.K, was.camera.K)
+            equal("colmap", "import: pictures", sample.rgb, was.rgb)
+            assert sample.split == was.split
+
+
+@pytest.mark.parametrize("kind", ["text", "binary"])
+@pytest.mark.parametrize("name", ["barrel", "rational", "fisheye"])
+def test_lenses_come_in(name, kind, tmp_path):
+    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": LENSES[name]}))
+    import_dataset("colmap", written(dataset, tmp_path / "made", kind) / "several", tmp_path / "in")
+    for sample, was in zip(Dataset(tmp_path / "in"), dataset, strict=True):
+        assert sample.camera.intrinsics == was.camera.intrinsics and sample.split == was.split
+
+
+@pytest.mark.parametrize("kind", ["text", "binary"])
+def test_what_pycolmap_writes_comes_in(stills, kind, tmp_path):
+    world = written(stills, tmp_path, kind) / "scene-000001"
+    place = tmp_path / "theirs"
+    (place / "sparse" / "0").mkdir(parents=True)
+    shutil.copytree(world / "images", place / "images")
+    model = pycolmap.Reconstruction(world / "sparse" / "0")
+    getattr(model, f"write_{kind}")(place / "sparse" / "0")
+    import_dataset("colmap", place, tmp_path / "in")
+    own = [sample for sample in stills if stills.plan.row_at(sample.index).subject == "scene-000001"]
+    for sample, was in zip(Dataset(tmp_path / "in"), own, strict=True):
+        close("colmap", f"import of pycolmap's {kind}: positions", sample.camera.t, was.camera.t, "m", atol=1e-12)
+        close("colmap", f"import of pycolmap's {kind}: lenses", sample.camera.K, was.camera.K, "px", atol=1e-12)
+
+
+def test_what_is_broken_is_told(poses, tmp_path):
+    for kind, ending in (("text", "txt"), ("binary", "bin")):
+        world = written(poses, tmp_path / kind, kind) / "car_000"
+        shutil.move(world / "images" / "00000001.png", world / "images" / "other.png")
+        with pytest.raises(StoreError, match=r"images\.\w+: image '00000001.png': expected a picture; found no 00000001.png"):
+            import_dataset("colmap", world, tmp_path / "in")
+        assert import_dataset("colmap", world, tmp_path / f"{kind}-in", keep_going=True).count == 3
+        for name in ("cameras", "images"):
+            file = world / "sparse" / "0" / f"{name}.{ending}"
+            whole = file.read_bytes()
+            file.unlink()
+            file.write_bytes(whole[:50] if kind == "binary" else whole + b"1 2 3\n")
+            with pytest.raises(StoreError, match="expected a model of COLMAP's; found: "):
+                import_dataset("colmap", world, tmp_path / "in")
+            file.write_bytes(whole)
+    with pytest.raises(StoreError, match=r"expected sparse/0 with cameras and images as \.txt or \.bin; found none"):
+        import_dataset("colmap", tmp_path, tmp_path / "in")
+
+
+def test_recipes_take_the_poses(stills, tmp_path):
+    folder = written(stills, tmp_path, "text")
+    read = read_colmap(folder / "scene-000001" / "sparse" / "0")
+    own = [sample for sample in stills if stills.plan.row_at(sample.index).subject == "scene-000001"]
+    assert read.intrinsics == own[0].camera.intrinsics
+    for entry, sample in zip(read.entries, own, strict=True):
+        close("colmap", "recipes: poses", entry.R, sample.camera.R, atol=1e-12)
+        close("colmap", "recipes: positions", entry.center, sample.camera.center, "m", atol=1e-12)

@@ -17,10 +17,12 @@ from proven import close, equal
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
+from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import project
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
+from viewsphere.sampling.pose_files.nerfstudio import read_nerfstudio
 
 
 def written(dataset, place, **options):
@@ -213,6 +215,7 @@ def test_a_world_comes_in_as_it_went_out(stills, poses, kind, tmp_path):
                 near = was.depth < 65.5
                 close("nerfstudio", "import: depth", sample.depth[near], was.depth[near], "m", atol=0.000501)
                 assert np.isinf(sample.depth[~near]).all()
+    assert check(imported, rays=False).ok
     again = written(imported, tmp_path / "again", kind=kind)
     first = [json.loads(min(place.rglob("transforms*.json")).read_text())["frames"] for place in (folder, again)]
     before, after = ([frame["transform_matrix"] for frame in frames] for frames in first)
@@ -263,3 +266,14 @@ def test_what_is_broken_is_told(poses, tmp_path):
     assert found.count == 4 and len(found.left_out) == 1
     with pytest.raises(StoreError, match=r"expected transforms\.json, or transforms_train\.json; found neither"):
         import_dataset("nerfstudio", tmp_path, tmp_path / "none")
+
+
+def test_recipes_take_the_poses(videos, tmp_path):
+    folder = written(videos, tmp_path)
+    for world in videos.sequences:
+        read = read_nerfstudio(folder / world / "transforms.json")
+        own = [sample for sample in videos if sample.sequence == world]
+        assert read.intrinsics == own[0].camera.intrinsics
+        for entry, sample in zip(read.entries, own, strict=True):
+            close("nerfstudio", "recipes: poses", entry.R, sample.camera.R, atol=1e-12)
+            close("nerfstudio", "recipes: positions", entry.center, sample.camera.center, "m", atol=1e-12)

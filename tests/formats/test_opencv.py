@@ -8,10 +8,13 @@ import pytest
 
 from cube_dataset import LENS, make
 from proven import close, equal
+from small import small_recipe
 from truth_scenes import LENSES
+from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import project
 from viewsphere.run.exporting import export
+from viewsphere.sampling.rig_files import read_rig
 
 
 def written(dataset, place):
@@ -24,6 +27,8 @@ def loaded(file):
     assert found.isOpened()
 
     def value(node):
+        if node.isString():
+            return node.string()
         return node.mat() if node.isMap() else int(node.real())
 
     return {name: value(found.getNode(name)) for name in found.root().keys()}  # noqa: SIM118, a FileNode is no mapping
@@ -61,6 +66,7 @@ def test_cv2_projects_alike(name, tmp_path):
 
 def test_rectified_pairs(videos, tmp_path):
     found = loaded(written(videos, tmp_path) / "stereo" / "left" / "right.yaml")
+    assert (found.pop("image_width"), found.pop("image_height")) == (160, 120)
     sizes = {"M1": (3, 3), "D1": (1, 5), "M2": (3, 3), "D2": (1, 5), "R": (3, 3), "T": (3, 1), "R1": (3, 3), "R2": (3, 3)}
     assert {name: value.shape for name, value in found.items()} == {**sizes, "P1": (3, 4), "P2": (3, 4), "Q": (4, 4)}
     for sample in (sample for sample in videos if sample.sensor == "left"):
@@ -84,6 +90,32 @@ def test_q_p1_and_p2_are_those_of_stereo_rectify(videos, tmp_path):
     R1, R2, P1, P2, Q, *_ = cv2.stereoRectify(*args, flags=cv2.CALIB_ZERO_DISPARITY, alpha=-1)
     for name, value in (("R1", R1), ("R2", R2), ("P1", P1), ("P2", P2), ("Q", Q)):
         close("opencv", f"cv2.stereoRectify: {name}", found[name], value, atol=1e-6)
+
+
+BENT = {"model": "fisheye", "coefficients": LENSES["fisheye"].coefficients}
+
+
+@pytest.mark.parametrize("first", ["pinhole", "fisheye"])
+def test_any_pair_and_that_rigs_take_it(first, tmp_path):
+    sensors = {
+        "front": {"distortion": BENT} if first == "fisheye" else {},
+        "side": {"position": [0.2, -0.1, 0.05], "rotation": [5, 20, -10], "distortion": BENT, "size": [80, 60], "focal_px": 60},
+    }
+    recipe = small_recipe(rig={"sensors": sensors}, channels=["rgb", "depth"], formats=[])
+    generate(recipe, tmp_path / "out", workers=0)
+    dataset = Dataset(tmp_path / "out")
+    folder = written(dataset, tmp_path / "made")
+    found = loaded(folder / "stereo" / "front" / "side.yaml")
+    one, other = dataset[0].camera, dataset[1].camera
+    points = np.random.default_rng(0).uniform(-1, 1, (50, 3))
+    moved = (points @ one.R.T + one.t) @ found["R"].T + found["T"][:, 0]
+    close("opencv", "R and T of any pair", moved, points @ other.R.T + other.t, "m", atol=1e-12)
+    assert found.get("model") == ("fisheye" if first == "fisheye" else None) and "Q" not in found
+    if first == "fisheye":
+        left, right = read_rig([folder / "stereo" / "front" / "side.yaml"])
+        assert left.size == (96, 72) and right.distortion == other.distortion
+        close("opencv", "recipes: rigs", right.rig_from_sensor[:3, :3], one.R @ other.R.T, atol=1e-12)
+        assert right.lens == pytest.approx({"fx": 60, "fy": 60, "cx": 40, "cy": 30})
 
 
 def test_lidars_have_no_files(drives, tmp_path):

@@ -14,8 +14,10 @@ from proven import close, equal
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
-from viewsphere.errors import UserError
+from viewsphere.check import check
+from viewsphere.errors import StoreError, UserError
 from viewsphere.run.exporting import export
+from viewsphere.run.importing import import_dataset
 
 STEP = 0.0002
 
@@ -128,3 +130,78 @@ def test_lenses_that_change(tmp_path):
     generate(small_recipe(camera=camera, channels=["rgb", "depth"], formats=[]), tmp_path / "out", workers=0)
     with pytest.raises(UserError, match="expected one lens for all pictures of a sensor; found several"):
         written(Dataset(tmp_path / "out"), tmp_path / "made")
+
+
+@pytest.mark.parametrize("kind", ["tum", "icl-nuim"])
+def test_a_sequence_comes_in_as_it_went_out(videos, kind, tmp_path):
+    folder = written(videos, tmp_path / "made", kind)
+    for world in videos.sequences:
+        place = folder / world / "right"
+        import_dataset("tum", place, tmp_path / f"{world}-in")
+        imported = Dataset(tmp_path / f"{world}-in")
+        own = videos.sequence(world, "right")
+        assert imported.sequences == ("right",) and len(imported) == len(own)
+        for sample, was in zip(imported, own, strict=True):
+            close("tum", f"import of {kind}: positions", sample.camera.center, was.camera.center, "m", atol=1e-12)
+            close("tum", f"import of {kind}: rotations", sample.camera.R, was.camera.R, atol=1e-12)
+            equal("tum", "import: lenses", sample.camera.K, was.camera.K)
+            equal("tum", "import: pictures", sample.rgb, was.rgb)
+            near = was.depth < 13.1
+            close("tum", "import: depth", sample.depth[near], was.depth[near], "m", atol=0.000101)
+            assert np.isinf(sample.depth[was.depth > 13.108]).all()
+            assert sample.instant == was.instant
+            assert kind == "icl-nuim" or sample.time == pytest.approx(was.time, abs=1e-6)
+    assert check(imported, rays=False).ok
+    export(imported.root, [{"tum": {"kind": kind}}], output=tmp_path / "again")
+    name = "*.gt.freiburg" if kind == "icl-nuim" else "groundtruth.txt"
+    before, after = (min(root.rglob(name)) for root in (place, tmp_path / "again"))
+    close("tum", "import: out again", np.array(rows(after), float), np.array(rows(before), float), atol=1e-9)
+
+
+def test_lenses_come_in(tmp_path):
+    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": LENSES["barrel"]}))
+    import_dataset("tum", written(dataset, tmp_path / "made") / "several", tmp_path / "in")
+    assert all(sample.camera.distortion == LENSES["barrel"] for sample in Dataset(tmp_path / "in"))
+
+
+def test_times_need_not_be_equal(videos, tmp_path):
+    """Pictures, depths and poses of a real sensor are taken one after another; without a near one there is none."""
+    place = written(videos, tmp_path / "made") / "car_000" / "left"
+    file = place / "groundtruth.txt"
+    lines = [[f"{float(row[0]) + 0.015:.3f}", *row[1:]] for row in rows(file)][:4]
+    file.unlink()
+    file.write_text("".join(" ".join(line) + "\n" for line in reversed(lines)))
+    import_dataset("tum", place, tmp_path / "in")
+    imported, own = Dataset(tmp_path / "in"), videos.sequence("car_000", "left")
+    assert len(imported) == 4
+    for sample, was in zip(imported, own, strict=False):
+        close("tum", "import: positions", sample.camera.center, was.camera.center, "m", atol=1e-12)
+
+
+def test_what_is_broken_is_told(videos, tmp_path):
+    place = written(videos, tmp_path / "made") / "car_000" / "left"
+
+    def told(name, change):
+        file = place / name
+        whole = file.read_text()
+        file.unlink()
+        if change is not None:
+            file.write_text(change(whole))
+        with pytest.raises(StoreError) as caught:
+            import_dataset("tum", place, tmp_path / "in")
+        file.unlink(missing_ok=True)
+        file.write_text(whole)
+        assert not (tmp_path / "in").exists()
+        return str(caught.value)
+
+    assert "expected a line of fx fy cx cy k1 k2 p1 p2 k3; found none" in told("calibration.txt", lambda text: "# none\n")
+    assert "expected 4, 8 or 9 numbers in calibration.txt; found 6" in told("calibration.txt", lambda text: "1 1 1 1 1 1")
+    assert "calibration.txt: expected a text of a line each; found" in told("calibration.txt", None)
+    assert "expected seconds at the beginning of each line" in told("rgb.txt", lambda text: text + "soon rgb/1.png\n")
+    assert "expected seconds at the beginning of each line; found others" in told("rgb.txt", lambda text: text + "nan a\n")
+    assert "picture of 0.1 s: expected a picture; found no rgb/none.png" in told(
+        "rgb.txt", lambda text: text.replace("rgb/0.100000.png", "rgb/none.png")
+    )
+    assert "picture of 0 s: " in told("rgb.txt", lambda text: text.replace("rgb/0.0", "../../../../rgb/0.0"))
+    assert "expected pictures that can be used; found none" in told("groundtruth.txt", lambda text: "")
+    assert "picture of 0.2 s: " in told("groundtruth.txt", lambda text: text + "0.2 1 2 3\n")

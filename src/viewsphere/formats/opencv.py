@@ -1,7 +1,8 @@
 """Calibrations in OpenCV's YAML, for `cv2.FileStorage`: of every camera, every pair of cameras, and every picture.
 
     cameras/<sensor>.yaml            image_width, image_height, camera_matrix, distortion_coefficients, fisheye_model
-    stereo/<left>/<right>.yaml       M1, D1, M2, D2, R, T; of rectified pairs R1, R2, P1, P2, Q, too
+    stereo/<left>/<right>.yaml       image_width, image_height, M1, D1, M2, D2, R, T; R1, R2, P1, P2, Q of rectified pairs;
+                                     of two fisheyes model: fisheye
     pictures/<split>/<index>.yaml    a camera's keys, and its pose: R, tvec, rvec
     parts/<number>/                  cameras and stereo of data sets that were merged into the first
 
@@ -39,7 +40,7 @@ LIDAR = True
 CREDITS = False
 HOLDS = ("cameras", "stereo calibration", "poses")
 READ_BY = ("cv2.FileStorage",)
-Value = int | NDArray[np.float64]
+Value = int | str | NDArray[np.float64]
 
 
 def refuses(scope: Scope) -> Iterator[str]:
@@ -95,11 +96,14 @@ def _bent(lens: Intrinsics) -> NDArray[np.float64]:
     return np.array([lens.distortion.coefficients if isinstance(lens.distortion, Distortion) else [0.0] * 5])
 
 
+def _is_fisheye(lens: Intrinsics) -> bool:
+    return isinstance(lens.distortion, Distortion) and lens.distortion.model == "fisheye"
+
+
 def _lens(lens: Intrinsics) -> dict[str, Value]:
     size = {"image_width": lens.width, "image_height": lens.height}
-    fisheye = isinstance(lens.distortion, Distortion) and lens.distortion.model == "fisheye"
     found = {"camera_matrix": _matrix(lens), "distortion_coefficients": _bent(lens)}
-    return {**size, **found, "fisheye_model": int(fisheye)}
+    return {**size, **found, "fisheye_model": int(_is_fisheye(lens))}
 
 
 def _stereo(left: Sensor, right: Sensor, baseline: float) -> dict[str, Value]:
@@ -107,9 +111,11 @@ def _stereo(left: Sensor, right: Sensor, baseline: float) -> dict[str, Value]:
     one, other = np.array(left.rig_from_sensor), np.array(right.rig_from_sensor)
     R = product(other[:3, :3].T, one[:3, :3])
     T = transform(other[:3, :3].T, one[:3, 3] - other[:3, 3])
-    K, f = _matrix(left.intrinsics), left.intrinsics
-    said: dict[str, Value] = {"M1": K, "D1": _bent(f), "M2": _matrix(right.intrinsics), "D2": _bent(right.intrinsics)}
-    said |= {"R": R, "T": T[:, None]}
+    K, f, second = _matrix(left.intrinsics), left.intrinsics, right.intrinsics
+    said: dict[str, Value] = {"image_width": f.width, "image_height": f.height}
+    said |= {"M1": K, "D1": _bent(f), "M2": _matrix(second), "D2": _bent(second), "R": R, "T": T[:, None]}
+    if _is_fisheye(f) and _is_fisheye(second):
+        said["model"] = "fisheye"
     if not baseline:
         return said
     square = f.fx / f.fy
@@ -122,7 +128,7 @@ def _yaml(values: dict[str, Value]) -> bytes:
     """A file as FileStorage has it."""
     text = ["%YAML:1.0", "---"]
     for name, value in values.items():
-        if isinstance(value, int):
+        if isinstance(value, int | str):
             text.append(f"{name}: {value}")
             continue
         rows, columns = value.shape

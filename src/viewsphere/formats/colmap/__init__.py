@@ -1,4 +1,4 @@
-"""COLMAP's sparse models, text or binary, as pycolmap, Gaussian splatting, nerfstudio and OpenMVS read them.
+"""COLMAP's sparse models, text or binary, as COLMAP, pycolmap and Gaussian splatting read them.
 
     <world>/images/<sensor>/<index>.png   the pictures; without <sensor> where there is one
     <world>/sparse/0/cameras.txt          lenses: PINHOLE, OPENCV, FULL_OPENCV, OPENCV_FISHEYE
@@ -16,7 +16,10 @@ Points of sequences that follow some (the channel `tracks`) are those that stand
 of other pictures are pixels of a coarse grid, lifted by their depth, which one image shows. All are exact: their errors are 0.
 COLMAP's world stands still: things that move in a sequence are in its pictures only. Numbers follow from the plan: an image's
 is its frame + 1; a frame's that of its first image. Where a picture's lens is not that of its data set's first, as in zooms, it
-has a camera and a rig of its own. Skew cannot be held. Versions before 3.12, which know no rigs, read the other three files.
+has a camera and a rig of its own. Skew cannot be held. `import` reads the folder of one world, without its points.
+
+Not verified: that versions before 3.12, which know no rigs, take the other three files. The first program of Gaussian
+splatting takes PINHOLE alone, and looks for pictures without <sensor>/, so for those of one sensor.
 Source: COLMAP's documentation, https://colmap.github.io/format.html.
 """
 
@@ -34,6 +37,7 @@ from viewsphere.formats._cameras import Moment, Rigs, unskewed, world_of
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
 from viewsphere.formats.colmap.points import Sights
+from viewsphere.formats.colmap.reading import read as read
 from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
@@ -43,7 +47,7 @@ from viewsphere.store import Dataset
 CHANNELS = ("rgb", "depth")
 CREDITS = False
 HOLDS = ("cameras", "poses", "rigs", "points")
-READ_BY = ("pycolmap", "COLMAP", "Gaussian splatting", "nerfstudio")
+READ_BY = ("pycolmap", "COLMAP", "Gaussian splatting")
 SHARED = 1
 """The rig that all frames have whose lenses are those of the first."""
 

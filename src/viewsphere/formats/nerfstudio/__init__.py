@@ -21,7 +21,9 @@ train, val and test that a world has not is its first one again, as loaders want
 Lenses are pinholes, OpenCV's with k1 k2 p1 p2 (for nerfstudio k3 too), and its fisheye. Those of NeRF's synthetic scenes look
 straight ahead, and all pictures of a world have the same. `kind: instant-ngp` names depth `depth_path` and has `aabb_scale`
 16, which is to be set to the scene's size. The first lens is said for all, too, as nerfstudio's reader of instant-ngp's files
-knows no others. Skew cannot be held. Not verified by running: these programs, whose readers' code tells the above.
+knows no others. Skew cannot be held. `import` reads the folder of one world, or one of its files.
+
+Not verified by running: these programs, whose readers' code tells the above; that instant-ngp's depth is along z.
 Sources: https://docs.nerf.studio/quickstart/data_conventions.html; https://github.com/NVlabs/instant-ngp; Mildenhall et al.,
 NeRF, ECCV 2020, https://github.com/bmild/nerf.
 """

@@ -15,10 +15,10 @@ With `kind: icl-nuim` names are numbers of frames instead of seconds, `associati
 `<world>.gt.freiburg`, as above, and `<world>.gt.sim`, three rows of four numbers and an empty line each. There, as in
 POV-Ray, y is up in cameras and world: fy is negative, and y and z of the world change places, which mirrors it.
 
-Fisheyes, lenses of more than five coefficients (of ICL-NUIM's any) and skew cannot be held; nor can lenses that change. Not
-verified: that ICL-NUIM's loaders need no other names of files. Sources: Sturm et al., IROS 2012,
-https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats; Handa et al., ICRA 2014,
-https://www.doc.ic.ac.uk/~ahanda/VaFRIC/iclnuim.html.
+Fisheyes, lenses of more than five coefficients (of ICL-NUIM's any) and skew cannot be held; nor can lenses that change.
+`import` reads one sensor's folder of either kind, with a `calibration.txt`. Not verified: that ICL-NUIM's loaders need no
+other names of files. Sources: Sturm et al., IROS 2012, https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats; Handa
+et al., ICRA 2014, https://www.doc.ic.ac.uk/~ahanda/VaFRIC/iclnuim.html.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from viewsphere.formats._cameras import Rigs, measured_png, unskewed, world_from
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import pinhole
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, line
+from viewsphere.formats.tum.reading import read as read
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
@@ -45,7 +46,7 @@ from viewsphere.store import Dataset
 CHANNELS = ("rgb", "depth")
 CREDITS = False
 HOLDS = ("depth", "trajectories")
-READ_BY = ("TUM's RGB-D tools", "SLAM systems", "evo", "Open3D")
+READ_BY = ("TUM's RGB-D tools", "SLAM systems", "evo")
 STEP = 1 / 5000
 """Metres of a step of depth."""
 
