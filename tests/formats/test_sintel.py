@@ -11,11 +11,14 @@ from torchvision_readers import torchvision_datasets
 from proven import close, equal
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope, sintel
-from viewsphere.formats._sequences import check_whole, number
+from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.run.exporting import export
 from viewsphere.run.scope import scope_of
 
 FRAMES = 6
+BENT = Intrinsics(
+    width=160, height=120, fx=170, fy=170, cx=80, cy=60, distortion=Distortion(model="fisheye", coefficients=(0.1, 0, 0, 0))
+)
 
 
 @pytest.fixture(scope="module")
@@ -193,17 +196,7 @@ def test_what_is_refused(videos, stills):
     assert "expected two rectified cameras" in next(sintel.refuses(scope(videos, rig=lone), pairs))
     found = list(sintel.refuses(scope(videos, rig=apart), plain))
     assert found == ["expected one camera, or two that are rectified; found left, right"]
-
-
-def test_names_sort_as_numbers_do():
-    assert number(7, 9999) == "0007" and number(7, 10_000) == "00007"
-
-
-def test_sequences_that_splits_cut_are_refused(videos):
-    class Cut:
-        splits = ("train", "val")
-        plan = type("Plan", (), {"parts": (type("Part", (), {"recipe": {"splits": {"by": "frame"}}}),)})
-
-    check_whole(videos, "sintel")
-    with pytest.raises(UserError, match=r"sintel: expected splits that keep sequences whole; found splits\.by: frame"):
-        check_whole(Cut, "sintel")
+    bent = rig.sensors[0].model_copy(update={"intrinsics": BENT})
+    assert list(sintel.refuses(scope(videos, rig=rig.model_copy(update={"sensors": (bent,)})), plain)) == [
+        "expected pinhole cameras; found the lens of left"
+    ]
