@@ -35,7 +35,7 @@ class Eyes:
         rig, pair = self._rig(sample), self.pair(sample)
         sides = {rig.sensors[pair.right].name: "right", rig.sensors[pair.left].name: "left"}
         if sample.sensor not in sides:
-            raise UserError(f"frame {sample.index}: expected sensors {', '.join(sides)}; found {sample.sensor}")
+            raise UserError(f"frame {sample.index}: expected sensors {', '.join(reversed(sides))}; found {sample.sensor}")
         return sides[sample.sensor]
 
     def pair(self, sample: Sample) -> Pair:
@@ -80,9 +80,11 @@ def scene(sample: Sample) -> str:
 
 
 def instants(dataset: Dataset, sample: Sample) -> int:
-    """Number of the instants of a sample's sequence, as it is planned."""
-    plan = dataset.plan
-    return TimeEntry.model_validate(plan.parts[plan.part_of(sample.index)].recipe["time"]).count
+    """Number of the instants of a sample's sequence, as it is planned; raises UserError for a still picture."""
+    time = dataset.plan.parts[dataset.plan.part_of(sample.index)].recipe.get("time")
+    if not time:
+        raise UserError(f"frame {sample.index}: expected a picture of a sequence; found a still one: export sequences apart")
+    return TimeEntry.model_validate(time).count
 
 
 def number(value: int, count: int, digits: int = 4) -> str:

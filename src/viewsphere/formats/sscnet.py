@@ -40,6 +40,7 @@ from viewsphere.formats import _refusals as refusals
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._numbered import Numbered
 from viewsphere.formats._pictures import depth_steps
+from viewsphere.formats._sequences import scene
 from viewsphere.formats._tree import File, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.camera import Camera, Intrinsics
@@ -104,7 +105,8 @@ class Sscnet(Tree):
         if (options.size, options.cell) != (SIZE, CELL):
             found = f"{' x '.join(map(str, options.size))} of {options.cell:g} m"
             raise UserError(f"sscnet: expected voxels of {' x '.join(map(str, SIZE))} cells of {CELL} m; found {found}")
-        name = f"depthbin/{sample.split or 'all'}/{sample.index:08d}_{sample.sequence or 'still'}_fl000_rm0000_0000"
+        where = scene(sample) if sample.sequence else "still"
+        name = f"depthbin/{sample.split or 'all'}/{sample.index:08d}_{where}_fl000_rm0000_0000"
         yield File(f"{name}.png", Coded(sample.index, "sscnet.png", partial(_depth, sample)))
         cells = partial(_cells, sample, Grid.of(options, sample.camera), self._classes)
         yield File(f"{name}.bin", Coded(sample.index, "sscnet.bin", cells))
