@@ -1,4 +1,4 @@
-"""SSCNet's data, read as its own code reads it: depth, put where the camera says, lies in cells that are not empty."""
+"""SSCNet's data, by a reader after its own code: depth, put where the camera says, lies in cells that are not empty."""
 
 from __future__ import annotations
 
@@ -59,12 +59,14 @@ def test_depth_and_cells(both):
     for sample in dataset:
         name = folder / f"depthbin/train/{sample.index:08d}_still_fl000_rm0000_0000"
         depth, seen = read_depth(name.with_suffix(".png")), np.isfinite(sample.depth)
-        equal("sscnet", "its code: where depth is", depth > 0, seen)
-        close("sscnet", "its code: depth", depth[seen], np.minimum(sample.depth[seen], 65.535), "m", atol=0.000501)
+        equal("sscnet", "a reader after its code: where depth is", depth > 0, seen)
+        close(
+            "sscnet", "a reader after its code: depth", depth[seen], np.minimum(sample.depth[seen], 65.535), "m", atol=0.000501
+        )
         corner, pose, classes = read(name.with_suffix(".bin"))
         grid = sample.voxel_grid
         expected = numbers[np.where(grid.state == 0, 0, grid.classes)]
-        equal("sscnet", "its code: classes", classes.transpose(2, 1, 0), expected)
+        equal("sscnet", "a reader after its code: classes", classes.transpose(2, 1, 0), expected)
         k = sample.camera.intrinsics
         v, u = np.nonzero(seen & (sample.depth < 6))
         z = sample.depth[v, u].astype(float)
@@ -75,13 +77,13 @@ def test_depth_and_cells(both):
         assert inside.sum() > 3000 and (classes[x, up, y] > 0).all()
         shown = numbers[sample.semantic[v, u][inside]]
         assert (classes[x, up, y] == shown).mean() > 0.95  # where two things share a cell, it is one's
-        close("sscnet", "its code: heights of places", points[:, 2].min(), 0, "m", atol=1e-4)  # the ground
+        close("sscnet", "a reader after its code: heights of places", points[:, 2].min(), 0, "m", atol=1e-4)  # the ground
         if dataset.name == "world":
-            close("sscnet", "its code: cameras", pose[:3, :3], sample.camera.R.T, "1", atol=1e-6)
-            close("sscnet", "its code: cameras", pose[:3, 3], sample.camera.center, "m", atol=1e-6)
-            close("sscnet", "its code: corners", corner, grid.grid.world_from_grid[:3, 3], "m", atol=1e-6)
+            close("sscnet", "a reader after its code: cameras", pose[:3, :3], sample.camera.R.T, "1", atol=1e-6)
+            close("sscnet", "a reader after its code: cameras", pose[:3, 3], sample.camera.center, "m", atol=1e-6)
+            close("sscnet", "a reader after its code: corners", corner, grid.grid.world_from_grid[:3, 3], "m", atol=1e-6)
         else:
-            close("sscnet", "its code: views", pose[0, 2], 0, "1", atol=1e-6)  # it looks along y
+            close("sscnet", "a reader after its code: views", pose[0, 2], 0, "1", atol=1e-6)  # it looks along y
 
 
 def made(dataset, runs):
