@@ -1,4 +1,4 @@
-"""Driving in the Matrix, read by supervision, and as the data set's own code reads it: the same boxes and classes."""
+"""Driving in the Matrix, read by supervision, and by a reader after the data set's own code: the same boxes and classes."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_lists_and_flags(stills, written):
         assert [int(root.find("size").findtext(tag)) for tag in ("width", "height", "depth")] == [160, 120, 3]
         for entry, o in zip(root.iter("object"), [o for o in sample.objects if o.box2d], strict=True):
             box = [float(entry.find("bndbox").findtext(tag)) - 1 for tag in ("xmin", "ymin", "xmax", "ymax")]
-            equal(NAME, "its own code: boxes, ends inside", box, [*o.box2d[:2], o.box2d[2] - 1, o.box2d[3] - 1])
+            equal(NAME, "a reader after its code: boxes, ends inside", box, [*o.box2d[:2], o.box2d[2] - 1, o.box2d[3] - 1])
             assert int(entry.findtext("difficult")) == (o.area < 300)
             assert int(entry.findtext("truncated")) == (o.truncation > 0.15)
             difficult += o.area < 300

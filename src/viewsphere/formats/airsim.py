@@ -45,6 +45,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats import _refusals as refusals
 from viewsphere.formats._contents import Coded, Content
 from viewsphere.formats._pictures import picture
+from viewsphere.formats._sequences import scene
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, quaternion_from_matrix, transform
 from viewsphere.model.camera import Camera
@@ -110,7 +111,7 @@ class AirSim(Tree):
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
         """The images of a sensor at an instant, a line of the log, and what the sensor is."""
-        root = sample.sequence or sample.split or "all"
+        root = scene(sample) if sample.sequence else sample.split or "all"
         seconds = sample.time if sample.sequence else sample.index / 1000
         names: list[str] = []
         for kind in self._kinds:

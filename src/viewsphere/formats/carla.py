@@ -42,6 +42,7 @@ from viewsphere.formats._contents import Coded
 from viewsphere.formats._numbered import Numbered
 from viewsphere.formats._paper import json_bytes
 from viewsphere.formats._pictures import picture
+from viewsphere.formats._sequences import scene
 from viewsphere.formats._tree import File, Piece, Tree, functions, item
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -101,7 +102,7 @@ class Carla(Tree):
         """A picture, its maps, its objects, and its camera."""
         split, _, number = self.stem(sample).partition("/")
         if sample.sequence:
-            split, number = sample.sequence, f"{sample.instant:06d}"
+            split, number = scene(sample), f"{sample.instant:06d}"
         root = f"{split}/{sample.sensor}"
         yield File(f"{root}/rgb/{number}.png", picture(sample, ".png"))
         for kind, make in (

@@ -138,6 +138,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
             yield from two_eyes(scope)
         yield from refusals.pinhole(scope)
         yield from refusals.no_skew(scope)
+        yield from refusals.most_objects(scope, FAR)
         lenses = {sensor.intrinsics: sensor.name for sensor in sensors if sensor.lidar is None}
         if len(lenses) > 1 or any(lens.fx != lens.fy for lens in lenses):
             yield f"expected cameras of one lens and one focal length; found {', '.join(lenses.values())}"
