@@ -22,8 +22,9 @@ def written(request, tmp_path_factory):
 
     def get(dataset):
         if dataset.name not in made:
-            export(dataset.root, "objectnet3d", output=tmp_path_factory.mktemp(dataset.name))
-            made[dataset.name] = tmp_path_factory.getbasetemp() / f"{dataset.name}0" / "objectnet3d"
+            place = tmp_path_factory.mktemp(dataset.name)
+            export(dataset.root, "objectnet3d", output=place)
+            made[dataset.name] = place / "objectnet3d"
         return made[dataset.name]
 
     return get

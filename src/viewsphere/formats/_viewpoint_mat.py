@@ -19,6 +19,7 @@ from pydantic import Field
 from viewsphere.errors import MissingExtraError, UserError
 from viewsphere.formats import Scope
 from viewsphere.formats._refusals import pinhole, plain_names
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset, ModelInfo
@@ -131,7 +132,7 @@ class Cads:
     def _object(self, o: ObjectAnnotation, sample: Sample) -> dict[str, Any]:
         center = o.box3d_object.mean(axis=0)
         motion = o.camera_from_object[:3].copy()
-        motion[:, 3] += motion[:, :3] @ center
+        motion[:, 3] = transform(motion, center)
         anchors = self._anchors(o)
         inside = 1 - o.truncation
         return {
@@ -207,7 +208,7 @@ def _viewpoint(o: ObjectAnnotation, sample: Sample, place: NDArray[np.float64], 
     behind it.
     """
     ahead = bool(place[2] > 0)
-    x, y, z = (sample.camera.K @ place).tolist()
+    x, y, z = transform(sample.camera.K, place).tolist()
     azimuth, elevation = o.view.azimuth_deg % 360, o.view.elevation_deg
     return {
         "azimuth_coarse": azimuth,

@@ -1,20 +1,8 @@
-"""YOLO, as Ultralytics trains it: a text file beside each picture, a line an object, numbers as shares of the picture.
-
-    data.yaml                        path, train, val, test, names; for pose kpt_shape, flip_idx, kpt_names
-    images/<split>/<index>.png       the pictures
-    labels/<split>/<index>.txt       class, and by task: `detect` centre x, centre y, width, height of the visible pixels'
-                                     box; `segment` the mask's polygon; `pose` the box, then x, y, v of each point; `obb` four
-                                     corners
-
-Classes count from 0 in the data set's order of categories. `segment`: an object has one ring; several pieces are joined by
-lines of no width, as Ultralytics' own converter does. `pose`: v is 2 for a visible point, 1 for an occluded one, 0 for others,
-and the points of all models together are one list, of which each object has its own. Objects of which nothing is seen have no
-line. Source: Ultralytics' documentation, https://docs.ultralytics.com/datasets/.
-"""
+"""Writes a data set as YOLO."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -24,15 +12,11 @@ from pydantic import Field
 from viewsphere.errors import UserError
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._rings import one_ring
-from viewsphere.formats._tree import File, Piece, Tree, functions
+from viewsphere.formats._tree import File, Piece, Tree
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("boxes", "masks", "keypoints", "oriented boxes")
-READ_BY = ("ultralytics", "supervision", "datumaro")
 KINDS = (".png", ".jpg", ".webp")
 STATES = {0: 2, 1: 1}  # of our keypoints; outside and behind the camera are not labelled
 
@@ -44,11 +28,6 @@ class Options(Frozen):
         default="detect",
         description="`detect`: boxes; `segment`: polygons; `pose`: boxes with keypoints; `obb`: oriented boxes",
     )
-
-
-def needs(options: Options) -> tuple[str, ...]:
-    """Labels on request."""
-    return {"pose": ("keypoints",), "obb": ("obb",)}.get(options.task, ())
 
 
 class Yolo(Tree):
@@ -75,9 +54,8 @@ class Yolo(Tree):
         data: dict[str, Any] = {"path": ".", **splits}
         data |= {name: next(iter(splits.values())) for name in ("train", "val") if name not in splits}
         if self._points:
-            swapped = _flipped(self.dataset)
             data["kpt_shape"] = [len(self._points), 3]
-            data["flip_idx"] = [self._points[swapped.get(name, name)] for name in self._points]
+            data["flip_idx"] = _flipped(self.dataset, self._points)
             names = list(self._points)
             data["kpt_names"] = {number: names for number in self._classes.values()}
         data["names"] = {self._classes[category.id]: category.name for category in self.dataset.categories}
@@ -90,13 +68,15 @@ class Yolo(Tree):
         low, high = np.array(o.box2d[:2]) / size, np.array(o.box2d[2:]) / size
         numbers = [*((low + high) / 2), *(high - low)]
         if self._task == "segment":
-            if not o.area:
+            rings = _rings(o)
+            if not rings:
                 return ""
-            numbers = (one_ring(o.polygons) / size).ravel()
+            numbers = (one_ring(rings) / size).ravel()
         elif self._task == "obb":
-            if o.obb is None:
+            corners = o.more.get("obb")
+            if corners is None:
                 return ""
-            numbers = np.clip(o.obb / size, 0, 1).ravel()
+            numbers = np.clip(corners / size, 0, 1).ravel()
         elif self._task == "pose":
             numbers += self._marked(o, size).ravel().tolist()
         return " ".join([str(self._classes[o.category_id]), *(f"{value:.8g}" for value in numbers)])
@@ -104,22 +84,34 @@ class Yolo(Tree):
     def _marked(self, o: ObjectAnnotation, size: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         """All points, (N, 3): x, y, v; 0 0 0 for those that the object does not have, or that are not in the picture."""
         found = np.zeros((len(self._points), 3))
+        if "keypoint_names" not in o.more:  # imported, as a box alone
+            return found
         for name, place, state in zip(o.keypoint_names, o.keypoints, o.keypoint_states, strict=True):
-            if int(state) in STATES:
+            if int(state) in STATES and name in self._points:
                 found[self._points[name]] = (*(place / size), STATES[int(state)])
         return found
 
 
+def _rings(o: ObjectAnnotation) -> list[list[float]]:
+    """The rings of its mask; of an imported object those that it came with."""
+    said = (o.source or {}).get("segmentation")
+    return said if said and isinstance(said, list) else o.polygons if o.area else []
+
+
 def _points(dataset: Dataset) -> dict[str, int]:
-    """The names of all models' points, and their numbers."""
-    names = (name for model in dataset.models for name in (model.keypoints.points if model.keypoints else ()))
+    """The names of all models' points, and their numbers; of imported data sets, those of the first object that has some."""
+    names = [name for model in dataset.models for name in (model.keypoints.points if model.keypoints else ())]
+    if not names:
+        marked = (o.more.get("keypoint_names") for sample in dataset for o in sample.objects)
+        names = next((found for found in marked if found), ())
     return {name: number for number, name in enumerate(dict.fromkeys(names))}
 
 
-def _flipped(dataset: Dataset) -> dict[str, str]:
-    """Which points change places in a mirror image."""
+def _flipped(dataset: Dataset, points: Mapping[str, int]) -> list[int]:
+    """By each point, which other it becomes in a mirror image."""
+    told = next((sample.source["flip_idx"] for sample in dataset if sample.source and "flip_idx" in sample.source), None)
+    if told is not None and len(told) == len(points):
+        return list(told)
     pairs = [pair for model in dataset.models if model.keypoints for pair in model.keypoints.flips]
-    return {one: other for pair in pairs for one, other in (pair, pair[::-1])}
-
-
-preparer, writer, verify = functions(Yolo)
+    swapped = {one: other for pair in pairs for one, other in (pair, pair[::-1])}
+    return [points[swapped.get(name, name)] for name in points]

@@ -1,0 +1,159 @@
+"""NYC3DCars: photographs on the globe with the vehicles that they show, as the tables of its database; for pandas or PostGIS.
+
+    images/<split>/<index>.jpg        the pictures
+    photos.csv                        id, filename, width, height, focal, k1, k2, t1-t3, r11-r33, lla, test, dataset_id, daytime
+    vehicles.csv                      id, pid, x1, y1, x2, y2, occlusion, theta, lla, geom, type_id, object
+    vehicle_types.csv                 id, tight_width, tight_length, tight_height, key
+
+The data set's own tables are a PostgreSQL dump; these are files with a head, of the columns that its toolkit reads. The world's
+origin lies at `latitude`, `longitude`, `altitude` (WGS 84; altitudes above the ellipsoid), x to the east, y to the north.
+Cameras are Bundler's: `r` and `t` take earth-centred metres to a camera with x right, y up and z behind it; focal is in pixels,
+the principal point is the picture's centre, k1 and k2 are 0. Points (lla) and footprints (geom) are text that PostGIS reads:
+`SRID=4326;POINT Z (longitude latitude altitude)`.
+
+A vehicle is an object of any category: x1 to y2 are its visible pixels' box, as shares of the picture; lla is the middle of
+its box's bottom, geom the bottom's corners; theta is the compass bearing of its front, degrees clockwise from north.
+occlusion: 0 at most 5 % hidden, 1 at most 50 %, 2 more. Types are the models: sizes in feet. pid is a photograph's id; test is
+true in the split `test`; daytime is empty, which PostgreSQL takes for unknown; dataset_id is 1. `object` (the object's id) and
+`key` (the model's) are columns that the data set does not have. Objects of which nothing is seen are left out.
+
+Lost: masks, sequences, and how vehicles are tilted, but for their footprint. Left out, as nothing says what they mean:
+view_theta, view_phi, and geom of photographs. Not verified: grades of occlusion above 0. theta follows from two formulas of the
+toolkit. Its detector adds 0.76 m to camera positions, an error of its photographs that these do not have. Source: K. Matzen, N.
+Snavely, NYC3DCars: A Dataset of 3D Vehicles in Geographic Context, ICCV 2013, https://github.com/kmatzen/nyc3dcars-toolkit.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.formats import Scope
+from viewsphere.formats._globe import compass, earth, globe
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._refusals import pinhole
+from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
+from viewsphere.geometry.rotation import product, transform
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("boxes", "places on the globe", "footprints", "occlusion", "cameras")
+READ_BY = ("pandas", "PostGIS")
+
+Float = NDArray[np.float64]
+
+FOOT = 0.3048
+OFF = 1e-9
+"""Share by which a camera may differ from a centred one with square pixels."""
+
+HEADS = {
+    "photos.csv": "id filename width height focal k1 k2 t1 t2 t3 r11 r12 r13 r21 r22 r23 r31 r32 r33 "
+    "lla test dataset_id daytime",
+    "vehicles.csv": "id pid x1 y1 x2 y2 occlusion theta lla geom type_id object",
+    "vehicle_types.csv": "id tight_width tight_length tight_height key",
+}
+
+
+class Options(Frozen):
+    """Where on the globe the world's origin lies."""
+
+    latitude: float = Field(default=40.7142, ge=-90, le=90, description="degrees north (default: New York)")
+    longitude: float = Field(default=-74.0064, ge=-180, le=180, description="degrees east")
+    altitude: float = Field(default=0.0, ge=-1e5, le=1e5, description="metres above the ellipsoid")
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Cameras that Bundler has not."""
+    if scope.rig is None:
+        yield "expected pictures of known cameras; found imported ones"
+    yield from pinhole(scope)
+    for sensor in scope.rig.sensors if scope.rig else ():
+        lens = sensor.intrinsics
+        found = lens.fy, lens.skew, lens.cx, lens.cy
+        wanted = lens.fx, 0.0, lens.width / 2, lens.height / 2
+        if sensor.lidar is None and not np.allclose(found, wanted, rtol=0, atol=OFF * lens.width):
+            yield f"expected square pixels and a centred camera; found K {lens.K.tolist()} of {sensor.name}"
+
+
+class Nyc3dCars(Tree):
+    """The tables and the pictures."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._types = {info.key: number for number, info in enumerate(dataset.models, 1)}
+        at = math.radians(options.latitude), math.radians(options.longitude)
+        self._earth_from_world = np.eye(4)
+        self._earth_from_world[:3, :3] = compass(*at)
+        self._earth_from_world[:3, 3] = earth(*at, options.altitude)
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture, its row and those of its vehicles."""
+        name = f"{self.stem(sample)}.jpg"
+        yield File(f"images/{name}", picture(sample, ".jpg"))
+        yield _row("photos.csv", self._photo(sample, name))
+        for o in sample.objects:
+            if o.box2d is not None:
+                yield _row("vehicles.csv", [self.dataset.plan.annotation_id(sample.index, o.id), *self._vehicle(sample, o)])
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """A head, then the rows."""
+        return (_line(HEADS[path].split()), "")
+
+    def rest(self) -> Iterator[File]:
+        """The models as types of vehicles."""
+        types = [_line(HEADS["vehicle_types.csv"].split())]
+        for info in self.dataset.models:
+            width, height, length = (size / FOOT for size in info.size)
+            types.append(_line([self._types[info.key], width, length, height, info.key]))
+        yield File("vehicle_types.csv", b"".join(types))
+
+    def _photo(self, sample: Sample, name: str) -> Iterator[Any]:
+        camera = sample.camera
+        turn = product(camera.R, self._earth_from_world[:3, :3].T) * [[1], [-1], [-1]]
+        place = transform(self._earth_from_world, camera.center)
+        yield from (sample.index + 1, name, sample.width, sample.height, camera.intrinsics.fx, 0.0, 0.0)
+        yield from (*(-transform(turn, place)).tolist(), *turn.ravel().tolist(), f"SRID=4326;POINT Z ({_words(place)})")
+        yield from ("t" if sample.split == "test" else "f", 1, "")
+
+    def _vehicle(self, sample: Sample, o: ObjectAnnotation) -> Iterator[Any]:
+        assert o.box2d is not None
+        corners = transform(self._earth_from_world, o.box3d[:4])
+        middle = corners.mean(axis=0)
+        latitude, longitude, _ = globe(middle)
+        front = transform(self._earth_from_world[:3, :3], -o.world_from_object[:3, 1])
+        east, north, _ = transform(compass(latitude, longitude).T, front).tolist()
+        yield sample.index + 1
+        yield from (np.array(o.box2d) / ([sample.width, sample.height] * 2)).tolist()
+        yield from (o.occlusion_level, math.degrees(math.atan2(east, north)) % 360)
+        yield f"SRID=4326;POINT Z ({_words(middle)})"
+        yield f"SRID=4326;POLYGON Z (({', '.join(map(_words, (*corners, corners[0])))}))"
+        yield from (self._types[o.key], o.id)
+
+
+def _row(path: str, values: Iterable[Any]) -> Piece:
+    return Piece(path, _line(values))
+
+
+def _line(values: Iterable[Any]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(values)
+    return text.getvalue().encode()
+
+
+def _words(place: Float) -> str:
+    """Longitude, latitude (degrees) and altitude of an earth-centred point."""
+    latitude, longitude, altitude = globe(place)
+    return f"{math.degrees(longitude)!r} {math.degrees(latitude)!r} {altitude!r}"
+
+
+preparer, writer, verify = functions(Nyc3dCars)

@@ -1,0 +1,38 @@
+"""YOLO, as Ultralytics trains it: a text file beside each picture, a line an object, numbers as shares of the picture.
+
+    data.yaml                        path, train, val, test, names; for pose kpt_shape, flip_idx, kpt_names
+    images/<split>/<index>.png       the pictures
+    labels/<split>/<index>.txt       class, and by task: `detect` centre x, centre y, width, height of the visible pixels'
+                                     box; `segment` the mask's polygon; `pose` the box, then x, y, v of each point; `obb` four
+                                     corners
+
+Classes count from 0 in the data set's order of categories. `segment`: an object has one ring; several pieces are joined by
+lines of no width, as Ultralytics' own converter does. `pose`: v is 2 for a visible point, 1 for an occluded one, 0 for others,
+and the points of all models together are one list, of which each object has its own. Objects of which nothing is seen have no
+line. Imported objects keep their own polygons, corners and points.
+
+Data sets that were made elsewhere are imported by their data.yaml: `viewsphere import yolo`. What a line is, its numbers tell:
+4 are a box, as many as kpt_shape says a box with points, others a polygon; one of four corners is an oriented box, too. Splits
+are data.yaml's: folders, or lists of pictures. A picture's labels lie where the last `images` of its path is `labels`; it may
+have none. Source: Ultralytics' documentation, https://docs.ultralytics.com/datasets/.
+"""
+
+from __future__ import annotations
+
+from viewsphere.formats._tree import functions
+from viewsphere.formats.yolo.reading import read as read
+from viewsphere.formats.yolo.writing import Options as Options
+from viewsphere.formats.yolo.writing import Yolo
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("boxes", "masks", "keypoints", "oriented boxes")
+READ_BY = ("ultralytics", "supervision", "datumaro")
+
+
+def needs(options: Options) -> tuple[str, ...]:
+    """Labels on request."""
+    return {"pose": ("keypoints",), "obb": ("obb",)}.get(options.task, ())
+
+
+preparer, writer, verify = functions(Yolo)

@@ -1,0 +1,250 @@
+"""A YOLO data set made elsewhere: data.yaml, pictures, and a file of labels for each."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path, PurePosixPath
+from typing import Any, cast
+
+import numpy as np
+import yaml
+
+from viewsphere.codecs.size import opened
+from viewsphere.errors import StoreError, UserError
+from viewsphere.formats.yolo.lines import Kind, Row, coco_of, kind_of, parsed_line
+from viewsphere.geometry.mask import rle_of_runs, rle_runs
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Category
+from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
+from viewsphere.store.paths import file_inside, is_name
+from viewsphere.urls.inside import is_inside
+
+PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+SPLITS = ("train", "val", "test")
+NO_SPLITS = frozenset({"path", "names", "nc", "kpt_shape", "flip_idx", "kpt_names", "download", "channels"})
+LARGEST_FILE = 10_000_000
+"""Bytes of a data.yaml."""
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """A picture, and its file of labels, None if it has none."""
+
+    split: str
+    name: str
+    file: Path
+    size: tuple[int, int]
+    labels: Path | None
+
+
+def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+    """All pictures and labels of a folder with data.yaml, or of one such file: what viewsphere.formats.yolo says.
+
+    Raises StoreError with every mistake: splits and pictures that are missing or outside, broken lines, classes that have no
+    name; with `keep_going` these are left out and reported.
+    """
+    file = _described(path)
+    told = _load(file)
+    root, problems = file.parent, list[str]()
+    categories = tuple(Category(number + 1, name, "") for number, name in enumerate(_names(told, file)))
+    kind = kind_of(told, file)
+    pictures = tuple(_pictures(root, told, file, problems))
+    digest, most = hashlib.sha256(file.read_bytes()), 1
+    for picture in pictures:
+        rows = list(_rows(picture, kind, len(categories), problems))
+        most = max(most, len(rows))
+        text = picture.labels.read_bytes() if picture.labels else b""
+        digest.update(f"{picture.split}/{picture.name}\0{hashlib.sha256(text).hexdigest()}".encode(errors="backslashreplace"))
+    if not keep_going:
+        refuse_broken(problems)
+    if not pictures:
+        raise StoreError(f"{file}: expected pictures that can be used; found none")
+    digest.update("\n".join(problems).encode(errors="backslashreplace"))
+    return ForeignDataset(
+        name=root.resolve().name,
+        digest=digest.hexdigest(),
+        categories=categories,
+        splits=tuple(dict.fromkeys(picture.split for picture in pictures)),
+        channels=("rgb",),
+        count=len(pictures),
+        poses=0,
+        max_objects=most,
+        frames=partial(_frames, pictures, categories, kind),
+        left_out=tuple(problems),
+    )
+
+
+def _described(path: Path) -> Path:
+    """The file that describes the data set."""
+    found = [path] if path.is_file() else [path / "data.yaml", *sorted(path.glob("*.yaml")), *sorted(path.glob("*.yml"))]
+    file = next((one for one in found if one.is_file()), None)
+    if file is None:
+        raise StoreError(f"{path}: expected a YOLO data set (data.yaml); found no such file")
+    return file
+
+
+def _load(file: Path) -> dict[str, Any]:
+    try:
+        data = file.read_bytes()
+        told = yaml.safe_load(data) if len(data) <= LARGEST_FILE else None
+    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+        raise StoreError(f"{file}: expected YOLO's YAML; found: {' '.join(str(error).split())}") from None
+    if not isinstance(told, dict):
+        raise StoreError(f"{file}: expected names and folders of pictures; found something else")
+    return cast(dict[str, Any], told)
+
+
+def _names(told: Mapping[str, Any], file: Path) -> list[str]:
+    """The classes' names, by their numbers from 0 on."""
+    names = told.get("names")
+    if isinstance(names, dict):
+        numbered = cast(dict[Any, Any], names)
+        names = [numbered[i] for i in range(len(numbered))] if all(i in numbered for i in range(len(numbered))) else None
+    found = cast(list[Any], names) if isinstance(names, list) else []
+    if not found or not all(isinstance(name, str) and name for name in found) or len({*found}) < len(found):
+        raise StoreError(
+            f"{file}: expected names, a list of different texts or a mapping from 0 on; found {told.get('names')!r:.60}"
+        )
+    return found
+
+
+def _pictures(root: Path, told: Mapping[str, Any], file: Path, problems: list[str]) -> Iterator[_Picture]:
+    """The pictures of all splits, each in the first of those that have it."""
+    seen = set[str]()
+    base = str(told.get("path") or "")
+    inside = base if base and is_inside(base) and (root / base).is_dir() else ""
+    for split, said in told.items():
+        places = cast(list[Any], said) if isinstance(said, list) else [said]
+        if split in NO_SPLITS or not isinstance(split, str) or said is None:
+            continue
+        for place in places:
+            relative = _relative(root, inside, place) if isinstance(place, str) and place else None
+            if relative is None or not is_name(split):
+                if split in SPLITS:
+                    problems.append(f"{file}: {split}: expected a folder or a list of pictures below; found {place!r:.100}")
+                continue
+            if relative not in seen:
+                seen.add(relative)
+                for name in _listed(root, relative, split, file, problems):
+                    picture = _picture(root, split, name, file, problems) if name not in seen else None
+                    seen.add(name)
+                    if picture:
+                        yield picture
+
+
+def _relative(root: Path, inside: str, place: str) -> str | None:
+    """A split's folder or list, from the root: below `path`, or else the root; `../` before it is passed over, as by
+    Ultralytics, for what Roboflow writes. None if there is none.
+    """
+    for prefix in (inside, ""):
+        for said in (place, place.removeprefix("../")):
+            path = PurePosixPath(prefix, said)
+            if is_inside(said) and (root / path).exists():
+                return path.as_posix()
+    return None
+
+
+def _listed(root: Path, relative: str, split: str, file: Path, problems: list[str]) -> Iterator[str]:
+    """The paths of a folder's pictures, or of those that a list names, from the root."""
+    try:
+        place = file_inside(root, relative)
+        if place.is_dir():
+            found = sorted(path for path in place.rglob("*") if path.suffix.lower() in PICTURES)
+            yield from (path.relative_to(root).as_posix() for path in found)
+            yield from _unpictured(root, relative, problems)
+            return
+        lines = place.read_text("utf-8").splitlines()
+    except (StoreError, OSError, ValueError) as error:
+        problems.append(f"{file}: {split}: {' '.join(str(error).split())}")
+        return
+    for said in filter(None, map(str.strip, lines)):
+        name = (PurePosixPath(relative).parent / said).as_posix()
+        if is_inside(said) and (root / name).is_file():
+            yield name
+        else:
+            problems.append(f"{place}: expected a picture below the folder; found no {said!r:.100}")
+
+
+def _unpictured(root: Path, relative: str, problems: list[str]) -> Iterator[str]:
+    """Problems: labels without a picture."""
+    labels = root / _labels_of(relative + "/x").rpartition("/")[0]
+    for file in sorted(labels.rglob("*.txt")) if labels.is_dir() and labels != root / relative else ():
+        beside = root / relative / file.relative_to(labels)
+        if not any(beside.with_suffix(kind).exists() or beside.with_suffix(kind.upper()).exists() for kind in PICTURES):
+            problems.append(f"{file}: expected a picture of these labels; found none in {root / relative}")
+    yield from ()
+
+
+def _labels_of(picture: str) -> str:
+    """Where a picture's labels lie: the last folder `images` of its path becomes `labels`."""
+    head, images, tail = f"/{picture}".rpartition("/images/")
+    return str(PurePosixPath(f"{head}/labels/{tail}" if images else f"/{picture}").with_suffix(".txt"))[1:]
+
+
+def _picture(root: Path, split: str, name: str, file: Path, problems: list[str]) -> _Picture | None:
+    try:
+        place, labels = file_inside(root, name), file_inside(root, _labels_of(name))
+        with opened(place) as found:
+            size = found.size
+        return _Picture(split, name, place, size, labels if labels.is_file() else None)
+    except (OSError, ValueError, SyntaxError, UserError) as error:
+        problems.append(f"{file}: {split}: expected a picture that can be read; found {name}: {' '.join(str(error).split())}")
+        return None
+
+
+def _rows(picture: _Picture, kind: Kind, classes: int, problems: list[str]) -> Iterator[Row]:
+    """The valid lines of a picture's labels."""
+    if picture.labels is None:
+        return
+    try:
+        lines = picture.labels.read_text("utf-8").splitlines()
+    except (OSError, ValueError) as error:
+        problems.append(f"{picture.labels}: expected lines of numbers; found: {error}")
+        return
+    for number, text in enumerate(lines, 1):
+        if text.strip():
+            try:
+                yield parsed_line(text, kind, classes)
+            except ValueError as error:
+                problems.append(f"{picture.labels}: line {number}: {error}")
+
+
+def _frames(pictures: Sequence[_Picture], categories: Sequence[Category], kind: Kind) -> Iterator[ForeignFrame]:
+    for index, picture in enumerate(pictures):
+        rows = _rows(picture, kind, len(categories), [])
+        objects = tuple(_object(number, row, categories, picture, kind) for number, row in enumerate(rows, 1))
+        said: dict[str, Any] = {"file_name": picture.name}
+        if kind.flips:
+            said["flip_idx"] = list(kind.flips)
+        yield ForeignFrame(Sample(index, picture.split, None, None, objects, {}, {}, picture.size, said), {"rgb": picture.file})
+
+
+def _object(number: int, row: Row, categories: Sequence[Category], picture: _Picture, kind: Kind) -> ObjectAnnotation:
+    """An object with what its line says, and as COCO would have it in `source`."""
+    source = coco_of(row, picture.size)
+    more: dict[str, Any] = {}
+    if row.points is not None:
+        seen = row.points[:, 2]
+        places = np.where(seen[:, None] > 0, row.points[:, :2] * picture.size, math.nan)
+        states = np.select([seen > 1, seen > 0], [0, 1], 3)
+        more = {"keypoint_names": kind.names, "keypoints": places, "keypoint_states": states.astype(np.int64)}
+    if row.corners is not None and len(row.corners) == 4:
+        more["obb"] = row.corners * picture.size
+    x, y, width, height = source["bbox"]
+    box, mask = (x, y, x + width, y + height), _mask(source.get("segmentation"), picture.size)
+    return foreign_object(number, categories[row.number], picture.size, source, mask, box, **({"more": more} if more else {}))
+
+
+def _mask(outline: Any, size: tuple[int, int]) -> str | None:
+    """The run-length code of a polygon, as pycocotools draws it."""
+    if not outline:
+        return None
+    from pycocotools import mask as coco
+
+    width, height = size
+    code: Any = coco.merge(coco.frPyObjects(outline, height, width))
+    return rle_of_runs(height, width, rle_runs(height, width, code["counts"].decode("ascii")))
