@@ -40,6 +40,7 @@ from viewsphere.labels import (
 from viewsphere.limits import table
 from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.recipe.file import schema
+from viewsphere.run.listing import listed
 
 DOCS = Path(__file__).parent.parent / "docs"
 NOTE = "<!-- written by scripts/docs; do not edit -->\n\n"
@@ -267,8 +268,53 @@ def limits_page() -> str:
     return text + "".join(f"| `{name}` | {limit.default:,} | {limit.meaning} |\n" for name, limit in table().items())
 
 
+FORMAT_LIST = """# All formats
+
+`viewsphere formats` lists them, too. Each is one file in `src/viewsphere/formats/`. Labels that a format needs and a data set
+does not keep are computed by `viewsphere export` from its shots and models; passes, such as `rgb`, have to be kept. `viewsphere
+check` proves every export: each file is what would be written now. The table says which programs read the written trees back in
+tests, what of them was compared with the data set's own labels, and the largest difference; *own reader* is a small one written
+from the format's documentation.
+
+| format | holds | needs | read by | compared in tests: largest difference | test |
+|---|---|---|---|---|---|
+"""
+
+
+def formats_page() -> str:
+    """Each format with what reads it and how far it agrees, then the page of each that formats.md does not describe."""
+    proofs = json.loads((DOCS / "formats.json").read_text("utf-8"))
+    described = set(re.findall(r"^## (\w+)$", (DOCS / "formats.md").read_text("utf-8"), re.MULTILINE))
+    text = NOTE + FORMAT_LIST
+    for one in listed():
+        found = proofs.get(one.name, [])
+        compared = "<br>".join(f"{proof['against']}: {error_of(proof)}" for proof in found)
+        tests = "<br>".join(dict.fromkeys(f"`{proof['test'].removeprefix('tests/')}`" for proof in found))
+        link = f"[`{one.name}`](formats.md#{one.name})" if one.name in described else f"[`{one.name}`](#{one.name})"
+        needs = ", ".join(f"`{name}`" for name in one.needs)
+        text += f"| {link} | {', '.join(one.holds)} | {needs} | {', '.join(one.read_by)} | {compared} | {tests} |\n"
+    for one in listed():
+        if one.name not in described:
+            text += f"\n## {one.name}\n\n{as_page(inspect.getdoc(plugins.load('formats', one.name)) or '')}\n"
+            if one.options:
+                text += options_table("formats", one.name)
+    return text
+
+
+def as_page(told: str) -> str:
+    """A docstring as Markdown: angle brackets outside of code are text."""
+    lines = (line if line.startswith("    ") else escaped(line) for line in told.splitlines())
+    return "\n".join(lines)
+
+
+def escaped(line: str) -> str:
+    parts = line.split("`")
+    return "`".join(part if i % 2 else part.replace("<", "&lt;") for i, part in enumerate(parts))
+
+
 PAGES = {
     "limits.md": limits_page,
+    "format-list.md": formats_page,
     "cli.md": cli_page,
     "channels.md": channels_page,
     "proofs.md": proofs_page,

@@ -10,38 +10,22 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import subprocess
 import sys
-import tempfile
-from pathlib import Path
-from typing import Any
 
-ROOT = Path(__file__).parent.parent
+from gathered import ROOT, Proofs, gathered
+
+from viewsphere import plugins
+
 FILE = ROOT / "docs" / "labels.json"
-USE = "from proven import"
 OBJECTS = 20
 ROUNDS = 5
-
-Proofs = dict[str, list[dict[str, Any]]]
 
 
 def errors() -> Proofs:
     """The largest difference of each label from each thing it is compared with, and the test files that do."""
-    files = sorted(str(path) for path in (ROOT / "tests").rglob("test_*.py") if USE in path.read_text("utf-8"))
-    with tempfile.TemporaryDirectory() as folder:
-        noted = Path(folder) / "proven"
-        command = [sys.executable, "-m", "pytest", "-q", "-m", "not slow", *files]
-        subprocess.run(command, cwd=ROOT, env={**os.environ, "VIEWSPHERE_PROVEN": str(noted)}, check=True)
-        lines = [json.loads(line) for line in noted.read_text("utf-8").splitlines()]
-    largest: dict[tuple[str, str, str, str], float] = {}
-    for line in lines:
-        key = line["label"], line["against"], line["unit"], line["test"]
-        largest[key] = max(largest.get(key, 0.0), line["error"])
-    found: Proofs = {}
-    for (label, against, unit, test), error in sorted(largest.items()):
-        found.setdefault(label, []).append({"against": against, "error": float(f"{error:.2g}"), "unit": unit, "test": test})
-    return found
+    formats = plugins.names("formats")
+    return {name: found for name, found in gathered("tests").items() if name not in formats}
 
 
 def costs() -> dict[str, float]:

@@ -1,4 +1,6 @@
-"""Comparisons of labels with what knows nothing of how they are made; `scripts/measure_labels` gathers their differences."""
+"""Comparisons of labels with what knows nothing of how they are made, and of what programs read of exports with labels;
+`scripts/measure_labels` and `scripts/measure_formats` gather their differences.
+"""
 
 from __future__ import annotations
 

@@ -164,6 +164,25 @@ def test_a_format_may_prepare_its_samples(small_dataset, tmp_path, monkeypatch):
     assert tree_hash(tmp_path / "The same table") == tree_hash(tmp_path / "One row an object")
 
 
+def test_a_format_may_be_a_tree(small_dataset, monkeypatch):
+    install(monkeypatch, "lines", "viewsphere.formats", EXAMPLES["One JSON line a picture"])
+    export(small_dataset.root, ["lines"])
+    folder = small_dataset.root / "lines"
+    lines = [
+        json.loads(line) for split in small_dataset.splits for line in (folder / f"{split}.jsonl").read_text().splitlines()
+    ]
+    assert len(lines) == len(small_dataset)
+    by_image = {line["image"]: line["boxes"] for line in lines}
+    for sample in small_dataset:
+        boxes = by_image[f"{sample.split}/{sample.index:08d}.png"]
+        assert boxes == [{"category": o.category, "box": list(o.box2d)} for o in sample.objects if o.box2d]
+    assert check(small_dataset, rays=False).ok
+    file = folder / f"{small_dataset[0].split}.jsonl"
+    file.write_text(file.read_text().replace("post box", "posh box", 1))
+    seal_again(small_dataset.root)
+    assert [f.check for f in check(small_dataset, rays=False).findings] == ["lines"]
+
+
 @pytest.mark.usefixtures("csv_boxes")
 @pytest.mark.parametrize("name", ["boxes.csv", "{split}/{index:06d}.png"])
 def test_it_proves_itself(small_dataset, name):

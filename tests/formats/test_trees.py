@@ -72,6 +72,7 @@ def test_an_export_is_proved(exported, name, world, request):
         assert remarks(request.getfixturevalue(world), name, folder) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_what_is_changed_is_found(exported, name, request, tmp_path):
     """A file of each kind, which is cut, changed in one byte, missing, or too many."""
@@ -82,21 +83,19 @@ def test_what_is_changed_is_found(exported, name, request, tmp_path):
     kinds = {}
     for file in sorted(path for path in folder.rglob("*") if path.is_file() and path.stat().st_size):
         kinds.setdefault((file.suffix, file.parent.name), file)
-    for file in kinds.values():
+    for number, file in enumerate(kinds.values()):
         data = file.read_bytes()
-        for other in (
-            data[:-1],
-            bytes([*data[:-1], data[-1] ^ 1]),
-            data[: len(data) // 2] + b"x" + data[len(data) // 2 :],
-            None,
-        ):
-            file.unlink()
-            if other is not None:
-                file.write_bytes(other)
-            found = remarks(dataset, name, folder)
-            assert found, (file, other is None)
-            assert all("\n" not in message for _, message in found)
-            file.write_bytes(data)
+        half = len(data) // 2
+        ways = (data[:-1], bytes([*data[:-1], data[-1] ^ 1]), data[:half] + b"x" + data[half:], None)
+        other = ways[number % len(ways)]  # in turn: each proof reads the whole export
+        file.unlink()
+        if other is not None:
+            file.write_bytes(other)
+        found = remarks(dataset, name, folder)
+        assert found, (file, other is None)
+        assert all("\n" not in message for _, message in found)
+        file.unlink(missing_ok=True)
+        file.write_bytes(data)
     (folder / "strange").write_text("")
     assert any("strange" in message for _, message in remarks(dataset, name, folder))
 

@@ -16,7 +16,7 @@ FEW = {"channels": ["rgb", "tracks"], "annotations": []}
 @pytest.mark.parametrize("world", ["stills", "videos"])
 def test_what_is_computed_is_what_would_have_been_kept(world, tmp_path, tmp_path_factory):
     whole = Dataset(rendered(world, shared_place(tmp_path_factory)))
-    recipe = stills(**{**FEW, "channels": ["rgb"]}) if world == "stills" else videos(**FEW, shot_frames=4)
+    recipe = stills(**{**FEW, "channels": ["rgb"]}) if world == "stills" else videos(**FEW, shot_frames=2)
     generate(recipe, tmp_path / "few")
     wanted = [name for name in whole.plan.channels if name not in ("rgb", "tracks")]
     asked = [name for name in whole.recipe["annotations"] if name not in ("captions",)]
@@ -48,7 +48,7 @@ def test_exports_of_few_channels_are_those_of_many(tmp_path, tmp_path_factory):
     whole = Dataset(rendered("stills", shared_place(tmp_path_factory)))
     generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
     for root, place in ((whole.root, "whole"), (tmp_path / "few", "computed")):
-        export(root, [{"yolo": {"task": "pose"}}, "ply"], output=tmp_path / place)
+        export(root, [{"yolo": {"task": "pose"}}, "pointcloud"], output=tmp_path / place)
     pairs = [(file, tmp_path / "computed" / file.relative_to(tmp_path / "whole"))
              for file in (tmp_path / "whole").rglob("*.txt")]  # fmt: skip
     assert len(pairs) == len(whole)

@@ -6,7 +6,7 @@ import hashlib
 import io
 import json
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,9 @@ BODY_PARTS = "body_parts"
 """The member of `extras` that names the parts of a mesh's body, and of a primitive the accessor of each triangle's."""
 
 Object = dict[str, Any]
+
+NEAR = 0.01
+"""Metres from a camera to what a viewer shows; glTF wants some."""
 
 
 def glb_bytes(mesh: Mesh) -> bytes:
@@ -67,22 +70,37 @@ class Placed:
     extras: Mapping[str, Any]
 
 
-def scene_glb_bytes(things: Sequence[Placed]) -> bytes:
-    """GLB of a scene, y up as glTF has it: a node for each thing, with its pose, its extras and a child for each part. Things
-    of one mesh share its arrays.
+@dataclass(frozen=True, eq=False)
+class Looking:
+    """A camera in a scene: its name there, world_from_camera (4, 4) of axes with z up, x right, y up, z back in the camera, the
+    full angle that it sees from top to bottom, radians, the picture's width by its height, and what is said of it, as JSON.
+    """
+
+    name: str
+    world_from_camera: NDArray[np.float64]
+    yfov: float
+    aspect: float
+    extras: Mapping[str, Any]
+
+
+def scene_glb_bytes(things: Sequence[Placed], cameras: Iterable[Looking] = ()) -> bytes:
+    """GLB of a scene, y up as glTF has it: a node for each thing, with its pose, its extras and a child for each part, and one
+    for each camera. Things of one mesh share its arrays, cameras of one lens that.
     """
     writer, meshes, nodes, parts = _Writer({}), dict[int, range](), list[Object](), list[Object]()
+    looking = [writer.camera(camera) for camera in cameras]
     for thing in things:
         first = len(writer.meshes)
         if id(thing.mesh) not in meshes:
             writer.add_mesh(thing.mesh)
             meshes[id(thing.mesh)] = range(first, len(writer.meshes))
         own = meshes[id(thing.mesh)]
-        begin = len(things) + len(parts)
+        begin = len(things) + len(looking) + len(parts)
         parts += [{"name": writer.meshes[i]["name"], "mesh": i} for i in own]
         children = {"children": list(range(begin, begin + len(own)))} if own else {}
         matrix = _turned(thing.world_from_object).T.reshape(-1).tolist()  # column by column
         nodes.append({"name": thing.name, "matrix": matrix, **children, "extras": dict(thing.extras)})
+    nodes += looking
     return writer.packed(nodes + parts, len(nodes))
 
 
@@ -115,6 +133,7 @@ class _Writer:
     extensions: set[str] = field(default_factory=set[str])
     animations: list[Object] = field(default_factory=list[Object])
     images: list[Image] = field(default_factory=list[Image])
+    cameras: list[Object] = field(default_factory=list[Object])
     last: Mesh | None = None
     first_image: int = 0
     first_material: int = 0
@@ -159,6 +178,13 @@ class _Writer:
             own = mesh.triangle_body_part[run.first : run.first + len(run.triangles)]
             entry["extras"] = {BODY_PARTS: self.accessor(own.astype(np.uint32).reshape(-1, 1), "SCALAR", target=None)}
         self.meshes[-1]["primitives"].append(entry)
+
+    def camera(self, seen: Looking) -> Object:
+        """The node of a camera, whose own axes are glTF's as they are."""
+        lens: Object = {"yfov": seen.yfov, "aspectRatio": seen.aspect, "znear": NEAR}
+        number = _index(self.cameras, {"type": "perspective", "perspective": lens})
+        matrix = (seen.world_from_camera[[0, 2, 1, 3]] * [[1.0], [1.0], [-1.0], [1.0]]).T.reshape(-1).tolist()
+        return {"name": seen.name, "matrix": matrix, "camera": number, "extras": dict(seen.extras)}
 
     def animate(self, seconds: Sequence[float]) -> None:
         """Show the first nodes one after another, as many as there are seconds."""
@@ -325,6 +351,7 @@ class _Writer:
             "buffers": [{"byteLength": self.binary.tell()}],
         }
         optional = {"images": images, "samplers": self.samplers, "textures": self.textures, "animations": self.animations}
+        optional["cameras"] = self.cameras
         root |= {name: value for name, value in optional.items() if value}
         if self.extensions:
             root["extensionsUsed"] = sorted(self.extensions)

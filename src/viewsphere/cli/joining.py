@@ -52,7 +52,10 @@ def import_(
     kind: Annotated[
         str,
         typer.Argument(
-            metavar="FORMAT", help="What it is: coco or native.", show_default=False, autocompletion=completion.formats
+            metavar="FORMAT",
+            help="What it is: a format that `viewsphere formats` says can be imported.",
+            show_default=False,
+            autocompletion=completion.formats,
         ),
     ],
     source: Annotated[Path, typer.Argument(help="Folder of the data set, or COCO's JSON file.", show_default=False)],

@@ -12,11 +12,15 @@ TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}
 """PLY's names of numpy's types."""
 
 
+def ply_head(kind: np.dtype[Any], count: int, comments: Iterable[str] = ()) -> bytes:
+    """The head of a file of so many vertices, whose properties are the fields of a structured dtype."""
+    head = ["ply", "format binary_little_endian 1.0", *(f"comment {line}" for line in comments), f"element vertex {count}"]
+    head += [f"property {TYPES[kind[name].str[1:]]} {name}" for name in kind.names or ()]
+    return "\n".join([*head, "end_header\n"]).encode("ascii")
+
+
 def encode_ply(vertices: NDArray[Any], comments: Iterable[str] = ()) -> bytes:
     """A file of vertices alone, a structured array (N,) whose fields are their properties; comments have no line breaks."""
-    names = vertices.dtype.names or ()
-    head = ["ply", "format binary_little_endian 1.0", *(f"comment {line}" for line in comments)]
-    head.append(f"element vertex {len(vertices)}")
-    head += [f"property {TYPES[vertices.dtype[name].str[1:]]} {name}" for name in names]
-    packed = np.dtype([(name, "<" + vertices.dtype[name].str[1:]) for name in names])
-    return "\n".join([*head, "end_header\n"]).encode("ascii") + vertices.astype(packed).tobytes()
+    kind = vertices.dtype
+    packed = np.dtype([(name, "<" + kind[name].str[1:]) for name in kind.names or ()])
+    return ply_head(kind, len(vertices), comments) + vertices.astype(packed).tobytes()

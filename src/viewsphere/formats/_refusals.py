@@ -51,3 +51,18 @@ def plain_names(scope: Scope, allowed: str = r"[^\s]+") -> Iterator[str]:
     for category in scope.categories:
         if not re.fullmatch(allowed, category.name):
             yield f"expected names of categories that match {allowed}; found {category.name!r}"
+
+
+def no_skew(scope: Scope) -> Iterator[str]:
+    """Of a format whose camera matrices are two focal lengths and a principal point."""
+    for sensor in () if scope.rig is None else scope.rig.sensors:
+        if sensor.lidar is None and sensor.intrinsics.skew != 0:
+            yield f"expected cameras without skew; found {sensor.intrinsics.skew:g} of {sensor.name}"
+
+
+def centred(scope: Scope) -> Iterator[str]:
+    """Of a format whose cameras are an angle of view: pixels are square, and the axis meets the middle of the picture."""
+    for sensor in () if scope.rig is None else scope.rig.sensors:
+        k = sensor.intrinsics
+        if sensor.lidar is None and ((k.cx, k.cy) != (k.width / 2, k.height / 2) or k.fx != k.fy or k.skew):
+            yield f"expected square pixels and a principal point in the picture's middle; found others of {sensor.name}"

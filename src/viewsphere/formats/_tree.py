@@ -17,9 +17,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from viewsphere.aside import temporary
+from viewsphere.errors import UserError
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import Content, Expected, check_files, put, same_bytes
 from viewsphere.formats._paper import json_bytes
+from viewsphere.labels import channels
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
@@ -38,13 +40,14 @@ class File:
 @dataclass(frozen=True)
 class Piece:
     """The next bytes of a section of a file that many samples, or all, have parts in; `between` stands before all but the
-    first.
+    first. `count`: how many of what the section holds they are.
     """
 
     path: str
     data: bytes
     section: str = ""
     between: bytes = b""
+    count: int = 1
 
 
 def line(path: str, *values: object) -> Piece:
@@ -96,7 +99,7 @@ class Tree:
         yield from ()
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """How a file is put together; `counts` are the numbers of its sections' pieces."""
+        """How a file is put together; `counts` are the numbers of what its sections hold."""
         return LIST if path.endswith(".json") else LINES
 
     def notes(self) -> Iterator[str]:
@@ -120,11 +123,12 @@ def functions(kind: type[Tree]) -> Functions:
 
         def prepare(sample: Sample) -> list[Piece]:
             pieces: list[Piece] = []
-            for one in tree.of(sample):
-                if isinstance(one, Piece):
-                    pieces.append(one)
-                else:
-                    put(dataset, one.content, folder / one.path)
+            with _lacking_told(tree, sample):
+                for one in tree.of(sample):
+                    if isinstance(one, Piece):
+                        pieces.append(one)
+                    else:
+                        put(dataset, one.content, folder / one.path)
             return pieces
 
         return prepare
@@ -151,6 +155,18 @@ def functions(kind: type[Tree]) -> Functions:
                 yield from _different(aside / path, folder / path)
 
     return Functions(preparer, writer, verify)
+
+
+@contextmanager
+def _lacking_told(tree: Tree, sample: Sample) -> Generator[None]:
+    """Raises UserError for a channel that the sample lacks, as those of imported data sets may."""
+    try:
+        yield
+    except KeyError as error:
+        if error.args and error.args[0] in channels():
+            lacking = f"expected channel {error.args[0]}, found none: leave this format out"
+            raise UserError(f"{tree.dataset.root}: frame {sample.index}: {lacking}") from None
+        raise
 
 
 def _nowhere(pieces: list[Piece]) -> None:
@@ -190,7 +206,7 @@ def _assemble(tree: Tree, path: str, sections: Mapping[str, _Section], file: Pat
 
 @dataclass
 class _Section:
-    """The pieces of a section, one after another, and how many there are."""
+    """The pieces of a section, one after another, and how many things they are."""
 
     file: Path
     count: int = 0
@@ -201,6 +217,7 @@ class _Collected:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._count = 0
         self.files: dict[str, dict[str, _Section]] = {}
 
     def add(self, pieces: Iterable[Piece]) -> None:
@@ -208,11 +225,12 @@ class _Collected:
         for piece in pieces:
             sections = self.files.setdefault(piece.path, {})
             if piece.section not in sections:
-                sections[piece.section] = _Section(self._folder / f"{len(self.files)}-{len(sections)}")
+                self._count += 1
+                sections[piece.section] = _Section(self._folder / str(self._count))
             section = sections[piece.section]
             with section.file.open("ab") as file:
                 file.write(piece.between + piece.data if section.count else piece.data)
-            section.count += 1
+            section.count += piece.count
 
 
 def _different(wanted: Path, found: Path) -> Iterator[Remark]:

@@ -96,7 +96,7 @@ class Target:
         the format needs of every frame.
         """
         shown = self.view.shown(sample)
-        absent = missing(getattr(self.module, "CHANNELS", ()), shown.channels)
+        absent = missing(getattr(self.module, "CHANNELS", ()), {*shown.channels, *shown.asked})
         is_exempt = getattr(self.module, "LIDAR", False) and isinstance(sample.known_camera and sample.camera.distortion, Scan)
         if sample.sensor != CAMERA and absent and not is_exempt:
             raise UserError(

@@ -170,7 +170,7 @@ class _Made:
         instant, own = other.shot.instants[at], self.shot.instants
         if any(one.index == instant.index for one in own):
             return self
-        where = 0 if place else len(own)
+        where = sum(one.index < instant.index for one in own)  # points that are followed bring instants far away, too
 
         def inserted(values: Iterable[Any], one: Any) -> tuple[Any, ...]:
             known = tuple(values)

@@ -1,12 +1,19 @@
 """COCO instances (https://cocodataset.org/#format-data) with the extra keys of Ruiz et al. 2019.
 
-    annotations/instances_<split>.json; with the annotation captions, captions_<split>.json
+    annotations/instances_<split>.json; with the annotation captions, captions_<split>.json; with keypoints, these, too
     images/<split>/<image id>.png, images/<split>/MASK/<image id>.png     (_<object id> if frames hold several objects)
     MODELS/<key>/<key>.obj, .glb, ...
 
 Large data sets have numbered sub-folders. Image and annotation ids count from 1 and come from the plan: they do not depend
 on what is finished. `Options` say how categories are numbered and where pictures lie. Segmentations are polygons that
-pycocotools rasterises to the identical mask. Imported annotations are kept unchanged, except for their ids.
+pycocotools rasterises to the identical mask, or run lengths. Imported annotations are kept unchanged, except for their ids.
+
+With the annotation keypoints, categories have `keypoints`, the names of all points of their models, and `skeleton`; objects
+have `keypoints`, x, y, v of each name, and `num_keypoints`: v is 2 for a visible point, 1 for an occluded one, and 0 for
+others, of which x and y are 0. As COCO's annotators gave whole pixels, (0, 0) is the centre of the first one, half a pixel less
+than in boxes and polygons; Detectron2 reads them so. They are in the instances file, where trainers look; datumaro looks for
+them in files `person_keypoints_<split>.json` only. COCOeval has to be given sigmas for each category (`params.kpt_oks_sigmas`),
+as its default ones are of 17 points.
 """
 
 from __future__ import annotations
@@ -17,9 +24,9 @@ from pathlib import Path
 
 from viewsphere.errors import UserError
 from viewsphere.formats._contents import put
-from viewsphere.formats.coco.categories import category_ids, keeps_ids
+from viewsphere.formats.coco.categories import keeps_ids
 from viewsphere.formats.coco.categories import notes as notes
-from viewsphere.formats.coco.entries import Entry, entry, files, seen
+from viewsphere.formats.coco.entries import Entries, Entry, files, seen
 from viewsphere.formats.coco.instances import instances
 from viewsphere.formats.coco.options import Options as Options
 from viewsphere.formats.coco.proving import verify as verify
@@ -28,20 +35,20 @@ from viewsphere.model.channel import missing
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
-HOLDS = ("boxes", "masks", "captions", "poses", "3D boxes")
+HOLDS = ("boxes", "masks", "keypoints", "captions", "poses", "3D boxes")
 READ_BY = ("pycocotools", "torchvision", "datumaro", "supervision", "FiftyOne")
 CHANNELS = ("rgb",)
 
 
 def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], Entry]:
     """Puts a sample's images and masks in place, and makes its entries of the instances JSON."""
-    ids = category_ids(dataset, options)
+    entries = Entries(dataset, options)
 
     def prepare(sample: Sample) -> Entry:
         masks = seen(sample)
         for _, name, content in files(dataset, sample, masks, options):
             put(dataset, content, folder / name)
-        return entry(dataset, sample, ids, masks)
+        return entries.of(sample, masks)
 
     return prepare
 

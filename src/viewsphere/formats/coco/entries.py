@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from viewsphere.formats._contents import Expected
 from viewsphere.formats._paper import faces, json_bytes, transformation_matrix
+from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.options import Options
+from viewsphere.formats.coco.points import object_points, point_names
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.labels.captions import MOST
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
@@ -37,11 +39,33 @@ class Entry:
     captions: tuple[bytes, ...] = ()
 
 
-def entry(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Entry:
-    """A sample's entry; `ids`: COCO's category ids by ours."""
-    annotations = map(json_bytes, _annotations(dataset, sample, ids, masks))
-    captions = map(json_bytes, _captions(sample))
-    return Entry(sample.split, json_bytes(_image(dataset, sample)), tuple(annotations), tuple(captions))
+class Entries:
+    """Makes the entries of samples."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        self._dataset, self._options = dataset, options
+        self._ids, self._names = category_ids(dataset, options), point_names(dataset)
+
+    def of(self, sample: Sample, masks: Masks) -> Entry:
+        """A sample's entry."""
+        annotations = tuple(json_bytes(one) for one in self._annotations(sample, masks))
+        captions = tuple(map(json_bytes, _captions(sample)))
+        return Entry(sample.split, json_bytes(_image(self._dataset, sample)), annotations, captions)
+
+    def _annotations(self, sample: Sample, masks: Masks) -> Iterator[dict[str, Any]]:
+        """COCO's annotations of all visible objects, and of imported ones that have a box."""
+        for o in sample.objects:
+            own = {
+                "id": self._dataset.plan.annotation_id(sample.index, o.id),
+                "image_id": sample.index + 1,
+                "category_id": self._ids[o.category_id],
+            }
+            if o.source is not None and (o.area or o.box2d is not None):
+                yield _foreign_annotation(o, own)
+            elif o.source is None and o.area:
+                outline = _outline(o, masks[o.id], self._options)
+                mask_file = _mask_file(self._dataset, sample, o.id)
+                yield own | _annotation(sample, o, outline, mask_file) | object_points(o, self._names)
 
 
 def _captions(sample: Sample) -> Iterator[dict[str, Any]]:
@@ -65,13 +89,11 @@ def files(dataset: Dataset, sample: Sample, masks: Masks, options: Options) -> I
         yield sample.index, f"{folder}/{_mask_file(dataset, sample, number)}", mask
 
 
-def _annotations(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Iterator[dict[str, Any]]:
-    """COCO's annotations of all visible objects, and of imported ones that have a box."""
-    for o in sample.objects:
-        if o.source is not None and (o.area or o.box2d is not None):
-            yield _foreign_annotation(dataset, sample, o, ids)
-        elif o.source is None and o.area:
-            yield _annotation(dataset, sample, o, ids, masks[o.id])
+def _outline(o: ObjectAnnotation, mask: NDArray[np.bool_], options: Options) -> Any:
+    """COCO's segmentation of a mask."""
+    if options.segmentation == "rle":
+        return {"size": [o.rle.height, o.rle.width], "counts": o.rle.counts}
+    return [[int(c) for c in polygon] for polygon in mask_polygons(mask)]
 
 
 def _image_file(dataset: Dataset, sample: Sample) -> str:
@@ -121,31 +143,22 @@ def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
     }
 
 
-def _foreign_annotation(dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int]) -> dict[str, Any]:
+def _foreign_annotation(o: ObjectAnnotation, own: Mapping[str, int]) -> dict[str, Any]:
     """An imported object's own annotation with this export's ids; its mask file, which is not in the store, is not named."""
     source = {k: v for k, v in (o.source or {}).items() if k != "path_mask"}
-    own = {
-        "id": dataset.plan.annotation_id(sample.index, o.id),
-        "image_id": sample.index + 1,
-        "category_id": ids[o.category_id],
-    }
     return {"iscrowd": 0, "area": o.area, **source, **own}
 
 
-def _annotation(
-    dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int], mask: NDArray[np.bool_]
-) -> dict[str, Any]:
+def _annotation(sample: Sample, o: ObjectAnnotation, outline: Any, mask_file: str) -> dict[str, Any]:
+    """The fields of a rendered object's annotation, but for its ids."""
     return {
-        "id": dataset.plan.annotation_id(sample.index, o.id),
-        "image_id": sample.index + 1,
-        "category_id": ids[o.category_id],
         "iscrowd": 0,
         "area": o.area,
         "bbox": _corner_and_size(o.box2d),
-        "segmentation": [[int(c) for c in polygon] for polygon in mask_polygons(mask)],
+        "segmentation": outline,
         "width": sample.camera.width,
         "height": sample.camera.height,
-        "path_mask": _mask_file(dataset, sample, o.id),
+        "path_mask": mask_file,
         "bbox_3D_pxs": faces(o.box3d_pixels),
         "bbox_projected": _corner_and_size(o.box2d_projected),
         "bbox_unclipped": _corner_and_size(o.box2d_unclipped),

@@ -13,6 +13,7 @@ from viewsphere.formats._paper import json_bytes, vehicles
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.entries import CAPTIONS, Entry
 from viewsphere.formats.coco.options import Options
+from viewsphere.formats.coco.points import category_points, has_label, point_names
 from viewsphere.store import Dataset
 from viewsphere.store.credits import credited
 
@@ -29,7 +30,7 @@ def file_names(dataset: Dataset) -> list[str]:
 
 def _captions(dataset: Dataset) -> tuple[str, ...]:
     """The kind of the files of captions, none where no picture has any."""
-    return (CAPTIONS,) if any(CAPTIONS in part.recipe.get("annotations", ()) for part in dataset.plan.parts) else ()
+    return (CAPTIONS,) if has_label(dataset, CAPTIONS) else ()
 
 
 @contextmanager
@@ -77,10 +78,14 @@ def _written(file: Path, head: bytes) -> Generator[Callable[[bytes, Iterable[byt
 def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
     info = {"description": dataset.name, "version": "1.0", "contributor": f"viewsphere {dataset.plan.version}"}
     licenses, credits = _terms(dataset)
+    names = point_names(dataset)
     return {
         "info": {**info, "credits": credits} if credits else info,
         "licenses": licenses,
-        "categories": [{"id": ids[c.id], "name": c.name, "supercategory": c.supercategory} for c in dataset.categories],
+        "categories": [
+            {"id": ids[c.id], "name": c.name, "supercategory": c.supercategory, **category_points(dataset, c.id, names)}
+            for c in dataset.categories
+        ],
         "models": vehicles(dataset.models),
     }
 

@@ -10,7 +10,7 @@ from viewsphere.model.frozen import Frozen
 
 
 class Options(Frozen):
-    """How categories are numbered, and where pictures lie."""
+    """How categories are numbered, where pictures lie, and how masks are written."""
 
     category_ids: Literal["contiguous", "coco"] = Field(
         default="contiguous",
@@ -20,6 +20,11 @@ class Options(Frozen):
     pictures: Literal["images", "splits"] = Field(
         default="images",
         description="`images`: in `images/<split>/`, where datumaro looks; `splits`: in `<split>/`, as the paper's tool does",
+    )
+
+    segmentation: Literal["polygons", "rle"] = Field(
+        default="polygons",
+        description="of masks, both exact. `polygons`: rings along pixels' edges; `rle`: pycocotools' compressed run lengths",
     )
 
     def folder(self, split: str) -> str:

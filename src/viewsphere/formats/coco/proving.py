@@ -11,8 +11,7 @@ from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, models
 from viewsphere.formats._json_proof import check_json
 from viewsphere.formats._json_rows import Where
-from viewsphere.formats.coco.categories import category_ids
-from viewsphere.formats.coco.entries import Entry, entry, files, seen
+from viewsphere.formats.coco.entries import Entries, Entry, files, seen
 from viewsphere.formats.coco.instances import file_name, file_names, instances
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.witness import testify
@@ -39,10 +38,10 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
 
 def _expected(dataset: Dataset, append: Callable[[Entry], None], options: Options) -> Iterator[Expected]:
     """All files but the instances, for which every frame is appended elsewhere."""
-    ids = category_ids(dataset, options)
+    entries = Entries(dataset, options)
     for sample in dataset:
         masks = seen(sample)
-        append(entry(dataset, sample, ids, masks))
+        append(entries.of(sample, masks))
         yield from files(dataset, sample, masks, options)
     yield from models(dataset)
 

@@ -19,12 +19,16 @@ from viewsphere.formats import Remark
 from viewsphere.formats._json_rows import rows
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.options import Options
+from viewsphere.formats.coco.points import Names, object_points, point_names
 from viewsphere.geometry.mask import encode_rle, mask_box
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
 MOST_FRAMES = 2000
 """Frames of a split that are looked at, spread evenly: COCOeval keeps all of them in memory."""
+
+SIGMA = 0.05
+"""Of all points, in COCOeval's similarity of keypoints; found where they are, they are alike whatever it is."""
 
 MISTAKES = (LookupError, TypeError, ValueError, AttributeError, AssertionError, OSError)
 """What pycocotools raises for files that are not as they should be."""
@@ -38,21 +42,23 @@ class _Truth:
     category: int
     mask: NDArray[np.bool_]
     box: list[int]  # x, y, width, height
+    points: list[float]  # x, y, v of each of its category's points
 
 
 def testify(dataset: Dataset, file: Path, split: str, sampled: Collection[int], options: Options) -> Iterator[Remark]:
-    """Masks, areas and boxes that differ from those of the instance maps, and an AP below 1 of detections made from these.
+    """Masks, areas and boxes that differ from those of the instance maps, and an AP below 1 of detections made from these, and
+    from the stored keypoints.
 
     Imported frames are left out: nobody knows their true masks.
     """
     positions = sorted(sampled)
     samples = (dataset[i] for i in positions[:: max(1, -(-len(positions) // MOST_FRAMES))])
-    ids = category_ids(dataset, options)
+    ids, names = category_ids(dataset, options), point_names(dataset)
     truths = {
         dataset.plan.annotation_id(sample.index, number): truth
         for sample in samples
         if sample.split == split and all(o.source is None for o in sample.objects)
-        for number, truth in _truths(sample, ids)
+        for number, truth in _truths(sample, ids, names)
     }
     if not truths or not file.is_file():
         return
@@ -61,13 +67,14 @@ def testify(dataset: Dataset, file: Path, split: str, sampled: Collection[int], 
         for number in truths.keys() & coco.anns.keys():
             yield from _differences(coco, coco.anns[number], truths[number])
         yield from _precision(coco, list(truths.values()), file)
+        yield from _precision_of_points(coco, [truth for truth in truths.values() if any(truth.points)], file)
     except Exception as error:  # pycocotools raises bare ones for wrong polygons
         if type(error) is not Exception and not isinstance(error, MISTAKES):
             raise
         yield None, f"{file.name}: expected COCO instances, found {type(error).__name__}: {error}"
 
 
-def _truths(sample: Sample, ids: Mapping[int, int]) -> Iterator[tuple[int, _Truth]]:
+def _truths(sample: Sample, ids: Mapping[int, int], names: Names) -> Iterator[tuple[int, _Truth]]:
     """By the objects' ids; from the run lengths where there is no map to read."""
     try:
         instances = sample.channels["instances"]
@@ -77,7 +84,8 @@ def _truths(sample: Sample, ids: Mapping[int, int]) -> Iterator[tuple[int, _Trut
         mask = o.mask if instances is None else instances == o.id
         if box := mask_box(mask):
             x0, y0, x1, y1 = box
-            yield o.id, _Truth(sample.index, ids[o.category_id], mask, [x0, y0, x1 - x0, y1 - y0])
+            points = object_points(o, names).get("keypoints", [])
+            yield o.id, _Truth(sample.index, ids[o.category_id], mask, [x0, y0, x1 - x0, y1 - y0], points)
 
 
 def _loaded(file: Path, images: Collection[int]) -> Any:
@@ -97,10 +105,10 @@ def _loaded(file: Path, images: Collection[int]) -> Any:
 
 
 def _differences(coco: Any, annotation: dict[str, Any], truth: _Truth) -> Iterator[Remark]:
-    code = coco.annToRLE(annotation)
+    counts = coco.annToRLE(annotation)["counts"]
     if not np.array_equal(coco.annToMask(annotation), truth.mask):
         yield truth.frame, f"annotation {annotation['id']}: its segmentation differs from the instance map"
-    if code["counts"] != encode_rle(truth.mask).encode("ascii"):
+    if (counts if isinstance(counts, str) else counts.decode("ascii")) != encode_rle(truth.mask):
         yield truth.frame, f"annotation {annotation['id']}: its run lengths differ from the instance map's"
     said, area = (annotation["area"], annotation["bbox"]), int(np.count_nonzero(truth.mask))
     if said != (area, truth.box):
@@ -120,6 +128,24 @@ def _precision(coco: Any, truths: Collection[_Truth], file: Path) -> Iterator[Re
         if not evaluation.stats[0] > 1 - 1e-9:
             found = f"{evaluation.stats[0]:.4f}"
             yield None, f"{file.name}: {kind}: expected AP 1.0 of detections made from the instance maps, found {found}"
+
+
+def _precision_of_points(coco: Any, truths: Collection[_Truth], file: Path) -> Iterator[Remark]:
+    """The same of keypoints, category by category, as each has its own number of them."""
+    from pycocotools.cocoeval import COCOeval
+
+    for category in sorted({truth.category for truth in truths}):
+        found = [{**_detection(truth), "keypoints": truth.points} for truth in truths if truth.category == category]
+        with contextlib.redirect_stdout(io.StringIO()):
+            evaluation: Any = COCOeval(coco, coco.loadRes(found), "keypoints")
+            evaluation.params.catIds, evaluation.params.maxDets = [category], [len(found)]
+            evaluation.params.kpt_oks_sigmas = np.full(len(found[0]["keypoints"]) // 3, SIGMA)
+            evaluation.evaluate()
+            evaluation.accumulate()
+        precision = evaluation.eval["precision"][..., 0, 0]  # of all areas and detections
+        if not precision.min() > 1 - 1e-9:
+            told = f"expected AP 1.0 of the stored points of category {category}, found {precision.mean():.4f}"
+            yield None, f"{file.name}: keypoints: {told}"
 
 
 def _detection(truth: _Truth) -> dict[str, Any]:

@@ -72,7 +72,9 @@ def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Samp
 def writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options) -> Generator[Callable[[None], None]]:
     """Nothing is left to write but clouds."""
     for name in missing(needs(options), dataset.plan.channels):
-        raise UserError(f"ply: expected a data set with the channel {name}, of which complete clouds are made; found none")
+        raise UserError(
+            f"pointcloud: expected a data set with the channel {name}, of which complete clouds are made; found none"
+        )
     yield lambda done: None
 
 

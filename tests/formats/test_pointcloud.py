@@ -1,4 +1,4 @@
-"""Point clouds: through the camera they are the pixels again; the format `ply`, read by trimesh."""
+"""Point clouds: through the camera they are the pixels again; the format `pointcloud`, read by trimesh."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from truth_scenes import LENSES
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import RecipeError, StoreError, UserError
-from viewsphere.formats.ply import Options, verify
+from viewsphere.formats.pointcloud import Options, verify
 from viewsphere.geometry.camera import project
 from viewsphere.model.camera import Distortion
 from viewsphere.recipe.formats import FormatEntry
@@ -71,18 +71,18 @@ FISHEYE = LENS.model_copy(update={"distortion": Distortion(model="fisheye", coef
 
 @pytest.fixture(scope="module", params=[LENS, FISHEYE], ids=["pinhole", "fisheye"])
 def dataset(request, tmp_path_factory):
-    return make(tmp_path_factory.mktemp("ply") / "out", several=True, intrinsics=request.param, ground=True)
+    return make(tmp_path_factory.mktemp("pointcloud") / "out", several=True, intrinsics=request.param, ground=True)
 
 
 def exported(dataset, folder, **options):
     folder.mkdir()
-    write(dataset, [(FormatEntry(name="ply", options=options), folder)])
+    write(dataset, [(FormatEntry(name="pointcloud", options=options), folder)])
     return folder
 
 
 @pytest.mark.parametrize("axes", ["camera", "world"])
 def test_trimesh_reads_the_clouds(dataset, tmp_path, axes):
-    folder = exported(dataset, tmp_path / "ply", axes=axes)
+    folder = exported(dataset, tmp_path / "pointcloud", axes=axes)
     assert len(list(folder.rglob("*.ply"))) == len(dataset)
     for sample in dataset:
         file = folder / sample.split / f"{sample.index:08d}.ply"
@@ -101,7 +101,7 @@ def test_trimesh_reads_the_clouds(dataset, tmp_path, axes):
 
 
 def test_its_proof_names_the_frame(dataset, tmp_path):
-    folder = exported(dataset, tmp_path / "ply")
+    folder = exported(dataset, tmp_path / "pointcloud")
     file = folder / dataset[1].split / f"{dataset[1].index:08d}.ply"
     data = bytearray(file.read_bytes())
     data[-1] ^= 1
@@ -113,7 +113,7 @@ def test_its_proof_names_the_frame(dataset, tmp_path):
 
 
 def test_complete_surface(tmp_path):
-    complete = {"ply": {"axes": "world", "surface": "complete"}}
+    complete = {"pointcloud": {"axes": "world", "surface": "complete"}}
     recipe = small_recipe(
         channels=["rgb", "depth", "instances", "surface_samples"],
         labels={"surface_samples": {"count": 200}},
@@ -123,7 +123,7 @@ def test_complete_surface(tmp_path):
     generate(recipe, tmp_path, workers=0)
     made = Dataset(tmp_path)
     for sample in made:
-        read = trimesh.load(tmp_path / "ply" / sample.split / f"{sample.index:08d}.ply")
+        read = trimesh.load(tmp_path / "pointcloud" / sample.split / f"{sample.index:08d}.ply")
         np.testing.assert_array_equal(read.vertices, sample.surface_samples["point"].astype(np.float32))
         rows = read.metadata["_ply_raw"]["vertex"]["data"]
         np.testing.assert_array_equal(rows["visible"].reshape(-1), sample.surface_samples["state"] == 0)
@@ -132,13 +132,13 @@ def test_complete_surface(tmp_path):
 
 
 def test_channels_that_it_needs_are_asked_for_before_anything_is_rendered(tmp_path):
-    with pytest.raises(RecipeError, match=r"^channels: expected depth, which format ply needs; found rgb"):
-        generate(small_recipe(channels=["rgb", "instances"], formats=["ply"]), tmp_path, workers=0)
-    complete = [{"ply": {"surface": "complete"}}]
-    with pytest.raises(RecipeError, match=r"^channels: expected surface_samples, which format ply needs; found rgb"):
+    with pytest.raises(RecipeError, match=r"^channels: expected depth, which format pointcloud needs; found rgb"):
+        generate(small_recipe(channels=["rgb", "instances"], formats=["pointcloud"]), tmp_path, workers=0)
+    complete = [{"pointcloud": {"surface": "complete"}}]
+    with pytest.raises(RecipeError, match=r"^channels: expected surface_samples, which format pointcloud needs; found rgb"):
         generate(small_recipe(channels=["rgb", "depth", "instances"], formats=complete), tmp_path, workers=0)
 
 
 def test_complete_clouds_of_a_data_set_without_their_points(dataset, tmp_path):
-    with pytest.raises(UserError, match=r"^ply: expected a data set with the channel surface_samples"):
-        exported(dataset, tmp_path / "ply", surface="complete")
+    with pytest.raises(UserError, match=r"^pointcloud: expected a data set with the channel surface_samples"):
+        exported(dataset, tmp_path / "pointcloud", surface="complete")

@@ -1,0 +1,152 @@
+"""Cameras, rigs and some points of the worlds that they see, for formats that know little else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.formats import Scope
+from viewsphere.formats._contents import Coded
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.rig import CAMERA, Rig
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+Float = NDArray[np.float64]
+MOST = 65535
+"""Steps of depth that 16 bits hold."""
+
+POINTS = 500
+"""Points that are taken of a picture, about."""
+
+
+def unskewed(scope: Scope) -> Iterator[str]:
+    """Of a format whose pixels have right angles."""
+    for sensor in () if scope.rig is None else scope.rig.sensors:
+        if sensor.lidar is None and sensor.intrinsics.skew:
+            yield f"expected cameras without skew; found {sensor.intrinsics.skew:g} of {sensor.name}"
+
+
+def world_of(dataset: Dataset, sample: Sample) -> str:
+    """The name of what stands still while it is looked at from several sides: a sequence, a scene or a model."""
+    if sample.sequence:
+        return sample.sequence
+    row = dataset.plan.row_at(sample.index)
+    return f"{row.subject}-{row.part}" if row.part else row.subject
+
+
+def world_from_camera(camera: Camera) -> Float:
+    """The camera's pose, (4, 4), of OpenCV's axes."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = camera.R.T, camera.center
+    return pose
+
+
+def opengl_pose(camera: Camera) -> Float:
+    """The camera's pose, (4, 4), of OpenGL's axes: x right, y up, z back."""
+    return world_from_camera(camera) * (1.0, -1.0, -1.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A rig when it takes a sample: names, lenses and `rig_from_sensor`, (4, 4), of its sensors, which of these the sample is
+    of, those of which there are samples, the number of the first of all, and the rig's own pose, as that of a camera. `folder`
+    is where files of several sensors are told apart, empty where there is one.
+    """
+
+    names: tuple[str, ...]
+    lenses: tuple[Intrinsics, ...]
+    mounts: tuple[Float, ...]
+    sensor: int
+    there: tuple[int, ...]
+    first: int
+    pose: Camera
+    folder: str
+
+    @property
+    def is_first(self) -> bool:
+        """Whether the sample is the first that there is of its moment."""
+        return self.sensor == self.there[0]
+
+
+class Rigs:
+    """Which rigs take a data set's samples."""
+
+    def __init__(self, dataset: Dataset) -> None:
+        self._dataset = dataset
+        self._shot = lru_cache(maxsize=8)(dataset.labelled)
+
+    def usual(self, part: int) -> Rig | None:
+        """That of the first shot of a part of the data set."""
+        return self._usual.get(part)
+
+    @property
+    def _usual(self) -> dict[int, Rig]:
+        if not hasattr(self, "_found"):
+            firsts = {row.part: row.key for row in reversed(self._dataset.rows)}
+            shots = {part: self._shot(key) for part, key in firsts.items()}
+            self._found = {part: shot.rig for part, shot in shots.items() if shot is not None}
+        return self._found
+
+    def at(self, sample: Sample) -> Moment:
+        """The rig that takes a sample, then; of one whose shot nobody knows, its camera alone."""
+        taken = sample.taken
+        shot = taken.shot or self._shot(taken.key) if taken else None
+        if taken is None or shot is None:
+            camera = sample.camera
+            folder = "" if sample.sensor == CAMERA else sample.sensor
+            return Moment((sample.sensor,), (camera.intrinsics,), (np.eye(4),), 0, (0,), sample.index, camera, folder)
+        sensors, first = shot.rig.sensors, sample.index - taken.sensor
+        return Moment(
+            tuple(sensor.name for sensor in sensors),
+            tuple(shot.camera(taken.instant, number).intrinsics for number in range(len(sensors))),
+            tuple(np.array(sensor.rig_from_sensor) for sensor in sensors),
+            taken.sensor,
+            tuple(self._dataset.choice.places(first, len(sensors))),
+            first,
+            shot.camera(taken.instant),
+            sensors[taken.sensor].name if len(sensors) > 1 else "",
+        )
+
+
+def measured_png(sample: Sample, metres: float) -> Coded:
+    """Depth along z in steps of so many metres, 16 bits, as RGB-D cameras measure it: 0 where nothing is, or it is too far."""
+
+    def make() -> bytes:
+        depth = sample.channels["depth"].astype(np.float64)
+        with np.errstate(invalid="ignore"):
+            steps = np.rint(depth / metres)
+        held = (depth > 0) & (steps <= MOST)
+        return encode_png(np.where(held, np.maximum(steps, 1), 0).astype(np.uint16))
+
+    return Coded(sample.index, f"measured {metres!r}.png", make)
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Where points are in a picture, (N, 2) pixels, in the world, (N, 3) metres, and their colours, (N, 3) uint8."""
+
+    pixels: Float
+    world: Float
+    colors: NDArray[np.uint8]
+
+
+def points_of(sample: Sample) -> Points:
+    """The points that pixels of a coarse grid show, by the channel `depth`."""
+    camera = sample.camera
+    step = max(1, math.ceil(math.sqrt(camera.width * camera.height / POINTS)))
+    rows, columns = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
+    depth, rays = sample.channels["depth"][rows, columns].astype(np.float64), pixel_rays(camera.intrinsics)[rows, columns]
+    seen = np.isfinite(depth) & np.isfinite(rays).all(axis=-1) & (rays[..., 2] * depth > 0)
+    rows, columns, rays, depth = rows[seen], columns[seen], rays[seen], depth[seen]
+    places = rays * (depth / rays[:, 2])[:, None]
+    pixels = np.column_stack((columns, rows)) + 0.5
+    return Points(pixels, transform(camera.R.T, places - camera.t), sample.picture[rows, columns, :3])

@@ -1,0 +1,90 @@
+"""Files of flow, disparity and depth that several formats share: Middlebury's .flo, PFM, KITTI's 16-bit pictures, masks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.formats._contents import Coded
+from viewsphere.model.sample import Sample
+
+FLO_TAG = b"PIEH"
+"""How .flo files begin, and Sintel's .dpt and .cam: the little-endian float 202021.25."""
+
+UNKNOWN = np.float32(1e10)
+"""Flow that is not known, in .flo files: all beyond 1e9."""
+
+STEPS, ZERO = 64, 2**15
+"""Of KITTI's flow in a pixel, and the number of no motion."""
+
+
+def tagged(array: NDArray[Any]) -> bytes:
+    """Numbers (H, W) or (H, W, 2) after Middlebury's tag, width and height, as little-endian float32, row by row."""
+    height, width = array.shape[:2]
+    return FLO_TAG + np.array([width, height], "<i4").tobytes() + np.ascontiguousarray(array, "<f4").tobytes()
+
+
+def pfm(array: NDArray[Any]) -> bytes:
+    """A PFM file of numbers (H, W) or (H, W, 3): little-endian float32, the lowest row first."""
+    head = f"{'PF' if array.ndim == 3 else 'Pf'}\n{array.shape[1]} {array.shape[0]}\n-1.0\n"
+    return head.encode() + np.ascontiguousarray(array[::-1], "<f4").tobytes()
+
+
+def flo_file(sample: Sample, channel: str = "flow") -> Coded:
+    """A channel of flow as .flo, 1e10 where there is none."""
+
+    def make() -> bytes:
+        flow = sample.channels[channel]
+        return tagged(np.where(np.isnan(flow), UNKNOWN, flow))
+
+    return Coded(sample.index, f"{channel}.flo", make)
+
+
+def flow_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
+    """A channel of flow as PFM of three numbers, the third 0; `nothing` where there is none."""
+
+    def make() -> bytes:
+        flow = sample.channels[channel]
+        return pfm(np.dstack((np.where(np.isnan(flow), np.float32(nothing), flow), np.zeros(flow.shape[:2], np.float32))))
+
+    return Coded(sample.index, f"{channel} {nothing}.pfm", make)
+
+
+def map_pfm(sample: Sample, channel: str, nothing: float = 0.0) -> Coded:
+    """A channel of one number as PFM, `nothing` where it is NaN."""
+
+    def make() -> bytes:
+        array = sample.channels[channel].astype(np.float32)
+        return pfm(np.where(np.isnan(array), np.float32(nothing), array))
+
+    return Coded(sample.index, f"{channel} {nothing}.pfm", make)
+
+
+def flow_png(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> bytes:
+    """KITTI's flow (H, W, 2) as 16-bit RGB: right and down in steps of 1/64 pixel from 2^15 on, and 1 where it is valid.
+
+    Flow beyond 512 pixels, which has no number, is not valid; what is not is 0, 0, 0.
+    """
+    steps = np.rint(np.where(valid[..., None], flow.astype(np.float64), 0) * STEPS) + ZERO
+    has = valid & ((steps >= 0) & (steps <= 65535)).all(axis=-1)
+    return encode_png(np.where(has[..., None], np.dstack((steps, np.ones(has.shape))), 0).astype(np.uint16))
+
+
+def steps_png(numbers: NDArray[Any], valid: NDArray[np.bool_]) -> bytes:
+    """KITTI's disparity (pixels) or depth (metres), (H, W), as 16 bits in steps of 1/256; 0 where it is not valid, or too large
+    for 16 bits. What is valid and less than half a step counts as one step.
+    """
+    steps = np.maximum(np.rint(np.where(valid, numbers.astype(np.float64), 0) * 256), 1)
+    return encode_png(np.where(valid & (steps <= 65535), steps, 0).astype(np.uint16))
+
+
+def states_png(sample: Sample, channel: str, *states: int) -> Coded:
+    """Pixels of a channel of states that are one of these, 255, others 0, as 8-bit grey PNG."""
+
+    def make() -> bytes:
+        return encode_png(np.where(np.isin(sample.channels[channel], states), 255, 0).astype(np.uint8))
+
+    return Coded(sample.index, f"{channel} {states}.png", make)

@@ -1,0 +1,134 @@
+"""What KITTI's benchmarks share: which sensors a car has, how they are calibrated, lines of labels, and files of points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._mounting import CAMERA_FROM_LIDAR, Float, centred, measured, mounted, pointless, unmoved
+from viewsphere.geometry.rotation import compose, product, transform
+from viewsphere.labels.occlusion_level import LARGELY, PARTLY, UNKNOWN
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.rig import Rig
+from viewsphere.model.sample import Box, ObjectAnnotation, Sample
+from viewsphere.model.shot import Shot
+
+
+class Car(NamedTuple):
+    """The sensors of a rig by their places in it: the camera that counts, its partner to the right, and the LiDAR."""
+
+    left: int
+    right: int | None = None
+    lidar: int | None = None
+
+
+def car_of(rig: Rig) -> Car | None:
+    """The rig as a car of KITTI's; None for one with other sensors than a camera or a rectified pair, and a LiDAR at most."""
+    cameras = [i for i, sensor in enumerate(rig.sensors) if sensor.lidar is None]
+    lidars = [i for i, sensor in enumerate(rig.sensors) if sensor.lidar is not None]
+    pairs = [pair for pair in rig.rectified if {pair.left, pair.right} <= set(cameras)]
+    if len(lidars) > 1 or not 1 <= len(cameras) <= 2 or (len(cameras) == 2 and not pairs):
+        return None
+    left, right = (pairs[0].left, pairs[0].right) if len(cameras) == 2 else (cameras[0], None)
+    return Car(left, right, lidars[0] if lidars else None)
+
+
+def other_cars(scope: Scope) -> Iterator[str]:
+    """Why a data set's rig is no car of KITTI's, or has none of its points."""
+    yield from pointless(scope)
+    if scope.rig is not None and car_of(scope.rig) is None:
+        found = ", ".join(sensor.name for sensor in scope.rig.sensors)
+        yield f"expected a camera or a rectified pair, and one LiDAR at most; found {found}"
+
+
+def car_in(shot: Shot, name: str) -> Car:
+    """The rig of a shot as a car; raises UserError, with the format's name, for any other."""
+    car = car_of(shot.rig)
+    if car is None:
+        raise UserError(f"{name}: shot {shot.key}: expected a camera or a rectified pair, and one LiDAR at most; found others")
+    return car
+
+
+def calibration(rig: Rig, car: Car, intrinsics: Intrinsics) -> Mapping[str, Float]:
+    """The four projections (3, 4), whose pixel (0, 0) is the centre of the first one, and `velo` (3, 4), from the LiDAR's axes
+    to those of the left camera. The grey cameras, 0 and 1, stand where the coloured ones, 2 and 3, do; a right one that is not
+    there, where the left one is. `intrinsics`: the left camera's lens then.
+    """
+    left, right = mounted(rig, car.left), mounted(rig, car.left if car.right is None else car.right)
+    velo = CAMERA_FROM_LIDAR
+    if car.lidar is not None:
+        velo = compose(compose(unmoved(left), mounted(rig, car.lidar)), CAMERA_FROM_LIDAR)
+    lens = centred(intrinsics.K)
+    two, three = (product(lens, [[1, 0, 0, -along], [0, 1, 0, 0], [0, 0, 1, 0]]) for along in (0.0, _along(left, right)))
+    return {"P0": two, "P1": three, "P2": two, "P3": three, "velo": velo[:3]}
+
+
+def _along(left: Float, right: Float) -> float:
+    """How far the right camera stands along the left one's x axis."""
+    return float(transform(left[:3, :3].T, right[:3, 3] - left[:3, 3])[0])
+
+
+def printed(values: Float) -> str:
+    """Numbers as KITTI's calibrations have them, row by row, with enough digits to be read back almost equal."""
+    return " ".join(f"{value:.12e}" for value in (np.asarray(values) + 0.0).ravel())
+
+
+def calibration_text(calibrated: Mapping[str, Float], *others: tuple[str, Float]) -> bytes:
+    """Lines of the four projections, and of other matrices, each with the word that its line begins with."""
+    projections = ((f"{name}:", calibrated[name]) for name in ("P0", "P1", "P2", "P3"))
+    return "".join(f"{name} {printed(matrix)}\n" for name, matrix in (*projections, *others)).encode()
+
+
+def velodyne(sample: Sample) -> bytes:
+    """The points of a LiDAR, four float32 each: x ahead, y left, z up (metres), and intensity."""
+    points = measured(sample)
+    return np.column_stack([points["xyz"], points["intensity"]]).astype("<f4").tobytes()
+
+
+NO_BOX = (-1.0, -1.0, -1.0, -1000.0, -1000.0, -1000.0, -10.0)
+NO_ANGLE, NO_SHARE = -10.0, -1
+"""What stands for values of imported objects that nobody knows."""
+
+
+def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
+    """A line of labels, without its end: of an object of this type, whose truncation is its share, or its grade."""
+    assert o.box2d is not None
+    alpha, box = upright(o) if o.is_placed else (NO_ANGLE, NO_BOX)
+    outside = NO_SHARE if math.isnan(o.truncation) else o.truncation_level if in_grades else o.truncation
+    start = f"{kind} {outside:.6g} {_hidden(o)}"
+    return " ".join([start, *(f"{number + 0.0:.9g}" for number in (alpha, *inclusive(o.box2d), *box))])
+
+
+def _hidden(o: ObjectAnnotation) -> int:
+    """KITTI's grade of occlusion, of merged objects too, of which no more than the shares is kept."""
+    if math.isnan(o.visibility):
+        return UNKNOWN
+    hidden = 1 - o.visibility / (1 - o.truncation)
+    return int(o.more.get("occlusion_level", (hidden > PARTLY) + (hidden > LARGELY)))
+
+
+def inclusive(box: Box) -> Box:
+    """The first and the last column and row of half-open corners (x0, y0, x1, y1)."""
+    x0, y0, x1, y1 = box
+    return x0, y0, x1 - 1, y1 - 1
+
+
+def upright(o: ObjectAnnotation) -> tuple[float, tuple[float, ...]]:
+    """alpha; and height, width, length, x, y, z (metres, camera axes, the middle of the bottom) and rotation_y (radians) of
+    the object's box as it stands upright in the camera's axes, around the same middle.
+    """
+    width, height, length = o.size
+    x, y, z = o.box3d_camera.mean(axis=0).tolist()
+    front = -o.camera_from_object[:3, 1]
+    turn = math.atan2(-front[2], front[0])
+    return _wrapped(turn - math.atan2(x, z)), (height, width, length, x, y + height / 2, z, turn)
+
+
+def _wrapped(angle: float) -> float:
+    """The same angle in [-pi, pi]."""
+    return math.remainder(angle, 2 * math.pi)

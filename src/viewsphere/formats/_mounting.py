@@ -1,0 +1,52 @@
+"""Where a rig's sensors are, in the axes that formats of driving have, and what its LiDAR measures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.geometry.rotation import rigid, transform
+from viewsphere.model.lidar import LIDAR
+from viewsphere.model.rig import Rig
+from viewsphere.model.sample import Sample
+
+Float = NDArray[np.float64]
+
+CAMERA_FROM_LIDAR = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+"""From a LiDAR's axes (x ahead, y left, z up) to those of a camera that stands and looks as it does."""
+
+
+def mounted(rig: Rig, sensor: int) -> Float:
+    """The rigid matrix (4, 4) from the axes of a sensor, by its place in the rig, to those of the first; OpenCV axes."""
+    return np.array(rig.sensors[sensor].rig_from_sensor, np.float64)
+
+
+def unmoved(matrix: Float) -> Float:
+    """The inverse of a rigid matrix (4, 4)."""
+    turn = np.ascontiguousarray(matrix[:3, :3].T)
+    return rigid(turn, -transform(turn, matrix[:3, 3]))
+
+
+def centred(matrix: Float) -> Float:
+    """A camera matrix K (3, 3) whose origin is the centre of the first pixel, of one whose origin is the picture's corner."""
+    moved = np.array(matrix)
+    moved[:2, 2] -= 0.5
+    return moved
+
+
+def pointless(scope: Scope) -> Iterator[str]:
+    """Of a format of points: LiDARs that keep none."""
+    for sensor in scope.rig.sensors if scope.rig else ():
+        if sensor.lidar is not None and LIDAR not in sensor.kept(scope.channels):
+            yield f"expected channel {LIDAR} of every LiDAR; found none of {sensor.name}"
+
+
+def measured(sample: Sample) -> NDArray[np.void]:
+    """The points of a LiDAR's sample, rows of `viewsphere.model.lidar.POINT`; raises UserError where they are not kept."""
+    if LIDAR not in sample.channels:
+        raise UserError(f"frame {sample.index}: expected channel {LIDAR} of a LiDAR, found none: render it with {LIDAR}")
+    return sample.channels[LIDAR]

@@ -1,0 +1,92 @@
+"""What formats of sequences have in common: which sensors are the left and the right eye, folders of scenes, their ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+
+from viewsphere.errors import StoreError, UserError
+from viewsphere.formats import Scope
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.rig import Pair, Rig
+from viewsphere.model.sample import Sample
+from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.store import Dataset
+from viewsphere.store.paths import is_name
+
+
+def two_eyes(scope: Scope) -> Iterator[str]:
+    """Of a format of one camera, or of a rectified pair: all else of a rig."""
+    if scope.rig is not None:
+        names = [sensor.name for sensor in scope.rig.sensors if sensor.lidar is None]
+        if len(names) > 2 or (len(names) == 2 and not scope.rig.rectified):
+            yield f"expected one camera, or two that are rectified; found {', '.join(names)}"
+
+
+class Eyes:
+    """Which sensors a format calls left and right: the first that are rectified with one another; a lone camera is left."""
+
+    def __init__(self, dataset: Dataset) -> None:
+        self._dataset = dataset
+        self._rig_of = lru_cache(maxsize=8)(self._read)
+
+    def side(self, sample: Sample) -> str:
+        """`left` or `right`; raises UserError for a sensor that is neither."""
+        rig, pair = self._rig(sample), self.pair(sample)
+        sides = {rig.sensors[pair.right].name: "right", rig.sensors[pair.left].name: "left"}
+        if sample.sensor not in sides:
+            raise UserError(f"frame {sample.index}: expected sensors {', '.join(reversed(sides))}; found {sample.sensor}")
+        return sides[sample.sensor]
+
+    def pair(self, sample: Sample) -> Pair:
+        """The two eyes of a sample's shot, and the metres between them; of a lone camera twice this, 0 apart."""
+        rig = self._rig(sample)
+        return rig.rectified[0] if rig.rectified else Pair(0, 0, 0.0)
+
+    def numbers(self, sample: Sample) -> tuple[int, int]:
+        """The number of the first sample of a sample's instant in the data set, and that of the instant before."""
+        assert sample.taken is not None
+        first = sample.index - sample.taken.sensor
+        return first, first - len(self._rig(sample).sensors)
+
+    def lens(self, sample: Sample) -> Intrinsics:
+        """The lens of the left eye in a sample's shot, before it zooms."""
+        return self._rig(sample).sensors[self.pair(sample).left].intrinsics
+
+    def _rig(self, sample: Sample) -> Rig:
+        if sample.taken is None:
+            raise StoreError(f"frame {sample.index}: expected the rig that took it; found an imported picture")
+        return self._rig_of(sample.taken.key)
+
+    def _read(self, key: str) -> Rig:
+        shot = self._dataset.labelled(key)
+        if shot is None:
+            raise StoreError(f"{self._dataset.root}: expected a shot {key}, found none")
+        return shot.rig
+
+
+def check_whole(dataset: Dataset, name: str) -> None:
+    """Raise UserError where instants of one sequence are of several splits."""
+    parts = [part.recipe.get("splits", {}) for part in dataset.plan.parts]
+    if len(dataset.splits) > 1 and any(splits.get("by") == "frame" for splits in parts):
+        raise UserError(f"{name}: expected splits that keep sequences whole; found splits.by: frame: split by sequence")
+
+
+def scene(sample: Sample) -> str:
+    """The name of a sample's sequence, as a folder's; raises StoreError for one that a folder cannot have."""
+    if not is_name(sample.sequence):
+        raise StoreError(f"frame {sample.index}: expected a sequence's name without /; found {sample.sequence!r:.100}")
+    return sample.sequence
+
+
+def instants(dataset: Dataset, sample: Sample) -> int:
+    """Number of the instants of a sample's sequence, as it is planned; raises UserError for a still picture."""
+    time = dataset.plan.parts[dataset.plan.part_of(sample.index)].recipe.get("time")
+    if not time:
+        raise UserError(f"frame {sample.index}: expected a picture of a sequence; found a still one: export sequences apart")
+    return TimeEntry.model_validate(time).count
+
+
+def number(value: int, count: int, digits: int = 4) -> str:
+    """A number of at least so many digits, and of as many as the largest of `count` has, so that names sort as numbers do."""
+    return f"{value:0{max(digits, len(str(count)))}d}"

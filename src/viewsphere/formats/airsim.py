@@ -1,0 +1,181 @@
+"""A recording of AirSim: a log of poses and picture files, depth as PFM, and the settings that such cameras would have.
+
+    <sequence>/airsim_rec.txt                          the log: VehicleName TimeStamp POS_X ... Q_Z ImageFile, tabs between
+    <sequence>/images/img_<sensor>_0_0_<time>.png      type 0, Scene
+    <sequence>/images/img_<sensor>_0_1_<time>.pfm      type 1, DepthPlanar: metres along z
+    <sequence>/images/img_<sensor>_0_2_<time>.pfm      type 2, DepthPerspective: metres along the pixel's ray
+    <sequence>/images/img_<sensor>_0_4_<time>.pfm      type 4, DisparityNormalized: disparity in widths of the picture
+    <sequence>/images/img_<sensor>_0_5_<time>.png      type 5, Segmentation: a colour for each object
+    <sequence>/images/img_<sensor>_0_7_<time>.png      type 7, Infrared: ids of objects, in red, green and blue alike
+    <sequence>/settings.json                           every sensor's picture size and angle of view
+    seg_rgbs.txt                                       the colours of Segmentation: id, tab, [r, g, b]
+
+Every sensor is a vehicle of its own, with camera 0, as in AirSim's mode ComputerVision, so that a line's pose is that of the
+camera. Image files of a line are joined by `;`. TimeStamp is milliseconds, times in names are nanoseconds, from the sequence's
+beginning. Still pictures are in a folder for each split, their number in the data set as milliseconds.
+
+Places are metres, NED: x north, y east, z down; north is our y, east our x. The quaternion, w x y z, turns the axes of a body
+(x ahead, y right, z down) to those: the camera looks along its x. PFM has its highest row first, as AirSim writes it, against
+PFM's own rule; most readers of PFM show it upside down. Depth is 65504 where nothing is; disparity is 0 where it is not known.
+`FOV_Degrees` is horizontal, the principal point in the picture's middle.
+
+Segmentation's colours are PASCAL VOC's by ids of objects, 0 for all else, and not those of AirSim's own table. Lost:
+categories, boxes, names of splits of sequences, and all that a vehicle's motors measure. Not verified: 65504, which is the
+largest number of 16-bit floats; the settings, which were tried with no AirSim. AirSim has flow of unknown units, which is left
+out. Source: Shah et al. 2017, "AirSim: High-Fidelity Visual and Physical Simulation for Autonomous Vehicles",
+https://microsoft.github.io/AirSim/.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.codecs.palette import palette
+from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats import _refusals as refusals
+from viewsphere.formats._contents import Coded, Content
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._sequences import scene
+from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
+from viewsphere.geometry.rotation import product, quaternion_from_matrix, transform
+from viewsphere.model.camera import Camera
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("cameras", "depth", "disparity", "instances")
+READ_BY = ("pandas", "AirSim's read_pfm")
+
+Kind = Literal["scene", "depth_planar", "depth_perspective", "disparity_normalized", "segmentation", "infrared"]
+KINDS: Mapping[Kind, tuple[int, str, str]] = {
+    "scene": (0, "png", "rgb"),
+    "depth_planar": (1, "pfm", "depth"),
+    "depth_perspective": (2, "pfm", "depth_ray"),
+    "disparity_normalized": (4, "pfm", "disparity"),
+    "segmentation": (5, "png", "instances"),
+    "infrared": (7, "png", "instances"),
+}
+"""The number of each type of images, its ending, and the channel that it is made of."""
+
+HEAD = "VehicleName TimeStamp POS_X POS_Y POS_Z Q_W Q_X Q_Y Q_Z ImageFile".replace(" ", "\t")
+NOTHING = 65504.0
+MOST = 255
+NED = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])
+BODY = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
+"""From a body's axes (ahead, right, down) to those of a camera (right, down, ahead)."""
+
+
+class Options(Frozen):
+    """Which types of images are recorded."""
+
+    images: tuple[Kind, ...] = Field(
+        default=("scene", "depth_planar", "segmentation"),
+        min_length=1,
+        description=f"types of images: {', '.join(KINDS)}; disparity_normalized is of two rectified cameras",
+    )
+
+
+def needs(options: Options) -> tuple[str, ...]:
+    """What the images are made of."""
+    return tuple(dict.fromkeys(KINDS[kind][2] for kind in options.images if kind != "scene"))
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Lenses that are more than an angle of view; more objects than colours."""
+    yield from refusals.pinhole(scope)
+    yield from refusals.centred(scope)
+    if {"segmentation", "infrared"} & set(options.images):
+        yield from refusals.most_objects(scope, MOST)
+    if "disparity_normalized" in options.images:
+        yield from refusals.stereo(scope)
+
+
+class AirSim(Tree):
+    """The recordings of a data set."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._kinds = tuple(dict.fromkeys(options.images))
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """The images of a sensor at an instant, a line of the log, and what the sensor is."""
+        root = scene(sample) if sample.sequence else sample.split or "all"
+        seconds = sample.time if sample.sequence else sample.index / 1000
+        names: list[str] = []
+        for kind in self._kinds:
+            number, ending, _ = KINDS[kind]
+            names.append(f"img_{sample.sensor}_0_{number}_{round(seconds * 1e9)}.{ending}")
+            yield File(f"{root}/images/{names[-1]}", _image(sample, kind))
+        values = (sample.sensor, round(seconds * 1e3), *_pose(sample.camera), ";".join(names))
+        yield Piece(f"{root}/airsim_rec.txt", ("\t".join(map(str, values)) + "\n").encode())
+        yield Piece(f"{root}/settings.json", b"", json.dumps([sample.sensor, self._settings(sample.camera)]))
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """The log with its head; the settings, of which each sensor's are the name of a section."""
+        if not path.endswith("settings.json"):
+            return (f"{HEAD}\n".encode(), "")
+        told = sorted(json.loads(section) for section in counts)
+        names = [name for name, _ in told]
+        if len(set(names)) < len(names):
+            raise UserError(f"airsim: expected sensors of one lens each; found several in {path.partition('/')[0]}")
+        said = {"SettingsVersion": 1.2, "SimMode": "ComputerVision", "Vehicles": dict(told)}
+        return (json.dumps(said, indent=2).encode(), b"\n")
+
+    def rest(self) -> Iterator[File]:
+        """The colours of objects."""
+        if "segmentation" in self._kinds:
+            rows = (f"{number}\t{color}\n" for number, color in enumerate(palette().tolist()))
+            yield File("seg_rgbs.txt", "".join(rows).encode())
+
+    def _settings(self, camera: Camera) -> dict[str, object]:
+        angle = math.degrees(2 * math.atan(camera.width / (2 * camera.intrinsics.fx)))
+        sizes = {"Width": camera.width, "Height": camera.height, "FOV_Degrees": angle}
+        captured = [{"ImageType": KINDS[kind][0], **sizes} for kind in self._kinds]
+        return {"VehicleType": "ComputerVision", "Cameras": {"0": {"CaptureSettings": captured}}}
+
+
+def _pose(camera: Camera) -> list[float]:
+    """Where a camera is, x y z, and how its body is turned, w x y z; NED."""
+    place = transform(NED, camera.center)
+    turned = quaternion_from_matrix(product(product(NED, np.ascontiguousarray(camera.R.T)), BODY))
+    return [value + 0.0 for value in (*place.tolist(), *turned)]
+
+
+def _image(sample: Sample, kind: Kind) -> Content:
+    if kind == "scene":
+        return picture(sample, ".png")
+    make = {"segmentation": _colors, "infrared": _grey}.get(kind) or partial(_floats, channel=KINDS[kind][2])
+    return Coded(sample.index, f"airsim {kind}", partial(make, sample))
+
+
+def _colors(sample: Sample) -> bytes:
+    return encode_png(palette()[sample.channels["instances"]])
+
+
+def _grey(sample: Sample) -> bytes:
+    return encode_png(np.dstack([sample.channels["instances"].astype(np.uint8)] * 3))
+
+
+def _floats(sample: Sample, channel: str) -> bytes:
+    """A PFM, its highest row first."""
+    array: NDArray[np.float32] = sample.channels[channel]
+    if channel == "disparity":
+        array = np.nan_to_num(array / np.float32(sample.width))
+    else:
+        array = np.where(np.isfinite(array), array, np.float32(NOTHING))
+    return f"Pf\n{sample.width} {sample.height}\n-1\n".encode() + array.astype("<f4").tobytes()
+
+
+preparer, writer, verify = functions(AirSim)

@@ -1,0 +1,171 @@
+"""What CARLA's cameras save: pictures, depth in 24 bits, semantic tags and instances, with cameras and boxes in CARLA's terms.
+
+    <sequence>/<sensor>/rgb/000000.png                      pictures, by the number of the instant
+    <sequence>/<sensor>/depth/000000.png                    metres along z: (R + 256 G + 65536 B) / (256^3 - 1) * 1000
+    <sequence>/<sensor>/semantic_segmentation/000000.png    red is the tag, green and blue are 0
+    <sequence>/<sensor>/instance_segmentation/000000.png    red is the tag, G + 256 B the object's id
+    <sequence>/<sensor>/bounding_boxes/000000.json          every object: id, type, tag, transform, extent
+    <sequence>/<sensor>/transforms.json                     every frame: frame, timestamp, transform, fov, image size
+
+Still pictures lie in `<split>/<sensor>/rgb/00000000.png`, by their numbers, in numbered folders where there are many. CARLA has
+no format for data sets: folders are called as its blueprints of sensors (sensor.camera.depth), and the two kinds of JSON are
+this tool's, with the names of CARLA's Python classes.
+
+Tags are those since version 0.9.14. Of stuff: sky Sky, ground Ground, road Roads, road marking RoadLine, pavement SideWalks,
+grass Terrain, vegetation Vegetation, building Building, fence Fence, pole Pole, traffic sign TrafficSign, street furniture
+Static, scenery Other. Categories that are called like a tag have it (person is Pedestrian); all others are Dynamic. Where
+nothing is, depth is 1000 m, as is what is farther.
+
+The world is Unreal's, left-handed, x ahead, y to the right, z up: (x, -y, z) of ours, metres. A transform is a location and a
+rotation, pitch, yaw and roll in degrees, as `carla.Transform` has them; a camera looks along its x, and so does an object; its
+location is the middle of its box, and `extent` is half of its length (x), width (y) and height (z). `fov` is horizontal,
+degrees: f = width / (2 tan(fov / 2)), and the principal point is (width / 2, height / 2) from the picture's corner.
+
+Lost: optical flow, whose scale and direction in CARLA could not be verified, LiDAR, and names of splits of sequences. Not
+verified with CARLA itself: that depth is planar. Source: Dosovitskiy et al. 2017, "CARLA: An Open Urban Driving Simulator", https://carla.readthedocs.io/en/latest/ref_sensors/.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.formats import Scope
+from viewsphere.formats import _refusals as refusals
+from viewsphere.formats._contents import Coded
+from viewsphere.formats._numbered import Numbered
+from viewsphere.formats._paper import json_bytes
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._sequences import scene
+from viewsphere.formats._tree import File, Piece, Tree, functions, item
+from viewsphere.model.camera import Camera
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "depth", "semantic", "instances")
+CREDITS = False
+HOLDS = ("depth", "segmentation", "instances", "cameras", "3D boxes")
+READ_BY = ("OpenCV", "code for CARLA's sensors")
+FAR = 1000.0
+STEPS = 256**3 - 1
+MOST = 65535
+LEVEL = 1e-9
+"""Of an axis: how far from straight up or down it still counts as that."""
+
+TAGS = (
+    "Unlabeled", "Roads", "SideWalks", "Building", "Wall", "Fence", "Pole", "TrafficLight", "TrafficSign", "Vegetation",
+    "Terrain", "Sky", "Pedestrian", "Rider", "Car", "Truck", "Bus", "Train", "Motorcycle", "Bicycle", "Static", "Dynamic",
+    "Other", "Water", "RoadLine", "Ground", "Bridge", "RailTrack", "GuardRail",
+)  # fmt: skip
+THINGS = {name.casefold(): number for number, name in enumerate(TAGS) if number} | {"person": 12, "tree": 9, "roadsign": 8}
+DYNAMIC = TAGS.index("Dynamic")
+STUFF = {
+    "sky": "Sky",
+    "ground": "Ground",
+    "scenery": "Other",
+    "road": "Roads",
+    "road marking": "RoadLine",
+    "pavement": "SideWalks",
+    "grass": "Terrain",
+    "vegetation": "Vegetation",
+    "building": "Building",
+    "fence": "Fence",
+    "pole": "Pole",
+    "traffic sign": "TrafficSign",
+    "street furniture": "Static",
+}
+
+
+def refuses(scope: Scope) -> Iterator[str]:
+    """Lenses that are more than an angle of view; more objects than ids have numbers."""
+    yield from refusals.pinhole(scope)
+    yield from refusals.centred(scope)
+    yield from refusals.most_objects(scope, MOST)
+
+
+class Carla(Tree):
+    """The tree of all sensors."""
+
+    def __init__(self, dataset: Dataset) -> None:
+        super().__init__(dataset)
+        stuff = {name: TAGS.index(tag) for name, tag in STUFF.items()}
+        self._tags = Numbered.of(dataset.classes, stuff, THINGS, DYNAMIC, counted=False).table
+        self._thing = {one.name: int(self._tags[one.id]) for one in dataset.classes if one.is_thing}
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture, its maps, its objects, and its camera."""
+        split, _, number = self.stem(sample).partition("/")
+        if sample.sequence:
+            split, number = scene(sample), f"{sample.instant:06d}"
+        root = f"{split}/{sample.sensor}"
+        yield File(f"{root}/rgb/{number}.png", picture(sample, ".png"))
+        for kind, make in (
+            ("depth", partial(_depth, sample)),
+            ("semantic_segmentation", partial(_tagged, sample, self._tags, ids=False)),
+            ("instance_segmentation", partial(_tagged, sample, self._tags, ids=True)),
+        ):
+            yield File(f"{root}/{kind}/{number}.png", Coded(sample.index, f"carla {kind}.png", make))
+        boxes = [self._box(o) for o in sample.objects if o.is_placed]
+        yield File(f"{root}/bounding_boxes/{number}.json", json_bytes(boxes) + b"\n")
+        told = {"frame": sample.instant if sample.sequence else sample.index, "timestamp": sample.time}
+        yield item(f"{root}/transforms.json", told | _camera(sample.camera))
+
+    def _box(self, o: ObjectAnnotation) -> dict[str, Any]:
+        right, ahead, up = -o.world_from_object[:3, 0], -o.world_from_object[:3, 1], o.world_from_object[:3, 2]
+        width, height, length = o.size
+        return {
+            "id": o.id,
+            "type_id": o.category,
+            "semantic_tag": self._thing[o.category],
+            "transform": transform(o.box3d.mean(axis=0), ahead, right, up),
+            "extent": {"x": length / 2, "y": width / 2, "z": height / 2},
+        }
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    """Where a camera is, and what it shows."""
+    right, down, ahead = camera.R
+    return {
+        "transform": transform(camera.center, ahead, right, -down),
+        "fov": math.degrees(2 * math.atan(camera.width / (2 * camera.intrinsics.fx))),
+        "image_size_x": camera.width,
+        "image_size_y": camera.height,
+    }
+
+
+Float = NDArray[np.float64]
+
+
+def transform(place: Float, ahead: Float, right: Float, up: Float) -> dict[str, dict[str, float]]:
+    """A place and axes of our world as CARLA's location and rotation. Of what looks straight up or down, roll is 0."""
+    x, y, z = place.tolist()
+    level = math.hypot(ahead[0], ahead[1])
+    yaw, roll = math.atan2(-ahead[1], ahead[0]), math.atan2(-right[2], up[2])
+    if level < LEVEL:
+        yaw, roll = math.atan2(-right[0], -right[1]), 0.0
+    turns = (math.atan2(ahead[2], level), yaw, roll)
+    return {
+        "location": {"x": x, "y": -y + 0.0, "z": z},
+        "rotation": dict(zip(("pitch", "yaw", "roll"), (math.degrees(turn) + 0.0 for turn in turns), strict=True)),
+    }
+
+
+def _depth(sample: Sample) -> bytes:
+    depth = sample.channels["depth"].astype(np.float64)
+    steps = np.rint(np.minimum(depth, FAR) / FAR * STEPS).astype(np.int64)
+    return encode_png(np.dstack([steps >> shift & 255 for shift in (0, 8, 16)]).astype(np.uint8))
+
+
+def _tagged(sample: Sample, tags: NDArray[np.uint8], *, ids: bool) -> bytes:
+    """Tags in red, and, asked for, ids of objects in green, low bytes, and blue."""
+    number = sample.channels["instances"].astype(np.int64) * ids
+    return encode_png(np.dstack((tags[sample.channels["semantic"]], number & 255, number >> 8)).astype(np.uint8))
+
+
+preparer, writer, verify = functions(Carla)

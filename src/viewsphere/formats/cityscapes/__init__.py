@@ -1,0 +1,155 @@
+"""Cityscapes, for torchvision, cityscapesScripts and the many trainers of semantic segmentation of streets.
+
+    leftImg8bit/<split>/<city>/<city>_<sequence>_<frame>_leftImg8bit.png
+    rightImg8bit/<split>/<city>/<city>_<sequence>_<frame>_rightImg8bit.png   of the right one of a rectified pair
+    gtFine/<split>/<city>/<city>_<sequence>_<frame>_gtFine_labelIds.png      8 bits: the label's id
+    ..._gtFine_instanceIds.png                                               16 bits: 1000 id + n, or the id
+    ..._gtFine_color.png, ..._gtFine_polygons.json                           RGBA; labels and polygons
+    camera/<split>/<city>/<city>_<sequence>_<frame>_camera.json              intrinsic and extrinsic
+    disparity/<split>/<city>/<city>_<sequence>_<frame>_disparity.png         with `stereo`: 16 bits
+
+A sequence is a city, with `-` for `_`, as names are parted at `_`; its number is that in the plan, frames are instants. Still
+pictures are of the city `stills`, and each is a sequence of its own; large data sets have `stills0000`, `stills0001`, ... Only
+the left pictures, or those of the only camera, have labels, as there. torchvision takes splits named train, val and test.
+
+Labels go by the names of classes and categories: those of Cityscapes, however spelled, and some others: road marking is road,
+pavement sidewalk, grass terrain; tree, hedge and shrub vegetation; house building; lamp post pole; road sign traffic sign;
+pedestrian person; cyclist rider; van and taxi car; lorry truck; tram train; motorbike motorcycle; bike bicycle. Ground without
+a road is `ground`, which evaluations ignore, as they do the rest: scenery, street furniture, benches, post boxes and bins are
+`static`, other things `dynamic`. There is no `unlabeled` pixel. Of person to bicycle, n counts a picture's instances of a label
+from 0; all else has the label's id alone.
+
+polygons.json: drawn one after another by cityscapesScripts, they give labelIds.png; vertices are pixels' columns and rows, and
+outlines belong to them. An instance is one polygon, its pieces joined by lines that what is drawn later covers; where such a
+line crosses another instance in pieces, pixels of it are wrong in maps that are drawn anew. Other labels have one polygon a
+piece.
+
+disparity: pixels = (p - 1) / 256, 0 unknown or 256 and more; dense, also where the right camera does not see the point; the
+sky's is 0 pixels. camera.json: u0 and v0 count from the centre of the first pixel; the vehicle, which viewsphere does not know,
+stands on world z = 0 below each camera and heads where it looks: x, y and yaw are 0, z is the height (metres), pitch and roll
+(radians) turn the camera's axes (x ahead, y left, z up) into the vehicle's as Ry(pitch) Rx(roll); `baseline` is 0 of a lone
+camera.
+
+Lost: poses in the world, 3D boxes, times, labels of right pictures. Not verified with the originals: how camera.json nests, and
+what their tools make of other cities. Source: M. Cordts et al., The Cityscapes Dataset, CVPR 2016;
+https://github.com/mcordts/cityscapesScripts, docs/csCalibration.pdf there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.formats import Scope
+from viewsphere.formats import _refusals as refusals
+from viewsphere.formats._contents import Coded
+from viewsphere.formats._paper import json_bytes
+from viewsphere.formats._pictures import picture, png
+from viewsphere.formats._sequences import Eyes, two_eyes
+from viewsphere.formats._timeline import Timeline
+from viewsphere.formats._tree import FOLDER_SIZE, File, Tree, functions
+from viewsphere.formats.cityscapes.classes import COLORS, LABELS, labels_of
+from viewsphere.formats.cityscapes.instances import EACH, Region, regions
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "instances", "semantic")
+CREDITS = False
+HOLDS = ("semantic masks", "instance masks", "polygons", "stereo pairs", "disparity", "calibration")
+READ_BY = ("torchvision", "cityscapesScripts")
+
+TYPES = 4
+"""Files of a frame in one folder, at most."""
+
+
+class Options(Frozen):
+    """Whether there is disparity."""
+
+    stereo: bool = Field(default=False, description="disparity of the left pictures, too; of a rig of two rectified cameras")
+
+
+def needs(options: Options) -> tuple[str, ...]:
+    """Disparity on request."""
+    return ("disparity",) if options.stereo else ()
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Rigs of several cameras that are no pair, lenses that camera.json has no numbers for, and more instances than ids."""
+    yield from two_eyes(scope)
+    yield from refusals.stereo(scope) if options.stereo else ()
+    yield from refusals.pinhole(scope)
+    yield from refusals.no_skew(scope)
+    yield from refusals.most_objects(scope, EACH)
+
+
+class Cityscapes(Tree):
+    """The tree of cities."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._options, self._eyes, self._timeline = options, Eyes(dataset), Timeline(dataset)
+        self._labels = labels_of(dataset.classes)
+
+    def of(self, sample: Sample) -> Iterator[File]:
+        """A picture; of a left one its camera and labels, too."""
+        side, name = self._eyes.side(sample), self._name(sample)
+        yield File(f"{side}Img8bit/{name}_{side}Img8bit.png", picture(sample, ".png"))
+        if side == "right":
+            return
+        camera = _camera(sample, self._eyes.pair(sample).baseline)
+        yield File(f"camera/{name}_camera.json", json_bytes(camera))
+        if self._options.stereo:
+            made = Coded(sample.index, "cityscapes disparity.png", lambda: _disparity(sample))
+            yield File(f"disparity/{name}_disparity.png", made)
+        labels = self._labels[sample.channels["semantic"]]
+        drawn = regions(labels, sample.channels["instances"])
+        numbers = labels.astype(np.uint16)
+        for region in drawn:
+            numbers[region.mask] = region.number
+        colors = np.array([(*color, 255) for color in COLORS.values()], np.uint8)
+        yield File(f"gtFine/{name}_gtFine_labelIds.png", png(sample, "cityscapes labels", labels))
+        yield File(f"gtFine/{name}_gtFine_instanceIds.png", png(sample, "cityscapes instances", numbers))
+        yield File(f"gtFine/{name}_gtFine_color.png", png(sample, "cityscapes colors", colors[labels]))
+        yield File(f"gtFine/{name}_gtFine_polygons.json", json_bytes(_polygons(sample, drawn)))
+
+    def _name(self, sample: Sample) -> str:
+        """Split, city, and what the names of all of a frame's files begin with."""
+        if sample.sequence:
+            city = sample.sequence.replace("_", "-")
+            number, frame = self._timeline.course(sample).number, sample.instant
+        else:
+            folder = self.dataset.plan.folder_of(sample.index, FOLDER_SIZE // TYPES)
+            city, number, frame = f"stills{'' if folder is None else f'{folder:04d}'}", sample.index, 0
+        return f"{sample.split or 'all'}/{city}/{city}_{number:06d}_{frame:06d}"
+
+
+def _polygons(sample: Sample, drawn: list[Region]) -> dict[str, Any]:
+    objects = [{"label": LABELS[one.label], "polygon": ring.tolist()} for one in drawn for ring in one.rings]
+    return {"imgHeight": sample.height, "imgWidth": sample.width, "objects": objects}
+
+
+def _disparity(sample: Sample) -> bytes:
+    """Disparity (pixels) as 16 bits, 256 steps a pixel above 1."""
+    pixels = sample.channels["disparity"].astype(np.float64)
+    steps = np.rint(np.where(np.isfinite(pixels), pixels, -1) * 256) + 1
+    return encode_png(np.where((steps >= 1) & (steps <= 65535), steps, 0).astype(np.uint16))
+
+
+def _camera(sample: Sample, baseline: float) -> dict[str, dict[str, float]]:
+    lens, (right, down, ahead) = sample.camera.intrinsics, sample.camera.R.tolist()
+    pitch = math.atan2(-ahead[2], math.hypot(ahead[0], ahead[1]))
+    roll = math.atan2(-right[2], -down[2])
+    extrinsic = {"baseline": baseline, "pitch": pitch, "roll": roll, "x": 0.0, "y": 0.0, "yaw": 0.0}
+    return {
+        "extrinsic": {**extrinsic, "z": float(sample.camera.center[2])},
+        "intrinsic": {"fx": lens.fx, "fy": lens.fy, "u0": lens.cx - 0.5, "v0": lens.cy - 0.5},
+    }
+
+
+preparer, writer, verify = functions(Cityscapes)

@@ -1,0 +1,145 @@
+"""COLMAP's sparse models, text or binary, as COLMAP, pycolmap and Gaussian splatting read them.
+
+    <world>/images/<sensor>/<index>.png   the pictures; without <sensor> where there is one
+    <world>/sparse/0/cameras.txt          lenses: PINHOLE, OPENCV, FULL_OPENCV, OPENCV_FISHEYE
+    <world>/sparse/0/rigs.txt             how sensors are mounted: sensor_from_rig
+    <world>/sparse/0/frames.txt           rig_from_world at each instant, and the images that are taken then
+    <world>/sparse/0/images.txt           cam_from_world, camera, file and points of each image
+    <world>/sparse/0/points3D.txt         points, their colours, and the images that show them
+    <world>/sparse/0/<split>.txt          names of the images of a split
+
+A world is what stands still while it is looked at: a sequence, a scene, or a model of still pictures. With `kind: binary` the
+five files end in `.bin`. Metres, z up; cameras look along z, x right, y down; quaternions are w, x, y, z. Pixels are counted
+from the image's corner, so the centre of the first is (0.5, 0.5), as COLMAP has it.
+
+Points of sequences that follow some (the channel `tracks`) are those that stand still, with all images that show them; those
+of other pictures are pixels of a coarse grid, lifted by their depth, which one image shows. All are exact: their errors are 0.
+COLMAP's world stands still: things that move in a sequence are in its pictures only. Numbers follow from the plan: an image's
+is its frame + 1; a frame's that of its first image. Where a picture's lens is not that of its data set's first, as in zooms, it
+has a camera and a rig of its own. Skew cannot be held. `import` reads the folder of one world, without its points.
+
+Not verified: that versions before 3.12, which know no rigs, take the other three files. The first program of Gaussian
+splatting takes PINHOLE alone, and looks for pictures without <sensor>/, so for those of one sensor.
+Source: COLMAP's documentation, https://colmap.github.io/format.html.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.formats import Scope
+from viewsphere.formats._cameras import Moment, Rigs, unskewed, world_of
+from viewsphere.formats._pictures import picture, suffix_of
+from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.colmap.points import Sights
+from viewsphere.formats.colmap.reading import read as read
+from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "depth")
+CREDITS = False
+HOLDS = ("cameras", "poses", "rigs", "points")
+READ_BY = ("pycolmap", "COLMAP", "Gaussian splatting")
+SHARED = 1
+"""The rig that all frames have whose lenses are those of the first."""
+
+
+class Options(Frozen):
+    """How the model is written."""
+
+    kind: Literal["text", "binary"] = Field(default="text", description="`text`: .txt files; `binary`: .bin files")
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Skew, and splits that are called like a model's files."""
+    yield from unskewed(scope)
+    for name in (name for name in scope.splits if name in KINDS):
+        yield f"expected splits of other names than {', '.join(KINDS)}; found {name}"
+
+
+class Colmap(Tree):
+    """A model for each world."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._binary = options.kind == "binary"
+        self._rigs, self._sights = Rigs(dataset), Sights(dataset)
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture, its image, its points, and, of the first of an instant, the frame."""
+        now, world, own = self._rigs.at(sample), world_of(self.dataset, sample), sample.index + 1
+        part = self.dataset.plan.part_of(sample.index)
+        name = self.stem(sample).partition("/")[2] + suffix_of(sample, ".png", ".jpg")
+        name = f"{now.folder}/{name}" if now.folder else name
+        yield File(f"{world}/images/{name}", picture(sample, ".png", ".jpg"))
+        sparse = f"{world}/sparse/0"
+        yield Piece(f"{sparse}/{sample.split or 'all'}.txt", f"{name}\n".encode())
+
+        cameras, rig = self._numbers(now, part)
+        if now.is_first:
+            lenses = [] if rig == SHARED else list(map(Camera, cameras, now.lenses))
+            yield self._piece(sparse, "cameras", lenses, part)
+            yield self._piece(sparse, "rigs", [] if rig == SHARED else [_rig(rig, cameras, now.mounts)], part)
+            images = [(cameras[sensor], now.first + sensor + 1) for sensor in now.there]
+            pose = pose_of(now.pose.R, now.pose.t)
+            yield self._piece(sparse, "frames", [Frame(now.first + 1, rig, pose, images)])
+        shown, camera = self._sights.of(sample), sample.camera
+        image = Image(own, pose_of(camera.R, camera.t), cameras[now.sensor], name, shown.seen)
+        yield self._piece(sparse, "images", [image])
+        yield self._piece(sparse, "points3D", shown.points)
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """What the records are, those that all frames of a part share, and the others; in binary files their number first."""
+        file = path.rpartition("/")[2].partition(".")[0]
+        if file not in KINDS:
+            return ("",)
+        section = next(iter(counts))
+        shared = self._shared(file, int(section)) if section else []
+        title = f"# {KINDS[file].COLUMNS}\n".encode()
+        head = struct.pack("<Q", len(shared) + counts[section]) if self._binary else title
+        return (head, self._bytes(shared), section)
+
+    def _shared(self, file: str, part: int) -> list[Record]:
+        """Cameras and rig of a part's first shot."""
+        rig = self._rigs.usual(part)
+        if rig is None:
+            return []
+        numbers = range(1, len(rig.sensors) + 1)
+        if file == "cameras":
+            return [Camera(number, sensor.intrinsics) for number, sensor in zip(numbers, rig.sensors, strict=True)]
+        return [_rig(SHARED, numbers, [np.array(sensor.rig_from_sensor) for sensor in rig.sensors])]
+
+    def _numbers(self, now: Moment, part: int) -> tuple[list[int], int]:
+        """Numbers of a moment's cameras and rig: the shared ones, where they are as these."""
+        usual = self._rigs.usual(part)
+        sensors = () if usual is None else usual.sensors
+        if now.lenses == tuple(sensor.intrinsics for sensor in sensors) and all(
+            np.array_equal(mount, sensor.rig_from_sensor) for mount, sensor in zip(now.mounts, sensors, strict=True)
+        ):
+            return list(range(1, len(sensors) + 1)), SHARED
+        return [len(sensors) + now.first + number + 1 for number in range(len(now.lenses))], now.first + 1 + SHARED
+
+    def _piece(self, folder: str, file: str, records: Iterable[Record], part: int | str = "") -> Piece:
+        """Records of one of the five files, which is there even if there are none."""
+        own = list(records)
+        return Piece(f"{folder}/{file}{'.bin' if self._binary else '.txt'}", self._bytes(own), str(part), count=len(own))
+
+    def _bytes(self, records: Iterable[Record]) -> bytes:
+        return b"".join(record.binary() if self._binary else record.text().encode() for record in records)
+
+
+def _rig(number: int, cameras: Iterable[int], mounts: Iterable[np.ndarray[Any, Any]]) -> Rig:
+    """A rig of sensors that are mounted so: `rig_from_sensor`, (4, 4)."""
+    turned = [(mount[:3, :3].T, mount[:3, 3]) for mount in mounts]
+    return Rig(number, list(cameras), [pose_of(R, -transform(R, place)) for R, place in turned])
+
+
+preparer, writer, verify = functions(Colmap)

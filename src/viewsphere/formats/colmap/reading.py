@@ -1,0 +1,157 @@
+"""Reads COLMAP's sparse models, text and binary: lenses, poses and pictures."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from viewsphere.errors import StoreError
+from viewsphere.formats._posed import MISTAKES, Posed, camera_of, check_picture, picture_inside, posed_dataset
+from viewsphere.geometry.rotation import matrix_from_quaternion, transform
+from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.store.foreign import ForeignDataset
+from viewsphere.store.paths import is_name
+
+PARAMETERS = {
+    "SIMPLE_PINHOLE": (0, "f cx cy"),
+    "PINHOLE": (1, "fx fy cx cy"),
+    "SIMPLE_RADIAL": (2, "f cx cy k1"),
+    "RADIAL": (3, "f cx cy k1 k2"),
+    "OPENCV": (4, "fx fy cx cy k1 k2 p1 p2"),
+    "OPENCV_FISHEYE": (5, "fx fy cx cy k1 k2 k3 k4"),
+    "FULL_OPENCV": (6, "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6"),
+    "SIMPLE_RADIAL_FISHEYE": (8, "f cx cy k1"),
+    "RADIAL_FISHEYE": (9, "f cx cy k1 k2"),
+}
+"""Number and parameters of the models that have an exact counterpart here."""
+
+NAMES = {number: name for name, (number, _) in PARAMETERS.items()}
+OWN = {"cameras", "images", "points3D", "rigs", "frames"}
+
+
+@dataclass(frozen=True)
+class _Image:
+    """An image's pose, cam_from_world, as quaternion w, x, y, z and translation; its camera's number and its file."""
+
+    pose: tuple[float, ...]
+    camera: int
+    name: str
+
+
+def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+    """All images of a folder with `sparse/0` and `images`, or of such a `sparse/0`, in the order of their names, with cameras;
+    no objects and no points.
+
+    Splits are those that `<split>.txt` beside the model lists; without these all is `train`. The world's axes are COLMAP's.
+    Raises StoreError with every image that lacks its picture or its camera; with `keep_going` these are left out and reported.
+    """
+    files = next(filter(None, map(_files, (path / "sparse" / "0", path / "sparse", path))), None)
+    if files is None:
+        raise StoreError(f"{path}: expected sparse/0 with cameras and images as .txt or .bin; found none")
+    cameras_file, images_file = files
+    model = cameras_file.parent
+    root = next((one for one in (path, model.parent, model.parent.parent) if (one / "images").is_dir()), path)
+    problems: list[str] = []
+    lenses: dict[int, Intrinsics] = {}
+    splits = {name: file.stem for file in sorted(model.glob("*.txt")) if file.stem not in OWN for name in _lines(file)}
+    try:
+        binary = cameras_file.suffix == ".bin"
+        read_cameras, read_images = (_binary_cameras, _binary_images) if binary else (_text_cameras, _text_images)
+        for number, name, size, values in read_cameras(cameras_file):
+            lenses[number] = _lens(name, size, values)
+        images = sorted(read_images(images_file), key=lambda image: image.name)
+    except (*MISTAKES, struct.error) as error:
+        raise StoreError(f"{model}: expected a model of COLMAP's; found: {error}") from None
+    found: list[Posed] = []
+    for image in images:
+        try:
+            found.append(_posed(root / "images", image, lenses, splits.get(image.name, "train")))
+        except MISTAKES as error:
+            told = f"found no camera {error}" if isinstance(error, KeyError) else error
+            problems.append(f"{images_file}: image {image.name!r:.80}: {told}")
+    texts = [cameras_file, images_file, *(file for file in sorted(model.glob("*.txt")) if file.stem not in OWN)]
+    return posed_dataset(path, found, texts, problems, keep_going)
+
+
+def _files(folder: Path) -> tuple[Path, Path] | None:
+    """A model's files of cameras and images, binary ones first; None where there are none."""
+    for ending in (".bin", ".txt"):
+        cameras, images = folder / f"cameras{ending}", folder / f"images{ending}"
+        if cameras.is_file() and images.is_file():
+            return cameras, images
+    return None
+
+
+def _posed(folder: Path, image: _Image, lenses: dict[int, Intrinsics], split: str) -> Posed:
+    lens = lenses[image.camera]
+    file, size = picture_inside(folder, image.name)
+    check_picture(size, lens)
+    if not is_name(split):
+        raise ValueError(f"expected a split's name; found {split!r:.60}")
+    rotation, t = matrix_from_quaternion(image.pose[:4]), np.array(image.pose[4:])
+    return Posed(file, camera_of(lens, np.column_stack((rotation.T, -transform(rotation.T, t)))), split)
+
+
+def _lens(model: str, size: tuple[int, int], values: Sequence[float]) -> Intrinsics:
+    names = PARAMETERS[model][1].split() if model in PARAMETERS else ()
+    if not names or len(values) != len(names):
+        raise ValueError(f"expected one of {', '.join(PARAMETERS)} with its parameters; found {model} with {len(values)}")
+    p = dict(zip(names, values, strict=True))
+    k1, k2, k3, k4, k5, k6, p1, p2 = (p.get(name, 0.0) for name in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"))
+    bent: Distortion | None = None
+    if model.endswith("FISHEYE"):
+        bent = Distortion(model="fisheye", coefficients=(k1, k2, k3, k4))
+    elif any((k1, k2, k3, k4, k5, k6, p1, p2)):
+        count = 8 if any((k4, k5, k6)) else 5 if k3 else 4
+        bent = Distortion(model="brown_conrady", coefficients=(k1, k2, p1, p2, k3, k4, k5, k6)[:count])
+    fx = p.get("fx", p.get("f", 0.0))
+    return Intrinsics(width=size[0], height=size[1], fx=fx, fy=p.get("fy", fx), cx=p["cx"], cy=p["cy"], distortion=bent)
+
+
+def _lines(file: Path) -> list[str]:
+    """Lines that are no comments."""
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{file}: expected text; found: {error}") from None
+    return [line.strip() for line in text.splitlines() if not line.lstrip().startswith("#")]
+
+
+def _text_cameras(file: Path) -> Iterator[tuple[int, str, tuple[int, int], list[float]]]:
+    for line in filter(None, _lines(file)):
+        number, model, width, height, *values = line.split()
+        yield int(number), model, (int(width), int(height)), list(map(float, values))
+
+
+def _text_images(file: Path) -> Iterator[_Image]:
+    """Every image has two lines, of which the second, its points, may be empty."""
+    lines = iter(_lines(file))
+    for line in filter(None, lines):
+        _, *pose, camera, name = line.split(maxsplit=9)
+        if len(pose) != 7:
+            raise ValueError(f"expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; found {line!r:.60}")
+        yield _Image(tuple(map(float, pose)), int(camera), name)
+        next(lines, None)
+
+
+def _binary_cameras(file: Path) -> Iterator[tuple[int, str, tuple[int, int], list[float]]]:
+    data, at = file.read_bytes(), 8
+    for _ in range(struct.unpack_from("<Q", data)[0]):
+        number, model, width, height = struct.unpack_from("<IiQQ", data, at)
+        name = NAMES.get(model, str(model))
+        count = len(PARAMETERS[name][1].split()) if name in PARAMETERS else 0
+        yield number, name, (width, height), list(struct.unpack_from(f"<{count}d", data, at + 24))
+        at += 24 + 8 * count
+
+
+def _binary_images(file: Path) -> Iterator[_Image]:
+    data, at = file.read_bytes(), 8
+    for _ in range(struct.unpack_from("<Q", data)[0]):
+        _, *pose, camera = struct.unpack_from("<I7dI", data, at)
+        end = data.index(b"\0", at + 64)
+        yield _Image(tuple(pose), camera, data[at + 64 : end].decode())
+        at = end + 9 + 24 * struct.unpack_from("<Q", data, end + 1)[0]

@@ -1,0 +1,111 @@
+"""Driving in the Matrix's tree: PASCAL VOC's annotations beside pictures that are PNG in a folder for JPEG; supervision
+and the data set's own training code read it; torchvision takes no PNG.
+
+    VOC2012/JPEGImages/00000000.png         the pictures
+    VOC2012/Annotations/00000000.xml        size, and of each object name, pose, truncated, difficult, bndbox
+    VOC2012/ImageSets/Main/<split>.txt      names of the pictures; trainval.txt, too, of train and val together
+
+Boxes are of the visible pixels, and count them from 1: xmin = floor(x) + 1, xmax = ceil(x + width). The data set's own code
+takes 1 from all four numbers, and reads no object of which `difficult` is not 0; with `smallest` those are objects that show
+fewer pixels. Names of categories are in small letters, as its `car` is. pose is Unspecified; truncated is 1 where more than
+15 % of the object is outside of the picture. Objects of which nothing is seen are left out. Pictures of sequences, of all
+sensors, count as any others.
+
+Lost: distances, masks, 3D boxes, cameras, which the original has in the database that its pictures came from, but not in the
+published files. The original's lists are called trainval10k, trainval50k and trainval200k: tell its code the name of another
+list. Not verified: other fields of its XML than PASCAL VOC's. Source: Johnson-Roberson et al. 2017, "Driving in the Matrix",
+https://github.com/umautobots/driving-in-the-matrix.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+from xml.etree import ElementTree
+
+from pydantic import Field
+
+from viewsphere.formats import Scope
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._refusals import plain_names
+from viewsphere.formats._tree import File, Piece, Tree, functions, line
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("boxes", "truncation")
+READ_BY = ("supervision", "its own training code")
+ROOT = "VOC2012"
+TRUNCATED = 0.15
+NAMES = r"[^\x00-\x1f]+"
+
+
+class Options(Frozen):
+    """Which objects are too small."""
+
+    smallest: int = Field(default=0, ge=0, le=10**9, description="objects that show fewer pixels are `difficult`, and not read")
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Names that XML cannot hold."""
+    yield from plain_names(scope, NAMES)
+
+
+class Matrix(Tree):
+    """The tree of a data set."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._smallest = options.smallest
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture and its objects."""
+        split, _, name = self.stem(sample).partition("/")
+        yield File(f"{ROOT}/JPEGImages/{name}.png", picture(sample, ".png"))
+        yield File(f"{ROOT}/Annotations/{name}.xml", self._xml(sample, f"{name}.png"))
+        yield line(f"{ROOT}/ImageSets/Main/{split}.txt", name)
+        if split in ("train", "val"):
+            yield line(f"{ROOT}/ImageSets/Main/trainval.txt", name)
+
+    def _xml(self, sample: Sample, file: str) -> bytes:
+        root = ElementTree.Element("annotation")
+        size = {"width": sample.width, "height": sample.height, "depth": 3}
+        _fill(root, {"folder": ROOT, "filename": file, "size": size, "segmented": 0})
+        for o in sample.objects:
+            if o.box2d is not None:
+                _fill(ElementTree.SubElement(root, "object"), _object(o, o.area < self._smallest))
+        ElementTree.indent(root, "\t")
+        return (ElementTree.tostring(root, "unicode") + "\n").encode()
+
+
+def _object(o: ObjectAnnotation, difficult: bool) -> dict[str, Any]:
+    """What is said of an object that is seen."""
+    assert o.box2d is not None
+    x0, y0, x1, y1 = o.box2d
+    return {
+        "name": o.category.lower(),
+        "pose": "Unspecified",
+        "truncated": int(o.truncation > TRUNCATED),
+        "difficult": int(difficult),
+        "bndbox": {
+            "xmin": math.floor(x0) + 1,
+            "ymin": math.floor(y0) + 1,
+            "xmax": math.ceil(x1),
+            "ymax": math.ceil(y1),
+        },
+    }
+
+
+def _fill(parent: ElementTree.Element, fields: dict[str, Any]) -> None:
+    for tag, value in fields.items():
+        child = ElementTree.SubElement(parent, tag)
+        if isinstance(value, dict):
+            _fill(child, value)  # pyright: ignore[reportUnknownArgumentType]
+        else:
+            child.text = str(value)
+
+
+preparer, writer, verify = functions(Matrix)

@@ -1,0 +1,171 @@
+"""Falling Things (FAT), as torchvision and pose estimators such as DOPE read it; or NDDS, whose program made it.
+
+`fat`:
+
+    FallingThings/mixed/<split>_<k>/                  of stills; of sequences <split>_<sequence>_<k>
+    FallingThings/single/<model>/<split>_<k>/         where all pictures are of one object
+        _camera_settings.json, _object_settings.json
+        <number>.left.jpg, .left.depth.png, .left.seg.png, .left.json          and the same of .right
+
+`ndds`:
+
+    <split>_<k>/_camera_settings.json, _object_settings.json
+        <number>.png, .depth.mm.16.png, .cs.png, .is.png, .json                of two cameras .left.png, ..., .right.json
+
+k counts thousands of pictures. The number, of six digits, is that of the instant in its sequence, or of the still picture in
+the data set (of a pair's first picture). A rig is one camera, `left`, or a rectified pair.
+
+Lengths are centimetres. An object's axes are those of a camera that looks out of its front: x to its right, y down, z ahead;
+their origin is the centre of its box. location and quaternion_xyzw (x, y, z, w) take them to the camera's axes (x right, y
+down, z ahead). pose_transform_permuted, A, is transposed and permuted: A^T P is the pose, where P takes (x, y, z) to
+(z, x, -y); NDDS calls the same matrix pose_transform. Points of bounding_box are [y, x], of cuboids [x, y]; the box is that of
+the projected model, and may reach out of the picture. Cuboids begin at front top right, then front top left, front bottom left,
+front bottom right, and the same of the rear; left and right are the object's own. Pixels have their origin at the picture's
+corner: cx is half the width. What is behind the camera is projected to [-1, -1]. visibility is the share of an object's pixels
+in the picture that nothing hides. The world, of camera_data, is viewsphere's: z up, right-handed (NDDS has Unreal's).
+
+A class is a model, by its key in the data set; objects of one model share it. fixed_model_transform (transposed) takes a
+model's points in metres, as the store's files and other formats have them, to its class's axes. Depth is along z, 16 bits, in
+steps of 0.1 mm (`ndds`: 1 mm); 65535 is all that is farther than that, and nothing. seg and cs have the number of the class,
+in `single` 255, 0 for none; is has the object's id as R 65536 + G 256 + B.
+
+torchvision takes every pair to be 6 cm apart, as FAT's are: with another baseline, its disparities are to be multiplied by
+the baseline / 6 cm. Settings have the lenses of the first shot; where lenses differ, camera_data's intrinsics hold (an
+extra). Lost: categories, exact colours (`fat` has JPEG), times. Not verified: how NDDS names the files of two cameras.
+Source: Tremblay, To and Birchfield, Falling Things: A Synthetic Dataset for 3D Object Detection and Pose Estimation (CVPR
+Workshops 2018), https://arxiv.org/abs/1804.06534, and the data set's readme; https://github.com/NVIDIA/Dataset_Synthesizer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._paper import json_bytes
+from viewsphere.formats._pictures import depth_png, picture, png
+from viewsphere.formats._refusals import pinhole
+from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.falling_things.entries import annotation, box_of, camera_data, class_of, lens_settings, model_settings
+from viewsphere.model.channel import missing
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.rig import Rig
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "depth", "instances")
+CREDITS = False
+HOLDS = ("object poses", "3D boxes", "boxes", "depth", "class masks", "camera poses")
+READ_BY = ("torchvision", "DOPE")
+FOLDER = 1000
+"""Numbers of pictures in a folder."""
+
+SINGLE = 255
+"""The class of all objects, where pictures have one."""
+
+
+class Options(Frozen):
+    """Which of two namings."""
+
+    naming: Literal["fat", "ndds"] = Field(
+        default="fat", description="`fat`: that of Falling Things; `ndds`: that of NVIDIA's Dataset Synthesizer"
+    )
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Lenses that are no pinholes, and rigs that are neither a camera nor a pair."""
+    yield from pinhole(scope)
+    if scope.rig is not None and _sides(scope.rig) is None:
+        yield f"expected one camera or a rectified pair; found {', '.join(sensor.name for sensor in scope.rig.sensors)}"
+
+
+def _sides(rig: Rig) -> dict[str, str] | None:
+    """Which sensor is left, and which right; None for a rig of other sensors."""
+    names = [sensor.name for sensor in rig.sensors]
+    if len(names) == 1:
+        return {names[0]: "left"}
+    pair = next(iter(rig.rectified), None)
+    return None if pair is None or len(names) > 2 else {names[pair.left]: "left", names[pair.right]: "right"}
+
+
+class FallingThings(Tree):
+    """The tree of a naming."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._is_fat = options.naming == "fat"
+        self._classes = {key: number for number, key in enumerate(dataset.plan.models, 1)}
+        if len(self._classes) >= SINGLE:
+            raise UserError(f"falling_things: expected fewer than {SINGLE} models; found {len(self._classes):,}")
+        shot = next((dataset.labelled(row.key) for row in dataset.rows[:1]), None)
+        self._sides = (shot and _sides(shot.rig)) or {}
+        lenses = {} if shot is None else {sensor.name: sensor.intrinsics for sensor in shot.rig.sensors}
+        self._lenses = [(side, lenses[name]) for name, side in self._sides.items()]
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A camera's picture, depth, classes and objects; raises UserError where an imported picture lacks a channel."""
+        for name in missing(CHANNELS, sample.channels):
+            raise UserError(f"frame {sample.index}: expected channel {name}; found none")
+        number = sample.instant if sample.sequence else sample.index - (sample.taken.sensor if sample.taken else 0)
+        folder = self._folder(sample, number)
+        side = self._sides.get(sample.sensor, "left")
+        yield from (Piece(f"{folder}/_{name}_settings.json", b"") for name in ("camera", "object"))
+        stem = f"{folder}/{number:06d}" + (f".{side}" if self._is_fat or len(self._sides) > 1 else "")
+        classes = png(sample, f"model classes {self._is_single(sample)}", self._class_map(sample))
+        if self._is_fat:
+            yield File(f"{stem}.jpg", picture(sample, ".jpg"))
+            yield File(f"{stem}.depth.png", depth_png(sample, 1e-4, nothing=65535))
+            yield File(f"{stem}.seg.png", classes)
+        else:
+            yield File(f"{stem}.png", picture(sample, ".png"))
+            yield File(f"{stem}.depth.mm.16.png", depth_png(sample, 1e-3, nothing=65535))
+            yield File(f"{stem}.cs.png", classes)
+            ids = sample.channels["instances"]
+            yield File(f"{stem}.is.png", png(sample, "ids 24", np.stack([ids >> 16, ids >> 8, ids], -1).astype(np.uint8)))
+        yield File(f"{stem}.json", json_bytes(self._frame(sample)))
+
+    def _is_single(self, sample: Sample) -> bool:
+        return self._is_fat and self.dataset.plan.most_objects(sample.index) == 1
+
+    def _folder(self, sample: Sample, number: int) -> str:
+        parts = (sample.split or "all", *([sample.sequence] if sample.sequence else []), str(number // FOLDER))
+        own = "_".join(parts)
+        if not self._is_fat:
+            return own
+        if not self._is_single(sample):
+            return f"FallingThings/mixed/{own}"
+        return f"FallingThings/single/{class_of(sample.objects[0]) if sample.objects else 'none'}/{own}"
+
+    def _class_map(self, sample: Sample) -> NDArray[np.uint8]:
+        """The number of the class that each pixel shows, (H, W)."""
+        table = np.zeros(max((o.id for o in sample.objects), default=0) + 1, np.uint8)
+        for o in sample.objects:
+            table[o.id] = SINGLE if self._is_single(sample) else self._classes[class_of(o)]
+        ids = sample.channels["instances"]
+        return np.where(ids < len(table), table[np.minimum(ids, len(table) - 1)], 0).astype(np.uint8)
+
+    def _frame(self, sample: Sample) -> dict[str, Any]:
+        matrix = "pose_transform_permuted" if self._is_fat else "pose_transform"
+        boxed = (o for o in sample.objects if o.is_placed and box_of(o) is not None)
+        return {
+            "camera_data": camera_data(sample.camera),
+            "objects": [annotation(o, sample.camera.K, matrix) for o in boxed],
+        }
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """A folder's settings."""
+        if path.endswith("_camera_settings.json"):
+            return (json_bytes({"camera_settings": [lens_settings(side, lens) for side, lens in self._lenses]}),)
+        only = path.split("/")[2] if path.startswith("FallingThings/single/") else None
+        shown = {info.track or info.key: info for info in reversed(self.dataset.models)}
+        shown = {name: shown[name] for name in self._classes if name in shown and only in (None, name)}
+        objects = [model_settings(info, name, SINGLE if only else self._classes[name]) for name, info in shown.items()]
+        return (json_bytes({"exported_object_classes": list(shown), "exported_objects": objects}),)
+
+
+preparer, writer, verify = functions(FallingThings)

@@ -1,0 +1,142 @@
+"""FlyingThings3D, Monkaa and Driving (the Scene Flow sets), which torchvision, ptlflow and stereo trainers read.
+
+    frames_cleanpass/<scene>/{left,right}/0000.png
+    optical_flow/<scene>/{into_future,into_past}/{left,right}/OpticalFlowInto{Future,Past}_0000_{L,R}.pfm
+    disparity/<scene>/{left,right}/0000.pfm
+    object_index/<scene>/{left,right}/0000.pfm
+    camera_data/<scene>/camera_data.txt, intrinsics.txt
+
+and, where the data set keeps the channels,
+
+    disparity_change/<scene>/into_future/{left,right}/0000.pfm             disparity_change
+    material_index/<scene>/{left,right}/0000.pfm                           materials
+    motion_boundaries/<scene>/into_future/{left,right}/0000.pgm            motion_boundaries: 255, else 0
+    occlusions/<scene>/{into_future,into_past}/{left,right}/0000.png       flow_state, flow_backward_state: 255 where the
+                                                                           other picture does not show the point
+
+A scene is, by `set`, flyingthings3d: `TRAIN/A/<sequence>`, or `TEST/A/<sequence>` in splits `val` and `test`; monkaa:
+`<sequence>`; driving: `<mm>mm_focallength/scene_forwards/<sequence>`, the millimetres those of a sensor 32 mm wide. Monkaa and
+Driving have no splits. Frames count from 0. torchvision wants the export's folder as FlyingThings3D for flow, and as
+SceneFlow/FlyingThings3D, SceneFlow/Monkaa or SceneFlow/Driving for stereo: link it.
+
+PFM: little-endian float32, the lowest row first. Flow: pixels, right and down, and a third number, 0; 1e10 where it is unknown,
+so at all pixels of the last picture into the future and of the first into the past: readers want all files. Disparity: pixels,
+positive in both pictures, 0 of what is infinitely far. Its change to the next picture: 1e10 where unknown. Index maps: ids of
+objects, and of materials, 0 for none. `occlusions` is none of the original's folders, but ptlflow's.
+
+camera_data.txt: a block a frame, `Frame N`, `L` and 16 numbers, `R` and 16 numbers: 4 x 4 matrices, row by row, from camera to
+world; cameras look along -z, x right, y up; metres, world z up. intrinsics.txt is an addition, because readers take a lens for
+granted: frame, fx, fy, cx, cy (pixels; the pixel (0, 0) a centre), baseline (metres).
+
+Lost: poses, boxes and categories of objects, a final pass, motion into the past but flow. Not verified with the originals: axes
+of the camera matrices, the kind of file of motion boundaries and of material indices. Source: Mayer et al. 2016, "A Large
+Dataset to Train Convolutional Networks for Disparity, Optical Flow, and Scene Flow Estimation",
+https://lmb.informatik.uni-freiburg.de/resources/datasets/SceneFlowDatasets.en.html.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.formats import Scope
+from viewsphere.formats import _refusals as refusals
+from viewsphere.formats._contents import Coded
+from viewsphere.formats._flow_files import UNKNOWN, flow_pfm, map_pfm, states_png
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._sequences import Eyes, check_whole, instants, number, scene, two_eyes
+from viewsphere.formats._tree import File, Piece, Tree, functions, line
+from viewsphere.geometry.rotation import rigid
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "instances", "flow", "flow_backward", "disparity")
+CREDITS = False
+HOLDS = ("flow", "disparity", "disparity change", "instances", "motion boundaries", "occlusions", "cameras")
+READ_BY = ("torchvision", "ptlflow")
+HELD_OUT = ("val", "test")
+SENSOR_MM = 32
+WAYS = (("future", "flow"), ("past", "flow_backward"))
+OPENGL = (1.0, -1.0, -1.0, 1.0)
+
+
+class Options(Frozen):
+    """Which of the three sets' folders there are."""
+
+    set: Literal["flyingthings3d", "monkaa", "driving"] = Field(
+        default="flyingthings3d", description="`flyingthings3d`: TRAIN and TEST; `monkaa`, `driving`: no splits"
+    )
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Still pictures, and what is no stereo pair."""
+    yield from refusals.sequences(scope)
+    yield from refusals.stereo(scope)
+    yield from two_eyes(scope)
+
+
+class FlyingThings(Tree):
+    """The tree of a set."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        check_whole(dataset, "flyingthings")
+        self._set, self._eyes = options.set, Eyes(dataset)
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture, its maps, and its cameras."""
+        folder, side = self._scene(sample), self._eyes.side(sample)
+        name = number(sample.instant, instants(self.dataset, sample))
+        yield File(f"frames_cleanpass/{folder}/{side}/{name}.png", picture(sample, ".png"))
+        for way, channel in WAYS:
+            into = f"{folder}/into_{way}/{side}"
+            file = f"OpticalFlowInto{way.title()}_{name}_{side[0].upper()}.pfm"
+            yield File(f"optical_flow/{into}/{file}", flow_pfm(sample, channel, float(UNKNOWN)))
+            if f"{channel}_state" in sample.channels:
+                yield File(f"occlusions/{into}/{name}.png", states_png(sample, f"{channel}_state", 1, 2, 3))
+        yield File(f"disparity/{folder}/{side}/{name}.pfm", map_pfm(sample, "disparity"))
+        yield File(f"object_index/{folder}/{side}/{name}.pfm", map_pfm(sample, "instances"))
+        yield from self._kept(sample, folder, f"{side}/{name}")
+        if side == "left":
+            yield from self._cameras(sample, f"camera_data/{folder}")
+
+    def _scene(self, sample: Sample) -> str:
+        if self._set == "monkaa":
+            return scene(sample)
+        if self._set == "flyingthings3d":
+            return f"{'TEST' if sample.split in HELD_OUT else 'TRAIN'}/A/{scene(sample)}"
+        lens = self._eyes.lens(sample)
+        return f"{round(lens.fx * SENSOR_MM / lens.width)}mm_focallength/scene_forwards/{scene(sample)}"
+
+    def _kept(self, sample: Sample, folder: str, name: str) -> Iterator[File]:
+        """Maps of channels that happen to be there."""
+        if "disparity_change" in sample.channels:
+            change = map_pfm(sample, "disparity_change", float(UNKNOWN))
+            yield File(f"disparity_change/{folder}/into_future/{name}.pfm", change)
+        if "materials" in sample.channels:
+            yield File(f"material_index/{folder}/{name}.pfm", map_pfm(sample, "materials"))
+        if "motion_boundaries" in sample.channels:
+            grey = Coded(sample.index, "motion_boundaries.pgm", partial(_pgm, sample))
+            yield File(f"motion_boundaries/{folder}/into_future/{name}.pgm", grey)
+
+    def _cameras(self, sample: Sample, folder: str) -> Iterator[Piece]:
+        """The frame's block of both eyes, and its lens."""
+        camera, baseline = sample.camera, self._eyes.pair(sample).baseline
+        eyes = (rigid(camera.R.T, camera.center + camera.R[0] * x) * OPENGL for x in (0.0, baseline))
+        rows = (f"{name} {' '.join(map(str, eye.ravel().tolist()))}\n" for name, eye in zip("LR", eyes, strict=True))
+        yield Piece(f"{folder}/camera_data.txt", f"Frame {sample.instant}\n{''.join(rows)}\n".encode())
+        lens = camera.intrinsics
+        yield line(f"{folder}/intrinsics.txt", sample.instant, lens.fx, lens.fy, lens.cx - 0.5, lens.cy - 0.5, baseline)
+
+
+def _pgm(sample: Sample) -> bytes:
+    array = np.where(sample.channels["motion_boundaries"] > 0, 255, 0).astype(np.uint8)
+    return f"P5\n{array.shape[1]} {array.shape[0]}\n255\n".encode() + array.tobytes()
+
+
+preparer, writer, verify = functions(FlyingThings)

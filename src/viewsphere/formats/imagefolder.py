@@ -1,0 +1,125 @@
+"""Pictures in a folder of their class, as torchvision's `ImageFolder` and Hugging Face's `imagefolder` read them.
+
+    README.md                          for `datasets`: which folder is which split
+    <split>/<class>/<index>.png        the pictures
+    <split>/metadata.jsonl             for `datasets`: a line a picture: file_name, label, and more of the object
+
+The class is the category, or the pose category (which side is seen), of the object that has the most visible pixels: of several
+with equally many, that of the lowest id. A picture of no object has no class, and is left out. `metadata.jsonl` has of this
+object: `label` (the class), `category`, `pose_category`, `model`, `azimuth`, `elevation`, `tilt` (degrees) and `distance`
+(metres) of the camera as it sees the object, `visibility` (0 to 1) and `box` (visible pixels, half-open corners x0, y0, x1,
+y1); `index` and `objects`, how many are seen, are of the picture. What nobody knows is null.
+
+Folders are named as classes are, but that a character of `<>:"/\\|?*[]%`, a control character, and a dot, space or underscore
+at either end stands as `%` and its code, as in URLs: readers would miss such folders. torchvision counts classes from 0 in the
+sorted order of the folders of one split: where a split lacks a class, its numbers differ from those of other splits. `datasets`
+gives the columns of `metadata.jsonl`, in which names are as they are. Large data sets have numbered folders in those of the
+classes. Sources: torchvision's documentation of `ImageFolder`; https://huggingface.co/docs/datasets/image_dataset.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+
+import yaml
+from pydantic import Field
+
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._paper import json_bytes
+from viewsphere.formats._pictures import picture, suffix_of
+from viewsphere.formats._tree import LINES, File, Layout, Piece, Tree, functions
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("the class of a picture", "viewpoints")
+READ_BY = ("torchvision", "datasets")
+KINDS = (".png", ".jpg", ".webp")
+CARD = "README.md"
+UNFIT = re.compile(r'[<>:"/\\|?*\[\]%\x00-\x1f\x7f]|^[. _]|[. _]$')
+LONGEST = 255
+"""Bytes of a folder's name."""
+
+
+class Options(Frozen):
+    """What a class is."""
+
+    by: Literal["category", "pose_category"] = Field(
+        default="category", description="`category`: what the object is; `pose_category`: which side of it is seen"
+    )
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Categories that folders cannot tell apart, and splits that `datasets` cannot."""
+    names = [_folder(category.name) for category in scope.categories] if options.by == "category" else []
+    for name in names:
+        if not name or len(name.encode()) > LONGEST:
+            yield f"expected names of categories that fit a folder's, 1 to {LONGEST} bytes; found {name!r}"
+    for kind, found in (("categories", names), ("splits", [_split(name) for name in scope.splits])):
+        if len({name.casefold() for name in found}) < len(found):
+            yield f"expected names of {kind} that differ in more than case and signs; found {', '.join(found)}"
+
+
+class ImageFolder(Tree):
+    """The tree of these classes."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._by = options.by
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture, and its line; nothing of a picture without objects."""
+        seen = [o for o in sample.objects if o.area]
+        if not seen:
+            return
+        o = max(seen, key=lambda one: (one.area, -one.id))
+        label = str(getattr(o, self._by))
+        if not label:
+            raise UserError(f"imagefolder: expected the {self._by} of object {o.id}; found none (frame {sample.index})")
+        split, _, place = self.stem(sample).partition("/")
+        inside = f"{_folder(label)}/{place}{suffix_of(sample, *KINDS)}"
+        yield File(f"{split}/{inside}", picture(sample, *KINDS))
+        told = {"file_name": inside, "label": label, "index": sample.index, "objects": len(seen), **_told(o)}
+        yield Piece(f"{split}/metadata.jsonl", json_bytes(told) + b"\n")
+        yield Piece(CARD, b"", split)
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """The card names the splits that have pictures, in the data set's order."""
+        if path != CARD:
+            return LINES
+        order = {name: number for number, name in enumerate(self.dataset.splits)}
+        splits = sorted(counts, key=lambda name: order.get(name, len(order)))
+        files = [{"split": _split(name), "path": f"{name}/**"} for name in splits]
+        head = yaml.safe_dump({"configs": [{"config_name": "default", "data_files": files}]}, sort_keys=False)
+        return (f"---\n{head}---\n".encode(),)
+
+
+def _folder(name: str) -> str:
+    """The name of a class's folder; no two classes have one."""
+    return UNFIT.sub(lambda match: f"%{ord(match[0]):02X}", name)
+
+
+def _split(name: str) -> str:
+    """A split's name as `datasets` allows it: letters, digits and underscores."""
+    return re.sub(r"\W", "_", name)
+
+
+def _told(o: ObjectAnnotation) -> dict[str, Any]:
+    view = {
+        "azimuth": o.view.azimuth_deg,
+        "elevation": o.view.elevation_deg,
+        "tilt": o.view.tilt_deg,
+        "distance": o.view.distance,
+        "visibility": o.visibility,
+    }
+    names = {"category": o.category, "pose_category": o.pose_category or None, "model": o.key or None}
+    return names | {key: None if math.isnan(value) else value for key, value in view.items()} | {"box": o.box2d}
+
+
+preparer, writer, verify = functions(ImageFolder)

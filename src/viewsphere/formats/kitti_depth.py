@@ -1,0 +1,74 @@
+"""KITTI's benchmark of depth prediction and completion, pictures beside, in folders as those of its drives.
+
+    {train,val,test}/<sequence>/image_0{2,3}/data/0000000000.png
+    {train,val,test}/<sequence>/proj_depth/groundtruth/image_0{2,3}/0000000000.png
+    {train,val,test}/<sequence>/calib_cam_to_cam.txt     S_rect_02, P_rect_02, and 03 of a pair; of its first pictures
+
+02 is the left camera, or the only one, 03 the right one of a rectified pair. Splits of other names than `val` and `test` lie in
+`train`. Frames count from 0.
+
+Depth: 16 bits, 256 times the metres along z, 0 where there is nothing, or what is farther than 256 metres; rounded, so errors
+are at most 2 mm. It is dense, unlike the original. Projections are of the left camera's axes (x right, y down, z ahead),
+metres; the pixel (0, 0) is a centre. Lost: poses, all labels of objects, a lens that zooms. Not verified with the originals:
+which lines their calib_cam_to_cam.txt have besides. Source: Uhrig et al. 2017, "Sparsity Invariant CNNs", and the development
+kit's readme, https://www.cvlibs.net/datasets/kitti/eval_depth.php?benchmark=depth_prediction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from viewsphere.formats import Scope
+from viewsphere.formats import _refusals as refusals
+from viewsphere.formats._contents import Coded
+from viewsphere.formats._flow_files import steps_png
+from viewsphere.formats._kitti_calibration import rectified
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._sequences import Eyes, check_whole, instants, number, scene, two_eyes
+from viewsphere.formats._tree import File, Tree, functions
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "depth")
+CREDITS = False
+HOLDS = ("depth", "calibration")
+READ_BY = ("OpenCV", "Pillow")
+CAMERAS = {"left": "image_02", "right": "image_03"}
+
+
+def refuses(scope: Scope) -> Iterator[str]:
+    """Still pictures, rigs of several cameras that are no pair, lenses that bend."""
+    yield from refusals.sequences(scope)
+    yield from two_eyes(scope)
+    yield from refusals.pinhole(scope)
+
+
+class KittiDepth(Tree):
+    """The tree of drives."""
+
+    def __init__(self, dataset: Dataset) -> None:
+        super().__init__(dataset)
+        check_whole(dataset, "kitti_depth")
+        self._eyes = Eyes(dataset)
+
+    def of(self, sample: Sample) -> Iterator[File]:
+        """A picture, its depth, and the lenses of the first."""
+        root, side = sample.split if sample.split in ("val", "test") else "train", self._eyes.side(sample)
+        folder, camera = f"{root}/{scene(sample)}", CAMERAS[side]
+        name = number(sample.instant, instants(self.dataset, sample), 10)
+        yield File(f"{folder}/{camera}/data/{name}.png", picture(sample, ".png"))
+        depth = Coded(sample.index, "kitti depth.png", partial(_metres, sample))
+        yield File(f"{folder}/proj_depth/groundtruth/{camera}/{name}.png", depth)
+        if side == "left" and not sample.instant:
+            yield File(f"{folder}/calib_cam_to_cam.txt", rectified(sample, self._eyes.pair(sample).baseline))
+
+
+def _metres(sample: Sample) -> bytes:
+    depth = sample.channels["depth"]
+    return steps_png(depth, np.isfinite(depth) & (depth > 0))
+
+
+preparer, writer, verify = functions(KittiDepth)

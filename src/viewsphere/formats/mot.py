@@ -1,0 +1,109 @@
+"""MOTChallenge's sequences, as MOT17 and MOT20 have them: boxes of tracked objects, read by trackers and their metrics.
+
+    <split>/<sequence>/seqinfo.ini          name, imDir, frameRate, seqLength, imWidth, imHeight, imExt
+    <split>/<sequence>/img1/000001.png      the pictures, numbered from 1
+    <split>/<sequence>/gt/gt.txt            a line an object and frame: frame, id, left, top, width, height, conf, class,
+                                            visibility
+    <split>/<sequence>/gt/labels.txt        names of the classes, a line each; not MOTChallenge's, datumaro reads it
+
+A sensor is a sequence of its own: the folder of one that is not named `camera` is `<sequence>-<sensor>`. Frames and ids count
+from 1, an object has its id in the whole sequence, and its class is the number of its category, from 1: MOTChallenge's own
+classes (1 is a pedestrian) are others, so TrackEval needs `DO_PREPROC` off. Boxes are in pixels, and 1-based: the picture's
+upper left corner is (1, 1). conf is 1: every line counts. Visibility is the share of the object's pixels that is seen, those
+outside of the picture included.
+
+Objects of which the box has nothing have no line. seqLength is that of the whole sequence, where only some of its frames are
+exported, too. A frame rate that is no whole number is written as one that is none, which MOTChallenge never has and datumaro
+does not read. There are no detections (`det`), and no camera. Sources: Milan et al. 2016, "MOT16: A Benchmark for Multi-Object
+Tracking", arXiv:1603.00831; TrackEval's readme of MOTChallenge, https://github.com/JonathonLuiten/TrackEval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._pictures import picture, suffix_of
+from viewsphere.formats._refusals import plain_names, sequences
+from viewsphere.formats._tree import LINES, File, Layout, Piece, Tree, functions
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.rig import CAMERA
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("boxes", "tracks of objects", "visibility")
+READ_BY = ("motmetrics", "TrackEval", "datumaro")
+KINDS = (".png", ".jpg")
+
+
+class Options(Frozen):
+    """What is boxed."""
+
+    boxes: Literal["visible", "whole"] = Field(
+        default="visible",
+        description="`visible`: an object's visible pixels; `whole`: the whole object as far as the picture reaches, hidden "
+        "ones too, as MOTChallenge's annotators guess it",
+    )
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Still pictures; names that take more than a line."""
+    yield from sequences(scope)
+    yield from plain_names(scope, r"\S([^\r\n]*\S)?")
+
+
+class Mot(Tree):
+    """The tree of these boxes."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._field = {"visible": "box2d", "whole": "box2d_projected"}[options.boxes]
+        self._labels = "".join(f"{category.name}\n" for category in dataset.categories)
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture, its lines, and what the whole sequence is."""
+        name = sample.sequence if sample.sensor == CAMERA else f"{sample.sequence}-{sample.sensor}"
+        folder, suffix = f"{sample.split or 'all'}/{name}", suffix_of(sample, *KINDS)
+        yield File(f"{folder}/img1/{sample.instant + 1:06d}{suffix}", picture(sample, *KINDS))
+        yield Piece(f"{folder}/gt/gt.txt", "".join(self._rows(sample)).encode())
+        yield Piece(f"{folder}/gt/labels.txt", b"")
+        yield Piece(f"{folder}/seqinfo.ini", b"", self._info(sample, name, suffix))
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """What all frames of a sequence say alike is the name of the section that they are in, and written once."""
+        if path.endswith("seqinfo.ini"):
+            return (next(iter(counts)).encode(),)
+        return (self._labels.encode(),) if path.endswith("labels.txt") else LINES
+
+    def _info(self, sample: Sample, name: str, suffix: str) -> str:
+        plan = self.dataset.plan
+        said = plan.parts[plan.part_of(sample.index)].recipe.get("time") if plan.parts else None
+        if not sample.sequence or said is None:
+            raise UserError(f"mot: expected sequences only; found the still picture of frame {sample.index}")
+        time = TimeEntry.model_validate(said)
+        return (
+            f"[Sequence]\nname={name}\nimDir=img1\nframeRate={time.fps:.10g}\nseqLength={time.count}\n"
+            f"imWidth={sample.width}\nimHeight={sample.height}\nimExt={suffix}\n"
+        )
+
+    def _rows(self, sample: Sample) -> Iterator[str]:
+        for o in sample.objects:
+            box = getattr(o, self._field)
+            if box is not None:
+                yield ",".join(map(str, _columns(sample, o, *box))) + "\n"
+
+
+def _columns(sample: Sample, o: ObjectAnnotation, x0: float, y0: float, x1: float, y1: float) -> tuple[int | str, ...]:
+    """A line's values; of a box (half-open corners) with origin 0."""
+    box = (f"{value:.10g}" for value in (x0 + 1, y0 + 1, x1 - x0, y1 - y0))
+    return (sample.instant + 1, o.id, *box, 1, o.category_id, f"{o.visibility:.10g}")
+
+
+preparer, writer, verify = functions(Mot)

@@ -1,0 +1,158 @@
+"""Posed pictures for radiance fields and Gaussian splatting: `transforms.json` as nerfstudio or instant-ngp read it, or NeRF's
+synthetic scenes.
+
+    <world>/transforms.json                  lenses, poses and files of all pictures; for nerfstudio the names of each split's
+    <world>/images/<sensor>/<index>.png      the pictures; without <sensor> where there is one
+    <world>/depths/<sensor>/<index>.png      depth along z, 16 bits, millimetres, 0 where nothing is, or farther than 65.5 m
+    <world>/masks/<sensor>/<index>.png       with `masks`: 255 where an object is, 0 for pixels that training leaves out
+    <world>/points.ply                       coloured points, pixels of a coarse grid, which splatting begins from
+
+and with `kind: nerf-synthetic`
+
+    <world>/transforms_<split>.json          train, val and test: angle of view and poses
+    <world>/<split>/<sensor>/<index>.png     the pictures, with alpha where the data set keeps `rgba`
+
+A world is what stands still while it is looked at: a sequence, a scene, or a model of still pictures; what moves in a sequence
+is in its pictures only. `transform_matrix` is world_from_camera, (4, 4), of OpenGL's axes: x right, y up, z back. Metres, z up.
+`cx` and `cy` count from the image's corner: a camera in the middle has half the width, and the ray of the first pixel goes
+through (0.5, 0.5), in nerfstudio and instant-ngp alike. NeRF's own code sends it through (0, 0), half a pixel away. A split of
+train, val and test that a world has not is its first one again, as loaders want all three.
+
+Lenses are pinholes, OpenCV's with k1 k2 p1 p2 (for nerfstudio k3 too), and its fisheye. Those of NeRF's synthetic scenes look
+straight ahead, and all pictures of a world have the same. `kind: instant-ngp` names depth `depth_path` and has `aabb_scale`
+16, which is to be set to the scene's size. The first lens is said for all, too, as nerfstudio's reader of instant-ngp's files
+knows no others. Skew cannot be held. `import` reads the folder of one world, or one of its files.
+
+Not verified by running: these programs, whose readers' code tells the above; that instant-ngp's depth is along z.
+Sources: https://docs.nerf.studio/quickstart/data_conventions.html; https://github.com/NVlabs/instant-ngp; Mildenhall et al.,
+NeRF, ECCV 2020, https://github.com/bmild/nerf.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.codecs.ply import ply_head
+from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._cameras import Rigs, measured_png, opengl_pose, points_of, world_of
+from viewsphere.formats._contents import Coded
+from viewsphere.formats._pictures import picture, suffix_of
+from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, item
+from viewsphere.formats.nerfstudio.lenses import SYNTHETIC, lens_problem, model_of, said_of
+from viewsphere.formats.nerfstudio.reading import read as read
+from viewsphere.formats.nerfstudio.synthetic import SPLITS, synthetic_files, synthetic_layout
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("cameras", "poses", "depth", "masks", "points")
+READ_BY = ("nerfstudio", "instant-ngp", "NeRF", "Gaussian splatting")
+MILLIMETRE = 0.001
+POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
+
+
+class Options(Frozen):
+    """Who reads it, and what is trained on."""
+
+    kind: Literal["nerfstudio", "instant-ngp", "nerf-synthetic"] = Field(
+        default="nerfstudio", description="whose files: `nerfstudio`, `instant-ngp`, or `nerf-synthetic`, NeRF's own scenes"
+    )
+    masks: bool = Field(default=False, description="masks of the objects, as nerfstudio leaves out what is around them")
+
+
+def needs(options: Options) -> tuple[str, ...]:
+    """Depth and objects on request."""
+    depth = () if options.kind == SYNTHETIC else ("depth",)
+    return (*depth, "instances") if options.masks else depth
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Lenses that are not in the files' words."""
+    if options.masks and options.kind != "nerfstudio":
+        yield f"expected masks with kind nerfstudio; found {options.kind}"
+    cameras = [sensor for sensor in scope.rig.sensors if sensor.lidar is None] if scope.rig else []
+    problems = ((sensor.name, lens_problem(sensor.intrinsics, options.kind)) for sensor in cameras)
+    yield from (f"{problem} of {name}" for name, problem in problems if problem)
+    if len(models := {model_of(sensor.intrinsics) for sensor in cameras}) > 1:
+        yield f"expected lenses of one model; found {' and '.join(sorted(models))}"
+
+
+class Nerfstudio(Tree):
+    """A folder for each world."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._options, self._kind = options, options.kind
+        self._rigs = Rigs(dataset)
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture, its depth, and what is said of it."""
+        lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
+        problem = lens_problem(lens, self._kind)
+        if problem:
+            raise UserError(f"nerfstudio: frame {sample.index}: {problem}")
+        stem = self.stem(sample).partition("/")[2]
+        stem = f"{now.folder}/{stem}" if now.folder else stem
+        if self._kind == SYNTHETIC:
+            yield from synthetic_files(sample, world, stem)
+            return
+        name = f"images/{stem}{suffix_of(sample, '.png', '.jpg')}"
+        yield File(f"{world}/{name}", picture(sample, ".png", ".jpg"))
+        yield File(f"{world}/depths/{stem}.png", measured_png(sample, MILLIMETRE))
+        depth = "depth_path" if self._kind == "instant-ngp" else "depth_file_path"
+        entry = {"file_path": name, depth: f"depths/{stem}.png", **said_of(lens, self._kind)}
+        entry["transform_matrix"] = opengl_pose(sample.camera).tolist()
+        if self._options.masks:
+            yield File(f"{world}/masks/{stem}.png", _mask(sample))
+            entry["mask_path"] = f"masks/{stem}.png"
+        yield item(f"{world}/transforms.json", entry, f"{model_of(lens)} {self.dataset.plan.part_of(sample.index)}")
+        yield item(f"{world}/transforms.json", name, f"split {sample.split}")
+        if self._kind == "nerfstudio":
+            yield _points(f"{world}/points.ply", sample)
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """The head of a file, and its frames."""
+        if path.endswith(".ply"):
+            return (ply_head(POINT, counts[""]), "")
+        if self._kind == SYNTHETIC:
+            return synthetic_layout(path, counts)
+        lists = [name for name in counts if name.startswith("split ")]
+        sections = [name for name in counts if name not in lists]
+        model, _, part = sections[0].partition(" ")
+        if len(sections) > 1:
+            raise UserError(f"nerfstudio: {path}: expected lenses of one kind in a world; found fisheye and others")
+        said: dict[str, Any] = {"camera_model": model, "ply_file_path": "points.ply"}
+        usual = self._rigs.usual(int(part))
+        if self._kind == "instant-ngp":
+            first = {} if usual is None else said_of(usual.sensors[0].intrinsics, self._kind)
+            said = {**first, "aabb_scale": 16, "integer_depth_scale": MILLIMETRE, "enable_depth_loading": True}
+            lists = []
+        text = json.dumps(said, separators=(",", ":"))[:-1].encode()
+        own = [f"split {name}" for name in SPLITS if f"split {name}" in lists]
+        named = [(name, f"split {name}" if f"split {name}" in own else own[0]) for name in SPLITS] if own else []
+        parts = [part for name, section in named for part in (f',\n"{name}_filenames":['.encode(), section, b"]")]
+        return (text, *parts, b',\n"frames":[\n', sections[0], b"\n]}\n")
+
+
+def _mask(sample: Sample) -> Coded:
+    return Coded(sample.index, "objects 255.png", lambda: encode_png((sample.channels["instances"] > 0).astype(np.uint8) * 255))
+
+
+def _points(path: str, sample: Sample) -> Piece:
+    found = points_of(sample)
+    rows = np.empty(len(found.world), POINT)
+    for name, column in zip(POINT.names or (), (*found.world.T, *found.colors.T), strict=True):
+        rows[name] = column
+    return Piece(path, rows.tobytes(), count=len(rows))
+
+
+preparer, writer, verify = functions(Nerfstudio)

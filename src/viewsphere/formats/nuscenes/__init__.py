@@ -1,0 +1,147 @@
+"""nuScenes: tables of scenes, sensors and boxes in the world, beside pictures and LiDAR points; nuscenes-devkit reads it.
+
+    <version>/<table>.json          category, attribute (empty), visibility, instance, sensor, calibrated_sensor, ego_pose, log,
+                                    scene, sample, sample_data, sample_annotation, map
+    <version>/splits.json           names of the scenes of each split
+    samples/<CHANNEL>/<scene>__<CHANNEL>__<instant>.png      pictures; .pcd.bin: points, float32 x y z intensity ring
+    maps/<token>.png                a map that says nothing: the development kit asks for one
+
+A scene is a sequence, a sample an instant, an instance an object; all samples are key frames. A sensor's channel is CAM_ or
+LIDAR_ and its name in capitals, so `front_left` is CAM_FRONT_LEFT; a sensor without a name of its own is CAM_FRONT, and the
+only LiDAR LIDAR_TOP. Tokens are hashes of names: the same data set has the same ones. Categories that nuScenes has, too, are
+written as there (car: vehicle.car); the development kit draws boxes of no others. Scenes are numbered from scene-0001 and begin
+an hour apart; timestamps are microseconds.
+
+World axes are the data set's, z up; the ego's are those of the rig's first sensor, turned to x ahead, y left, z up, so it
+stands where that sensor does, and is as level as it is; cameras have x right, y down, z ahead, a LiDAR x ahead, y left, z up.
+Metres; quaternions are w x y z. A box is about the middle of the object's own, `size` is width, length, height, its x axis
+points ahead. Pixel (0, 0) is the centre of the first one, so K's principal point is half a pixel less than the data set's.
+
+Every object has an annotation at every instant at which it is there, whether a sensor sees it or not: `num_lidar_pts` and
+`visibility` say how well (1 below 40 %, 2 below 60 %, 3 below 80 %, 4 more; of the camera that sees most of it, where there is
+none of the LiDAR). Velocities follow from prev and next. What is lost: masks and all other maps of pixels, attributes,
+radar, roads. Intensities are the data set's, whose largest value may be any; rings count from the highest.
+
+Not verified: the origin of pixels, which nuScenes does not state, and the name and place of splits.json, which newer kits read.
+Source: H. Caesar et al., nuScenes: A multimodal dataset for autonomous driving, CVPR 2020;
+https://github.com/nutonomy/nuscenes-devkit/blob/master/docs/schema_nuscenes.md.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache, partial
+from itertools import chain
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._mounting import pointless
+from viewsphere.formats._paper import json_bytes
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._refusals import pinhole, sequences
+from viewsphere.formats._timeline import Timeline, unknown_shots
+from viewsphere.formats._tree import LIST, File, Layout, Piece, Tree, functions, item
+from viewsphere.formats.nuscenes import records
+from viewsphere.formats.nuscenes.names import LOG, MAP, alike, category_of, channels_of, modalities, token
+from viewsphere.formats.nuscenes.story import story_of
+from viewsphere.formats.nuscenes.view import KINDS, View, points
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+LIDAR = True
+ANNOTATES = False
+HOLDS = ("3D boxes", "tracks", "camera poses", "calibrations", "LiDAR points")
+READ_BY = ("nuscenes-devkit",)
+
+
+class Options(Frozen):
+    """How the tables are found."""
+
+    version: str = Field(
+        default="v1.0-mini", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=64, description="name of the tables' folder"
+    )
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Still pictures, lenses, and names that would be one."""
+    yield from sequences(scope)
+    yield from unknown_shots(scope)
+    yield from pinhole(scope)
+    yield from pointless(scope)
+    yield from alike("categories", [(category.name, category_of(category.name)) for category in scope.categories])
+    if scope.rig is not None:
+        names = (sensor.name for sensor in scope.rig.sensors)
+        yield from alike("sensors", list(zip(names, channels_of(scope.rig), strict=True)))
+
+
+class NuScenes(Tree):
+    """The tables and files of a version."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._version = options.version
+        self._timeline = Timeline(dataset)
+        self._story = lru_cache(maxsize=2)(partial(story_of, self._timeline))
+        shot = next((dataset.labelled(key) for key, _ in dataset.shots()), None)
+        self._kinds = {} if shot is None else dict(zip(channels_of(shot.rig), modalities(shot.rig), strict=True))
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """What a sensor adds; the first one of an instant, all that is of the instant as a whole, too."""
+        course, (shot, instant, place) = self._timeline.course(sample), self._timeline.taken(sample)
+        start, story = sample.index - place, self._story(course)
+        view, channel = View(sample, shot, instant, place, course, story), channels_of(shot.rig)[place]
+        if self._kinds.get(channel) != view.modality:
+            raise UserError(f"nuscenes: expected the sensors {', '.join(self._kinds)} in all sequences; found {channel}")
+        yield File(view.file(channel), points(sample) if view.modality == "lidar" else picture(sample, *KINDS))
+        yield from self._items(view.of_sensor(channel))
+        there = [index for index in range(start, start + course.each) if self._timeline.has(index)]
+        if sample.index == there[0]:
+            yield from self._items(view.of_instant())
+            yield from self._items(view.of_objects([self._at(index) for index in there]))
+            for table in ("instance", "sample_annotation"):  # of no object they are there, too
+                yield Piece(f"{self._version}/{table}.json", b"", "there")
+            if sample.instant == story.instants[0]:
+                yield from (item(f"{self._version}/splits.json", view.scene, split or "all") for split in story.splits)
+
+    def rest(self) -> Iterator[File]:
+        """The tables that belong to no scene, and the map."""
+        log = {"token": LOG, "logfile": self.dataset.name, "vehicle": "", "date_captured": "", "location": ""}
+        ground = {"token": MAP, "log_tokens": [LOG], "category": "semantic_prior", "filename": f"maps/{MAP}.png"}
+        tables: dict[str, list[records.Record]] = {
+            "category": [records.category(one) for one in self.dataset.categories],
+            "attribute": [],
+            "visibility": records.visibilities(),
+            "sensor": [
+                {"token": token("sensor", name), "channel": name, "modality": kind} for name, kind in self._kinds.items()
+            ],
+            "log": [log],
+            "map": [ground],
+        }
+        yield from (File(f"{self._version}/{name}.json", json_bytes(rows) + b"\n") for name, rows in tables.items())
+        yield File(f"maps/{MAP}.png", encode_png(np.zeros((16, 16), np.uint8)))
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """Lists, but for the scenes of each split."""
+        if not path.endswith("/splits.json"):
+            return LIST
+        starts = (f"{mark}\n{json.dumps(name)}:[".encode() for mark, name in zip("{" + "," * len(counts), counts, strict=False))
+        lists = ((start, name, b"]") for start, name in zip(starts, counts, strict=True))
+        return [*chain.from_iterable(lists), b"\n}\n"]
+
+    def _items(self, rows: Iterable[tuple[str, records.Record]]) -> Iterator[Piece]:
+        return (item(f"{self._version}/{table}.json", row) for table, row in rows)
+
+    def _at(self, index: int) -> Sample:
+        row = self.dataset.plan.row_at(index)
+        return self.dataset.sample_at(row.key, index - row.first)
+
+
+preparer, writer, verify = functions(NuScenes)

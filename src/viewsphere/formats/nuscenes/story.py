@@ -1,0 +1,48 @@
+"""What of a sequence is there: its instants, by sensor and by object, so that a record knows those before and behind it."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from viewsphere.formats._timeline import Course, Timeline
+from viewsphere.model.camera import Intrinsics
+
+
+@dataclass(frozen=True)
+class Story:
+    """The instants of a sequence that are in the data set: all, and, by its place in the rig or by its id, those of each sensor
+    and each object; the sensors' lenses at first; and the splits of its pictures.
+    """
+
+    instants: tuple[int, ...]
+    sensors: dict[int, list[int]]
+    objects: dict[int, list[int]]
+    lenses: dict[int, Intrinsics]
+    splits: tuple[str, ...]
+
+
+def story_of(timeline: Timeline, course: Course) -> Story:
+    """What a sequence's finished and chosen samples show; its shots are read for it."""
+    sensors, objects = dict[int, list[int]](), dict[int, list[int]]()
+    lenses, splits, instants = dict[int, Intrinsics](), dict[str, None](), dict[int, None]()
+    for shot in timeline.shots(course):
+        for index, place, sensor in shot.samples:
+            if not timeline.has(index):
+                continue
+            now = shot.instants[place]
+            if now.index not in instants:
+                for thing in shot.objects:
+                    if thing.motion.at(place) is not None:
+                        objects.setdefault(thing.id, []).append(now.index)
+            instants[now.index] = splits[now.split] = None
+            sensors.setdefault(sensor, []).append(now.index)
+            lenses.setdefault(sensor, shot.camera(place, sensor).intrinsics)
+    return Story(tuple(instants), sensors, objects, lenses, tuple(splits))
+
+
+def neighbours(instants: Sequence[int], instant: int) -> tuple[int | None, int | None]:
+    """The instants before and behind one of some, None at their ends."""
+    place = bisect_left(instants, instant)
+    return instants[place - 1] if place else None, instants[place + 1] if place + 1 < len(instants) else None

@@ -1,0 +1,157 @@
+"""One sample and what is known of its sequence: the records that it adds to nuScenes' tables."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from viewsphere.formats._mounting import measured
+from viewsphere.formats._pictures import suffix_of
+from viewsphere.formats._timeline import Course
+from viewsphere.formats.nuscenes import records
+from viewsphere.formats.nuscenes.names import LOG, modalities, token
+from viewsphere.formats.nuscenes.story import Story
+from viewsphere.model.lidar import LIDAR
+from viewsphere.model.sample import Sample
+from viewsphere.model.shot import Shot
+
+APART_S = 3600
+"""Seconds from the beginning of a scene to that of the next: the development kit sorts scenes by them."""
+
+KINDS = (".png", ".jpg")
+
+Rows = Iterator[tuple[str, records.Record]]
+"""Tables' names, and records of theirs."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A sample, its shot, its instant and its sensor there, and its sequence."""
+
+    sample: Sample
+    shot: Shot
+    instant: int
+    place: int
+    course: Course
+    story: Story
+
+    @property
+    def scene(self) -> str:
+        """The name of its scene."""
+        return f"scene-{self.course.number + 1:04d}"
+
+    @property
+    def modality(self) -> str:
+        """`camera` or `lidar`."""
+        return modalities(self.shot.rig)[self.place]
+
+    @property
+    def timestamp(self) -> int:
+        """Microseconds."""
+        return round((APART_S * self.course.number + self.sample.time) * 1e6)
+
+    def token(self, table: str, *names: object) -> str:
+        """The token of a record of its sequence."""
+        return token(table, self.sample.sequence, *names)
+
+    def file(self, channel: str) -> str:
+        """The path of its picture or points."""
+        suffix = ".pcd.bin" if self.modality == "lidar" else suffix_of(self.sample, *KINDS)
+        return f"samples/{channel}/{self.scene}__{channel}__{self.sample.instant:06d}{suffix}"
+
+    def of_sensor(self, channel: str) -> Rows:
+        """The record of its file, and, at first and where the camera zooms, of how the sensor is calibrated."""
+        instant, lens, own = self.sample.instant, self.sample.camera.intrinsics, self.story.sensors[self.place]
+        zooms, is_camera = lens != self.story.lenses[self.place], self.modality == "camera"
+        calibrated = self.token("calibrated_sensor", channel, *([instant] if zooms else []))
+        if zooms or instant == own[0]:
+            mounting = records.ego_from_sensor(self.shot.rig, self.place)
+            yield (
+                "calibrated_sensor",
+                {
+                    "token": calibrated,
+                    "sensor_token": token("sensor", channel),
+                    **mounting,
+                    "camera_intrinsic": records.matrix_of(lens) if is_camera else [],
+                },
+            )
+        yield (
+            "sample_data",
+            {
+                "token": self.token("sample_data", channel, instant),
+                "sample_token": self.token("sample", instant),
+                "ego_pose_token": self.token("ego_pose", instant),
+                "calibrated_sensor_token": calibrated,
+                "timestamp": self.timestamp,
+                "fileformat": self.file(channel).rpartition(".")[2] if is_camera else "pcd",
+                "is_key_frame": True,
+                "height": self.sample.height if is_camera else 0,
+                "width": self.sample.width if is_camera else 0,
+                "filename": self.file(channel),
+                **records.chain(own, instant, lambda other: self.token("sample_data", channel, other)),
+            },
+        )
+
+    def of_instant(self) -> Rows:
+        """The records of its instant, and, of the first one, of the scene."""
+        instant, instants = self.sample.instant, self.story.instants
+        ego = records.world_from_ego(np.array(self.shot.instants[self.instant].world_from_rig))
+        yield "ego_pose", {"token": self.token("ego_pose", instant), "timestamp": self.timestamp, **ego}
+        own, scene = self.token("sample", instant), self.token("scene")
+        beside = records.chain(instants, instant, lambda other: self.token("sample", other))
+        yield "sample", {"token": own, "timestamp": self.timestamp, "scene_token": scene, **beside}
+        if instant == instants[0]:
+            ends = zip(("first_sample_token", "last_sample_token"), (instants[0], instants[-1]), strict=True)
+            samples = {name: self.token("sample", end) for name, end in ends}
+            named = {"name": self.scene, "description": self.sample.sequence}
+            yield "scene", {"token": scene, "log_token": LOG, "nbr_samples": len(instants), **samples, **named}
+
+    def of_objects(self, seen: Sequence[Sample]) -> Rows:
+        """The records of its instant's objects, as these samples of it show them."""
+        points, shares, instant = _hits(seen), _shares(seen), self.sample.instant
+        for o in self.sample.objects:
+            own, instance = self.story.objects[o.id], self.token("instance", o.id)
+            named = partial(self.token, "sample_annotation", o.id)
+            if instant == own[0]:
+                ends = {"first_annotation_token": named(own[0]), "last_annotation_token": named(own[-1])}
+                kind = token("category", o.category_id)
+                yield "instance", {"token": instance, "category_token": kind, "nbr_annotations": len(own), **ends}
+            yield (
+                "sample_annotation",
+                {
+                    "token": named(instant),
+                    "sample_token": self.token("sample", instant),
+                    "instance_token": instance,
+                    "visibility_token": records.grade(shares[o.id]),
+                    "attribute_tokens": [],
+                    **records.box(o),
+                    **records.chain(own, instant, named),
+                    "num_lidar_pts": points[o.id],
+                    "num_radar_pts": 0,
+                },
+            )
+
+
+def points(sample: Sample) -> bytes:
+    """The points of a LiDAR, five float32 each: x ahead, y left, z up (metres), intensity, ring."""
+    found = measured(sample)
+    return np.column_stack([found["xyz"], found["intensity"], found["ring"]]).astype("<f4").tobytes()
+
+
+def _hits(seen: Sequence[Sample]) -> Counter[int]:
+    """How many points of all LiDARs are on each object, by its id."""
+    found = [sample.channels[LIDAR]["instance"] for sample in seen if LIDAR in sample.channels]
+    return Counter(np.concatenate(found).tolist() if found else ())
+
+
+def _shares(seen: Sequence[Sample]) -> dict[int, float]:
+    """How much of each object, by its id, the camera sees that sees most of it; without cameras, the LiDAR."""
+    cameras = [sample for sample in seen if LIDAR not in sample.channels] or seen
+    found = dict[int, float]()
+    for o in (o for sample in cameras for o in sample.objects):
+        found[o.id] = max(found.get(o.id, 0.0), o.visibility)
+    return found

@@ -1,0 +1,144 @@
+"""MPI Sintel's tree, with its archives of depth, segmentation and stereo, which torchvision and ptlflow read.
+
+    training/clean/<sequence>/frame_0001.png       the pictures
+    training/albedo/<sequence>/frame_0001.png      where the data set keeps the channel: sRGB, as the pictures
+    training/flow/<sequence>/frame_0001.flo        flow to the next picture; all but the last have one, as all of the next two
+    training/occlusions/<sequence>/frame_0001.png  255 where the next picture does not show the point
+    training/invalid/<sequence>/frame_0001.png     255 where there is no flow
+    training/depth/<sequence>/frame_0001.dpt
+    training/camdata_left/<sequence>/frame_0001.cam
+    training/segmentation/<sequence>/frame_0001.png
+    stereo/training/{clean_left,clean_right,disparities,occlusions,outofframe}/<sequence>/frame_0001.png   with `stereo`
+
+The split `test` lies in a folder `test`, all others in `training`; each has all labels. torchvision wants the folder above
+`training` to be called Sintel, ptlflow does not mind: link it. Stereo lies apart because its `occlusions`, of the other eye and
+one for each picture, have the path of those of flow. There is one pass, `clean`, with whatever the recipe has painted (motion
+blur, too); there is none called `final`.
+
+Flow: pixels, right and down, float32, 1e10 where it is unknown: of flat backgrounds and of what is behind the camera then.
+Points that leave the picture have flow, and count as occluded. Depth: metres along z, float32, inf where nothing is. Cameras:
+the 3 x 3 matrix M, the pixel (0, 0) a centre, and the 3 x 4 motion N from the world to the camera (x right, y down, z ahead),
+float64: x = M N X. Segmentation: ids of objects, 0 for none, R 65536 + G 256 + B; they are those of the whole sequence.
+Disparity: pixels, positive, 4 R + G / 64 + B / 16384, below 1024; `outofframe` where the right picture ends before,
+`occlusions` where it is hidden, or not known. Frames count from 1.
+
+Lost: other sensors than the left one but for stereo pictures, boxes and poses of objects, categories, names of splits. Not
+verified with the originals: that depth is z in metres, that pixels are centres, that masks of occlusions hold what leaves the
+picture, the names of the folders camdata_left and segmentation. Source: Butler et al. 2012, "A Naturalistic Open Source Movie
+for Optical Flow Evaluation", http://sintel.is.tue.mpg.de.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.assets.srgb import encoded
+from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats import _refusals as refusals
+from viewsphere.formats._contents import Coded
+from viewsphere.formats._flow_files import FLO_TAG, flo_file, states_png, tagged
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._sequences import Eyes, check_whole, instants, number, scene, two_eyes
+from viewsphere.formats._tree import File, Tree, functions
+from viewsphere.model.camera import Camera
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "depth", "instances", "flow", "flow_state")
+CREDITS = False
+HOLDS = ("flow", "occlusions", "depth", "cameras", "instances", "disparity")
+READ_BY = ("torchvision", "ptlflow")
+MOST = 1024
+
+
+class Options(Frozen):
+    """Which of Sintel's archives are written."""
+
+    stereo: bool = Field(default=False, description="the archive of stereo pairs, too; of a rig of two rectified cameras")
+
+
+def needs(options: Options) -> tuple[str, ...]:
+    """Labels of pairs."""
+    return ("disparity", "disparity_state") if options.stereo else ()
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Still pictures, rigs of several cameras that are no pair, lenses that bend."""
+    yield from refusals.sequences(scope)
+    yield from refusals.stereo(scope) if options.stereo else two_eyes(scope)
+    yield from refusals.pinhole(scope)
+
+
+class Sintel(Tree):
+    """The tree of a data set."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        check_whole(dataset, "sintel")
+        self._stereo, self._eyes = options.stereo, Eyes(dataset)
+
+    def of(self, sample: Sample) -> Iterator[File]:
+        """A picture, and the labels of the left eye's."""
+        count, side = instants(self.dataset, sample), self._eyes.side(sample)
+        name = f"{scene(sample)}/frame_{number(sample.instant + 1, count)}"
+        root = "test" if sample.split == "test" else "training"
+        if self._stereo:
+            yield from self._pair(sample, f"stereo/{root}", side, f"{name}.png")
+        if side == "left":
+            yield File(f"{root}/clean/{name}.png", picture(sample, ".png"))
+            yield File(f"{root}/depth/{name}.dpt", Coded(sample.index, "depth.dpt", lambda: tagged(sample.channels["depth"])))
+            yield File(f"{root}/camdata_left/{name}.cam", cam(sample.camera))
+            yield File(f"{root}/segmentation/{name}.png", Coded(sample.index, "ids 24.png", partial(_ids, sample)))
+            if "albedo" in sample.channels:
+                yield File(f"{root}/albedo/{name}.png", Coded(sample.index, "albedo.png", partial(_albedo, sample)))
+            if sample.instant < count - 1:
+                yield File(f"{root}/flow/{name}.flo", flo_file(sample))
+                yield File(f"{root}/occlusions/{name}.png", states_png(sample, "flow_state", 1, 2, 3))
+                yield File(f"{root}/invalid/{name}.png", states_png(sample, "flow_state", 3, 4))
+
+    def _pair(self, sample: Sample, root: str, side: str, name: str) -> Iterator[File]:
+        """What the archive of stereo pairs has of a picture."""
+        yield File(f"{root}/clean_{side}/{name}", picture(sample, ".png"))
+        if side == "left":
+            yield File(f"{root}/disparities/{name}", Coded(sample.index, "sintel disparity.png", partial(_disparity, sample)))
+            yield File(f"{root}/occlusions/{name}", states_png(sample, "disparity_state", 1, 4))
+            yield File(f"{root}/outofframe/{name}", states_png(sample, "disparity_state", 2, 3))
+
+
+def cam(camera: Camera) -> bytes:
+    """A camera as Sintel's .cam: the tag, M and N, float64."""
+    lens = camera.K.copy()
+    lens[:2, 2] -= 0.5
+    return FLO_TAG + lens.astype("<f8").tobytes() + np.column_stack((camera.R, camera.t)).astype("<f8").tobytes()
+
+
+def _disparity(sample: Sample) -> bytes:
+    disparity = np.nan_to_num(sample.channels["disparity"].astype(np.float64))
+    steps = np.rint(disparity * 2**14).astype(np.int64)
+    if steps.max() >= MOST << 14:
+        raise UserError(f"frame {sample.index}: sintel: expected disparity below {MOST} pixels; found {disparity.max():.1f}")
+    return encode_png(bytes_of(steps, 16, 8, 0))
+
+
+def _ids(sample: Sample) -> bytes:
+    return encode_png(bytes_of(sample.channels["instances"].astype(np.int64), 16, 8, 0))
+
+
+def bytes_of(numbers: NDArray[np.int64], *shifts: int) -> NDArray[np.uint8]:
+    """Numbers (H, W) as pixels: their bytes from these bits on."""
+    return np.stack([numbers >> shift & 255 for shift in shifts], axis=-1).astype(np.uint8)
+
+
+def _albedo(sample: Sample) -> bytes:
+    return encode_png(np.rint(encoded(np.clip(sample.channels["albedo"], 0, 1)) * 255).astype(np.uint8))
+
+
+preparer, writer, verify = functions(Sintel)

@@ -1,0 +1,241 @@
+"""SYNTHIA's trees: `seqs` of its video sequences, with depth, classes, objects and cameras, or `rand` of its random pictures,
+with classes; datumaro reads the latter.
+
+    SYNTHIA-SEQS-<sequence>/RGB/Stereo_Left/Omni_F/000000.png           layout `seqs`: pictures; Stereo_Right is the right one
+    SYNTHIA-SEQS-<sequence>/Depth/Stereo_Left/Omni_F/000000.png         cm along z, 16 bits, the same in three channels
+    SYNTHIA-SEQS-<sequence>/GT/LABELS/Stereo_Left/Omni_F/000000.png     16 bits: red class, green object, blue 0
+    SYNTHIA-SEQS-<sequence>/GT/COLOR/Stereo_Left/Omni_F/000000.png      colours of classes
+    SYNTHIA-SEQS-<sequence>/CameraParams/Stereo_Left/Omni_F/000000.txt  16 numbers
+    SYNTHIA-SEQS-<sequence>/CameraParams/intrinsics.txt                 focal length, ppx, ppy, baseline on lines 1, 3, 5, 7
+
+    RGB/0000000.png                                                     layout `rand`: pictures
+    GT/0000000.png, GTTXT/0000000.txt                                   colours of classes, and their numbers
+    ALL.txt                                                             the names of all pictures, a line each
+    label_colors.txt                                                    red, green, blue and name of every class, by its number
+
+A rig of sensors that are all called left or right and one of f, b, l, r (left_f, right_b, ...) has the folders Omni_F, Omni_B,
+Omni_L and Omni_R; of others a camera or a rectified pair is written, to Omni_F.
+
+Classes are SYNTHIA's: Sky, Building, Road, Sidewalk, Fence, Vegetation (grass, too), Pole, Sign, Lanemarking, and of categories
+Car, Pedestrian (also called person), Bicycle (Cyclist in `rand`) and TrafficLight; ground, scenery and street furniture are
+Void, 0. Other categories are numbered from 16 on (from 14 in `rand`), and have colours of their own. Objects have their ids, 0
+for none; they keep them in a sequence. Depth is 65535 where nothing is, and where it is farther than 655.34 m.
+
+The 16 numbers lead from the camera to the world, column by column, so that the last four are its place. Both are left-handed:
+x right, y up, z ahead of the camera, and the world's y and z are ours changed for one another; metres. The principal point has
+its origin at the picture's corner; one focal length is for x and y, equal in a sequence.
+
+Lost: boxes, poses of objects, names of splits, and, in `rand`, all but classes. Not verified with the original files: the
+order, direction and axes of the 16 numbers (public readers disagree; most read them so), what depth is where nothing is, and
+where pixels have their origin. SYNTHIA has no flow. Source: Ros et al. 2016, "The SYNTHIA Dataset", http://synthia-dataset.net.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats import _refusals as refusals
+from viewsphere.formats._contents import Coded
+from viewsphere.formats._numbered import Numbered
+from viewsphere.formats._pictures import depth_steps, picture
+from viewsphere.formats._sequences import Eyes, scene, two_eyes
+from viewsphere.formats._tree import LINES, File, Layout, Piece, Tree, functions
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.camera import Camera
+from viewsphere.model.classes import Color, SemanticClass
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "semantic")
+CREDITS = False
+HOLDS = ("segmentation", "instances", "depth", "cameras", "stereo")
+READ_BY = ("datumaro (rand)", "OpenCV", "numpy")
+FAR = 65535
+MOST = 200
+
+COLORS: dict[str, Color] = {
+    "Void": (0, 0, 0),
+    "Sky": (128, 128, 128),
+    "Building": (128, 0, 0),
+    "Road": (128, 64, 128),
+    "Sidewalk": (0, 0, 192),
+    "Fence": (64, 64, 128),
+    "Vegetation": (128, 128, 0),
+    "Pole": (192, 192, 128),
+    "Car": (64, 0, 128),
+    "Sign": (192, 128, 128),
+    "Pedestrian": (64, 64, 0),
+    "Bicycle": (0, 128, 192),
+    "Lanemarking": (0, 175, 0),
+}
+"""Classes 0 to 12."""
+
+LIGHT: Color = (0, 128, 128)
+LIGHTS = {"seqs": 15, "rand": 13}
+STUFF = {
+    "sky": 1,
+    "building": 2,
+    "road": 3,
+    "pavement": 4,
+    "fence": 5,
+    "vegetation": 6,
+    "grass": 6,
+    "pole": 7,
+    "traffic sign": 9,
+    "road marking": 12,
+}
+THINGS = {
+    "building": 2,
+    "fence": 5,
+    "tree": 6,
+    "pole": 7,
+    "car": 8,
+    "sign": 9,
+    "trafficsign": 9,
+    "roadsign": 9,
+    "pedestrian": 10,
+    "person": 10,
+    "bicycle": 11,
+    "cyclist": 11,
+}
+NAMED = re.compile(r"(left|right)[_.-]?([fblr])", re.IGNORECASE)
+SWAPPED = np.array([[1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
+UPWARD = np.diag([1.0, -1, 1])
+
+
+class Options(Frozen):
+    """Which of SYNTHIA's trees."""
+
+    layout: Literal["seqs", "rand"] = Field(
+        default="rand", description="`seqs`: sequences, with depth, objects and cameras; `rand`: pictures, with classes"
+    )
+
+
+def needs(options: Options) -> tuple[str, ...]:
+    """What sequences have more."""
+    return ("depth", "instances") if options.layout == "seqs" else ()
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Of sequences: stills, other rigs and lenses; names with spaces, and more categories than there are numbers."""
+    yield from refusals.most_categories(scope, MOST)
+    yield from refusals.plain_names(scope)
+    if options.layout == "seqs":
+        yield from refusals.sequences(scope)
+        sensors = scope.rig.sensors if scope.rig else ()
+        if not all(NAMED.fullmatch(sensor.name) for sensor in sensors):
+            yield from two_eyes(scope)
+        yield from refusals.pinhole(scope)
+        yield from refusals.no_skew(scope)
+        yield from refusals.most_objects(scope, FAR)
+        lenses = {sensor.intrinsics: sensor.name for sensor in sensors if sensor.lidar is None}
+        if len(lenses) > 1 or any(lens.fx != lens.fy for lens in lenses):
+            yield f"expected cameras of one lens and one focal length; found {', '.join(lenses.values())}"
+
+
+class Synthia(Tree):
+    """The tree of a layout."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._rand = options.layout == "rand"
+        light = LIGHTS[options.layout]
+        things = {**THINGS, "trafficlight": light}
+        self._numbered = Numbered.of(dataset.classes, STUFF, things, light + 1)
+        self._names, self._colors = _named(self._numbered, dataset.classes, light)
+        self._eyes = None if self._rand else Eyes(dataset)
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture, and its labels."""
+        classes = self._numbered.table
+        color = Coded(sample.index, f"synthia {self._rand}.png", lambda: encode_png(self._colors[_ids(sample, classes)]))
+        if self._rand:
+            name = f"{sample.index:07d}"
+            yield File(f"RGB/{name}.png", picture(sample, ".png"))
+            yield File(f"GT/{name}.png", color)
+            yield File(f"GTTXT/{name}.txt", Coded(sample.index, "synthia.txt", partial(_table, sample, classes)))
+            yield Piece("ALL.txt", f"{name}.png\n".encode())
+            return
+        assert self._eyes is not None
+        root, camera = f"SYNTHIA-SEQS-{scene(sample)}", self._camera(sample)
+        for kind, content in (
+            ("RGB", picture(sample, ".png")),
+            ("Depth", Coded(sample.index, "synthia depth.png", partial(_depth, sample))),
+            ("GT/LABELS", Coded(sample.index, "synthia labels.png", partial(_labels, sample, classes))),
+            ("GT/COLOR", color),
+        ):
+            yield File(f"{root}/{kind}/{camera}/{sample.instant:06d}.png", content)
+        yield File(f"{root}/CameraParams/{camera}/{sample.instant:06d}.txt", extrinsics(sample.camera))
+        lens = sample.camera.intrinsics
+        told = "\n\n".join(f"{value!r}" for value in (lens.fx, lens.cx, lens.cy, self._eyes.pair(sample).baseline))
+        yield Piece(f"{root}/CameraParams/intrinsics.txt", b"", f"{told}\n")
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """The lens of a sequence, which is the name of a section; else lines."""
+        if not path.endswith("intrinsics.txt"):
+            return LINES
+        if len(counts) > 1:
+            raise UserError(f"synthia: expected one lens in each sequence; found {len(counts)} in {path.partition('/')[0]}")
+        return (next(iter(counts)).encode(),)
+
+    def rest(self) -> Iterator[File]:
+        """The classes."""
+        if self._rand:
+            rows = (f"{r} {g} {b} {name}\n" for name, (r, g, b) in zip(self._names, self._colors.tolist(), strict=True))
+            yield File("label_colors.txt", "".join(rows).encode())
+
+    def _camera(self, sample: Sample) -> str:
+        named = NAMED.fullmatch(sample.sensor)
+        if named:
+            return f"Stereo_{named[1].capitalize()}/Omni_{named[2].upper()}"
+        assert self._eyes is not None
+        return f"Stereo_{self._eyes.side(sample).capitalize()}/Omni_F"
+
+
+def _named(numbered: Numbered, classes: tuple[SemanticClass, ...], light: int) -> tuple[list[str], NDArray[np.uint8]]:
+    """Names and colours (N, 3) of all numbers; of categories that SYNTHIA lacks colours that it does not use."""
+    known = {i: named for i, named in enumerate(COLORS.items())} | {light: ("TrafficLight", LIGHT)}
+    own = {one.name: one.color for one in classes if one.is_thing}
+    for number, name in numbered.own.items():
+        r, g, b = own[name]
+        known[number] = (name, (r | 1, g | 1, b | 1))
+    found = [known.get(i, (f"Reserved{i}", (0, 0, 0))) for i in range(max(known) + 1)]
+    return [name for name, _ in found], np.array([color for _, color in found], np.uint8)
+
+
+def extrinsics(camera: Camera) -> bytes:
+    """The motion from a camera to the world, both left-handed with y up, as 16 numbers, column by column."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = SWAPPED @ camera.R.T @ UPWARD, transform(SWAPPED, camera.center)
+    return (" ".join(map(repr, (matrix.T + 0.0).ravel().tolist())) + "\n").encode()
+
+
+def _ids(sample: Sample, classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return classes[sample.channels["semantic"]]
+
+
+def _labels(sample: Sample, classes: NDArray[np.uint8]) -> bytes:
+    ids = sample.channels["instances"]
+    return encode_png(np.dstack((_ids(sample, classes), ids, np.zeros_like(ids))).astype(np.uint16))
+
+
+def _depth(sample: Sample) -> bytes:
+    return encode_png(np.dstack([depth_steps(sample, 0.01, FAR, FAR)] * 3))
+
+
+def _table(sample: Sample, classes: NDArray[np.uint8]) -> bytes:
+    return "".join(" ".join(map(str, row)) + "\n" for row in _ids(sample, classes).tolist()).encode()
+
+
+preparer, writer, verify = functions(Synthia)

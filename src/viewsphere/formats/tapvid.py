@@ -1,0 +1,128 @@
+"""TAP-Vid and TAPVid-3D: points followed through videos, as the benchmarks' own evaluation reads them.
+
+    <split>/<sequence>.pkl                  `kind: tapvid`
+    <split>/<sequence>.npz                  `kind: tapvid3d`
+    <split>/<sequence>_<sensor>.pkl, .npz   of rigs of several cameras
+
+TAP-Vid: a pickle as of TAP-Vid-DAVIS, but one a video, so that none grows with the data set; `dict.update` joins them. It is a
+dictionary, by the video's name, of `video`, uint8 (T, H, W, 3); `points`, float32 (N, T, 2), x and y as shares of width and
+height, with the picture's corner as origin, 0 where a point has none; `occluded`, bool (N, T), true where it is hidden, outside
+or behind the camera. There are no queries: readers make them. The pickles need numpy of any version, and nothing else.
+
+TAPVid-3D: arrays `images_jpeg_bytes` (T), a JPEG each; `fx_fy_cx_cy`, pixels, with the picture's corner as origin;
+`tracks_XYZ`, float32 (T, N, 3), metres in the camera's axes of that instant (x right, y down, z ahead), 0 where a point is
+nowhere; `visibility`, bool (T, N); `queries_xyt`, float32 (N, 3), pixels and number of the picture at which each was picked;
+`extrinsics_w2c`, float64 (T, 4, 4). Points of the sky, which have no place, are left out. The names are those that the
+benchmark's programs read; its readme has others.
+
+The points are those of the recipe's `tracks`. Lost: the instants' times, whether an unseen point is hidden or outside, objects;
+of JPEG some colour. Not verified with the originals: that pixels of queries_xyt have the corner as origin. Sources: Doersch et
+al. 2022, "TAP-Vid: A Benchmark for Tracking Any Point in a Video"; Koppula et al. 2024, "TAPVid-3D: A Benchmark for Tracking
+Any Point in 3D", https://github.com/google-deepmind/tapnet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.codecs.pictures import encode_picture
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats import _refusals as refusals
+from viewsphere.formats._archives import archive, pickled
+from viewsphere.formats._contents import Coded
+from viewsphere.formats._pictures import JPEG_QUALITY, opaque
+from viewsphere.formats._sequences import check_whole, scene
+from viewsphere.formats._tree import File, Tree, functions
+from viewsphere.geometry.rotation import rigid
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "tracks")
+CREDITS = False
+HOLDS = ("point tracks", "occlusion", "cameras")
+READ_BY = ("tapnet",)
+
+
+class Options(Frozen):
+    """Which benchmark."""
+
+    kind: Literal["tapvid", "tapvid3d"] = Field(
+        default="tapvid", description="`tapvid`: where points are in the pictures; `tapvid3d`: in the camera's axes"
+    )
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Still pictures; of points in space, lenses that bend."""
+    yield from refusals.sequences(scope)
+    if options.kind == "tapvid3d":
+        yield from refusals.pinhole(scope)
+
+
+class Tapvid(Tree):
+    """A file a video."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        check_whole(dataset, "tapvid")
+        self._make, self._ending = {"tapvid": (self._pickled, "pkl"), "tapvid3d": (self._archived, "npz")}[options.kind]
+
+    def of(self, sample: Sample) -> Iterator[File]:
+        """Nothing: a file has a whole sequence."""
+        yield from ()
+
+    def rest(self) -> Iterator[File]:
+        """The videos, each made when it is written."""
+        last = ""
+        for key, places in self.dataset.shots():
+            first = self.dataset.sample_at(key, places[0])
+            if first.sequence == last:
+                continue
+            last = first.sequence
+            shot = self.dataset.labelled(key)
+            sensors = [sensor.name for sensor in shot.rig.sensors] if shot else [first.sensor]
+            for sensor in (sensors[i] for i in sorted({place % len(sensors) for place in places})):
+                name = scene(first) if len(sensors) == 1 else f"{scene(first)}_{sensor}"
+                path = f"{first.split or 'all'}/{name}.{self._ending}"
+                yield File(path, Coded(first.index, path, partial(self._make, name, last, sensor)))
+
+    def _pickled(self, name: str, sequence: str, sensor: str) -> bytes:
+        samples, tracks = self.dataset.sequence(sequence, sensor), self.dataset.tracks(sequence, sensor)
+        size = (samples[0].width, samples[0].height)
+        found = {
+            "video": np.stack([opaque(sample.picture) for sample in samples]),
+            "points": np.nan_to_num(tracks.xy.transpose(1, 0, 2) / size, posinf=0, neginf=0).astype("<f4"),
+            "occluded": tracks.state.T != 0,
+        }
+        return pickled({name: found})
+
+    def _archived(self, name: str, sequence: str, sensor: str) -> bytes:
+        samples, tracks = self.dataset.sequence(sequence, sensor), self.dataset.tracks(sequence, sensor)
+        lens = samples[0].camera.intrinsics
+        if any(sample.camera.intrinsics != lens for sample in samples):
+            raise UserError(f"tapvid: kind tapvid3d: expected one lens all through a sequence; found that {sequence} zooms")
+        kept = ~np.isinf(tracks.xyz[..., 2]).any(axis=0) & np.isin(tracks.query[:, 0], tracks.instants)
+        queries = tracks.query[kept][:, [1, 2, 0]]
+        queries[:, 2] = np.searchsorted(tracks.instants, queries[:, 2])
+        return archive(
+            images_jpeg_bytes=np.array([_jpeg(self.dataset, sample) for sample in samples]),
+            fx_fy_cx_cy=np.array([lens.fx, lens.fy, lens.cx, lens.cy]),
+            tracks_XYZ=np.nan_to_num(tracks.xyz[:, kept]).astype("<f4"),
+            visibility=tracks.state[:, kept] == 0,
+            queries_xyt=queries.astype("<f4"),
+            extrinsics_w2c=np.stack([rigid(sample.camera.R, sample.camera.t) for sample in samples]),
+        )
+
+
+def _jpeg(dataset: Dataset, sample: Sample) -> bytes:
+    file = sample.picture_file or ""
+    return dataset.read(file) if file.endswith(".jpg") else encode_picture(opaque(sample.picture), "jpeg", JPEG_QUALITY)
+
+
+preparer, writer, verify = functions(Tapvid)

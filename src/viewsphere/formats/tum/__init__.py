@@ -1,0 +1,145 @@
+"""RGB-D sequences as those of TUM, which SLAM systems and their evaluations read; or as ICL-NUIM's, which are mirrored.
+
+    <world>/<sensor>/rgb/<seconds>.png        the pictures; without <sensor> where there is one
+    <world>/<sensor>/depth/<seconds>.png      depth along z, 16 bits, 5000 a metre, 0 where nothing is, or farther than 13.1 m
+    <world>/<sensor>/rgb.txt, depth.txt       a picture a line: seconds, file
+    <world>/<sensor>/groundtruth.txt          a pose a line: seconds, tx ty tz, qx qy qz qw, world_from_camera
+    <world>/<sensor>/associations.txt         a pair a line: seconds, file of the picture, seconds, file of the depth
+    <world>/<sensor>/calibration.txt          fx fy cx cy k1 k2 p1 p2 k3; TUM has these numbers on its web page
+
+A world is a sequence, or, of still pictures, a scene or a model, whose time is the number of the frame. Seconds are those from
+the sequence's beginning, to the microsecond. Metres, z up; cameras look along z, x right, y down. `cx` and `cy` count from
+the middle of the first pixel: a camera in the middle has (width - 1) / 2.
+
+With `kind: icl-nuim` names are numbers of frames instead of seconds, `associations.txt` has the depth first, and poses are in
+`<world>.gt.freiburg`, as above, and `<world>.gt.sim`, three rows of four numbers and an empty line each. There, as in
+POV-Ray, y is up in cameras and world: fy is negative, and y and z of the world change places, which mirrors it.
+
+Fisheyes, lenses of more than five coefficients (of ICL-NUIM's any) and skew cannot be held; nor can lenses that change.
+`import` reads one sensor's folder of either kind, with a `calibration.txt`. Not verified: that ICL-NUIM's loaders need no
+other names of files. Sources: Sturm et al., IROS 2012, https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats; Handa
+et al., ICRA 2014, https://www.doc.ic.ac.uk/~ahanda/VaFRIC/iclnuim.html.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.errors import UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._cameras import Rigs, measured_png, unskewed, world_from_camera, world_of
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._refusals import pinhole
+from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, line
+from viewsphere.formats.tum.reading import read as read
+from viewsphere.geometry.rotation import quaternion_from_matrix
+from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb", "depth")
+CREDITS = False
+HOLDS = ("depth", "trajectories")
+READ_BY = ("TUM's RGB-D tools", "SLAM systems", "evo")
+STEP = 1 / 5000
+"""Metres of a step of depth."""
+
+HEADS = {
+    "rgb.txt": "# color images\n# timestamp filename\n",
+    "depth.txt": "# depth maps\n# timestamp filename\n",
+    "groundtruth.txt": "# ground truth trajectory\n# timestamp tx ty tz qx qy qz qw\n",
+    "calibration.txt": "# fx fy cx cy k1 k2 p1 p2 k3\n",
+}
+MOST = 5
+"""Coefficients of a lens."""
+
+
+class Options(Frozen):
+    """Whose sequences they look like."""
+
+    kind: Literal["tum", "icl-nuim"] = Field(
+        default="tum", description="`tum`: right-handed, files by seconds; `icl-nuim`: mirrored, files by frames"
+    )
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Lenses that a line of numbers does not hold."""
+    yield from unskewed(scope)
+    if options.kind == "icl-nuim":
+        yield from pinhole(scope)
+    for sensor in () if scope.rig is None else scope.rig.sensors:
+        if sensor.lidar is None and not _is_held(sensor.intrinsics):
+            yield f"expected lenses of k1 k2 p1 p2 k3; found another of {sensor.name}"
+
+
+class Tum(Tree):
+    """A folder for each sensor of each world."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._mirrored = options.kind == "icl-nuim"
+        self._rigs = Rigs(dataset)
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture, its depth, where it was taken, and lines that name them."""
+        lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
+        if lens.skew or not _is_held(lens):
+            raise UserError(f"tum: frame {sample.index}: expected a lens of k1 k2 p1 p2 k3; found another")
+        folder = f"{world}/{now.folder}" if now.folder else world
+        number = sample.instant if sample.sequence else sample.index
+        stamp = str(number) if self._mirrored else f"{sample.time if sample.sequence else number:.6f}"
+        between = self.stem(sample).partition("/")[2].rpartition("/")[0]
+        name = f"{between}/{stamp}.png" if between else f"{stamp}.png"
+        yield File(f"{folder}/rgb/{name}", picture(sample, ".png"))
+        yield File(f"{folder}/depth/{name}", measured_png(sample, STEP))
+
+        color, depth = (stamp, f"rgb/{name}"), (stamp, f"depth/{name}")
+        pose = _mirrored(world_from_camera(sample.camera)) if self._mirrored else world_from_camera(sample.camera)
+        w, *xyz = quaternion_from_matrix(pose[:3, :3])
+        motion = (stamp, *pose[:3, 3].tolist(), *xyz, w)
+        yield Piece(f"{folder}/calibration.txt", b"", _numbers(lens, -1 if self._mirrored else 1))
+        if self._mirrored:
+            yield line(f"{folder}/associations.txt", *depth, *color)
+            yield line(f"{folder}/{world}.gt.freiburg", *motion)
+            rows = "".join(" ".join(map(str, row)) + "\n" for row in pose[:3].tolist())
+            yield Piece(f"{folder}/{world}.gt.sim", f"{rows}\n".encode())
+        else:
+            yield line(f"{folder}/associations.txt", *color, *depth)
+            yield line(f"{folder}/groundtruth.txt", *motion)
+            yield line(f"{folder}/rgb.txt", *color)
+            yield line(f"{folder}/depth.txt", *depth)
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """The head that TUM's files have, and the lines; the lens is the name of its section."""
+        name = path.rpartition("/")[2]
+        head = HEADS.get(name, "").encode()
+        if name != "calibration.txt":
+            return (head, "")
+        if len(counts) > 1:
+            raise UserError(f"tum: {path}: expected one lens for all pictures of a sensor; found several")
+        return (head, f"{next(iter(counts))}\n".encode())
+
+
+def _is_held(lens: Intrinsics) -> bool:
+    own = lens.distortion
+    return own is None or (own.model == "brown_conrady" and not any(own.coefficients[MOST:]))
+
+
+def _numbers(lens: Intrinsics, up: int) -> str:
+    own = lens.distortion.coefficients[:MOST] if isinstance(lens.distortion, Distortion) else ()
+    values = (lens.fx, up * lens.fy, lens.cx - 0.5, lens.cy - 0.5, *own, *[0.0] * (MOST - len(own)))
+    return " ".join(map(str, values))
+
+
+def _mirrored(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A camera's pose, (4, 4), with y up in the camera and in the world, both of which are left-handed then."""
+    return pose[[0, 2, 1, 3]] * (1.0, -1.0, 1.0, 1.0)
+
+
+preparer, writer, verify = functions(Tum)
