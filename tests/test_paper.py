@@ -17,6 +17,7 @@ from PIL import Image
 
 import viewsphere as vs
 from small import ROOT
+from viewsphere import plugins
 from viewsphere.check import check
 from viewsphere.cli.arguments import load_recipe
 from viewsphere.model.sample import ObjectAnnotation
@@ -213,3 +214,11 @@ def test_two_hundred_frames_of_car_poses(tmp_path):
     smallest, largest, cut = framing(dataset)
     assert 0.23 <= smallest < largest <= 0.86  # head-on at 7 m, a long narrow car is 3.5 times smaller than side-on at 5 m
     assert cut == 0
+
+
+def test_every_format_of_table_1_is_there_and_so_is_its_test():
+    rows = re.findall(r"^\| .* \| ✓ \[`(\w+)`\]\(([\w.-]+)#\w+\) \| `(\S+)` \|", PAGE, re.MULTILINE)
+    assert len(rows) >= 16
+    for name, page, test in rows:
+        assert hasattr(plugins.load("formats", name), "writer") and (ROOT / test).is_file()
+        assert f"\n## {name}\n" in (ROOT / "docs" / page).read_text("utf-8")
