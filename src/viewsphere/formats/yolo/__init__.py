@@ -1,6 +1,6 @@
 """YOLO, as Ultralytics trains it: a text file beside each picture, a line an object, numbers as shares of the picture.
 
-    data.yaml                        path, train, val, test, names; for pose kpt_shape, flip_idx, kpt_names
+    data.yaml                        train, val, test, names; for pose kpt_shape, flip_idx, kpt_names
     images/<split>/<index>.png       the pictures
     labels/<split>/<index>.txt       class, and by task: `detect` centre x, centre y, width, height of the visible pixels'
                                      box; `segment` the mask's polygon; `pose` the box, then x, y, v of each point; `obb` four

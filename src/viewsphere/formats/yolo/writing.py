@@ -51,7 +51,7 @@ class Yolo(Tree):
     def rest(self) -> Iterator[File]:
         """The description that training begins from."""
         splits = {name: f"images/{name}" for name in self.dataset.splits}
-        data: dict[str, Any] = {"path": ".", **splits}
+        data: dict[str, Any] = {**splits}  # without a path, which Ultralytics would take from the working folder
         data |= {name: next(iter(splits.values())) for name in ("train", "val") if name not in splits}
         if self._points:
             data["kpt_shape"] = [len(self._points), 3]

@@ -1,29 +1,4 @@
-"""PASCAL VOC, as the VOC2012 development kit has it; read by torchvision, supervision, datumaro and most trainers of detectors.
-
-    VOCdevkit/VOC2012/JPEGImages/<index>.jpg             the pictures; .png with `pictures: png`
-    VOCdevkit/VOC2012/Annotations/<index>.xml            size; of each object name, pose, truncated, occluded, difficult, box
-    VOCdevkit/VOC2012/SegmentationClass/<index>.png      palette picture: 0 background, else the category's number
-    VOCdevkit/VOC2012/SegmentationObject/<index>.png     palette picture: 0 background, else the object's place in the XML
-    VOCdevkit/VOC2012/ImageSets/Main/<split>.txt         names of a split's pictures; in Segmentation/, of those with masks
-    VOCdevkit/VOC2012/labelmap.txt                       names and colours of the categories' numbers, for datumaro
-
-Boxes are around the visible pixels and count pixels from 1, both ends inside: xmin = floor(x) + 1, xmax = ceil(x + w).
-datumaro takes them as such with `coordinate_mode="voc-one-based"`, supervision always; torchvision gives the numbers as they
-are. Categories' numbers count from 1 in the data set's order; their colours are VOC's palette. Objects of which nothing is seen
-have no entry.
-
-truncated: more than 15 % of the object lies outside of the picture. occluded: others hide more than 5 % of what lies inside.
-Both numbers are those of the annotators' guidelines. pose: Frontal, Rear, Left or Right, where the camera stands within 20
-degrees of that side, no more than 45 degrees above or below and tilted; else Unspecified. Left is seen of an object that shows
-its own left side: it faces the picture's left. difficult: see the option.
-
-Lost: sequences, sensors and cameras. Masks have no void line (255) around objects, as VOC's own have: all pixels are known. The
-class lists of the classification task (`<category>_<split>.txt`) and `trainval.txt` are not written: they follow from the XML,
-and from `train.txt` and `val.txt`. torchvision takes only splits named train, val and trainval, and pictures that are JPEG;
-supervision looks at no sub-folders, which data sets of more than 10,000 pictures have; datumaro passes over splits with `_` in
-their name. Not verified: what `Left` means, of which the guidelines say nothing. Source: M. Everingham et al., The PASCAL
-Visual Object Classes Challenge, http://host.robots.ox.ac.uk/pascal/VOC/voc2012/, and its annotation guidelines of 2009.
-"""
+"""Writes a data set as PASCAL VOC."""
 
 from __future__ import annotations
 
@@ -38,26 +13,15 @@ from pydantic import Field
 
 from viewsphere.codecs.palette import palette
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.formats import Scope
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import picture
-from viewsphere.formats._refusals import most_categories, most_objects, plain_names
-from viewsphere.formats._tree import File, Piece, Tree, functions, line
+from viewsphere.formats._tree import File, Piece, Tree, line
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Portion
 from viewsphere.model.sample import ObjectAnnotation, ObjectView, Sample
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("boxes", "class masks", "instance masks", "truncation", "occlusion", "pose categories")
-READ_BY = ("torchvision", "supervision", "datumaro")
-
 ROOT = "VOCdevkit/VOC2012"
-MOST = 254  # 255 is void
-NAMES = r"[^:#\x00-\x1f][^:\x00-\x1f]*"
-"""Names of categories that XML and a line of labelmap.txt can hold."""
-
 VIEWS = {0: "Frontal", 90: "Left", 180: "Rear", 270: "Right"}
 """By the azimuth from which an object is seen."""
 
@@ -79,13 +43,6 @@ class Options(Frozen):
         default=0.1,
         description="an object is difficult, so that evaluations pass over it, where less than this share is seen",
     )
-
-
-def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Numbers of 8 bits, and names that fill a line."""
-    yield from most_categories(scope, MOST)
-    yield from most_objects(scope, MOST)
-    yield from plain_names(scope, NAMES)
 
 
 class Voc(Tree):
@@ -132,16 +89,18 @@ class Voc(Tree):
 
 
 def _object(o: ObjectAnnotation, difficult_below: float) -> dict[str, Any]:
-    """The fields of an object; of imported ones, of which less is known, flags are 0."""
+    """The fields of an object; of imported ones what they came with, or else flags of 0, as less is known."""
     assert o.box2d is not None
     x0, y0, x1, y1 = o.box2d
     inside = 1 - o.truncation
+    told = {key: value for key, value in (o.source or {}).items() if key in ("pose", "truncated", "occluded", "difficult")}
     return {
         "name": o.category,
         "pose": _pose(o.view),
         "truncated": int(o.truncation > TRUNCATED),
         "occluded": int(inside > 0 and 1 - o.visibility / inside > OCCLUDED),
         "difficult": int(o.visibility < difficult_below),
+        **told,
         "bndbox": {
             "xmin": math.floor(x0) + 1,
             "ymin": math.floor(y0) + 1,
@@ -174,6 +133,3 @@ def _add(parent: ElementTree.Element, fields: Mapping[str, Any]) -> None:
 def _indexed(sample: Sample, name: str, numbers: NDArray[np.uint8]) -> Coded:
     """A map (H, W) in VOC's palette."""
     return Coded(sample.index, f"voc {name}.png", lambda: encode_png(numbers, palette=palette()))
-
-
-preparer, writer, verify = functions(Voc)
