@@ -1,0 +1,628 @@
+"""Formats without a public reader that installs, read a second time, from their documentation alone (formats.md of the
+project's reference), by readers that were written without a look at what writes them.
+"""
+
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from proven import close, equal
+from viewsphere import Dataset, generate
+from viewsphere.run.exporting import export
+from worlds import poses as poses_recipe
+from worlds import videos as videos_recipe
+
+CENTRE = 0.5  # from an origin at the first pixel's centre to one at the picture's corner
+
+
+# ---- what the readers share ----------------------------------------------------------------------------------------------
+
+
+def written(dataset, place, name, **options):
+    export(dataset.root, [{name: options}], output=place)
+    return place / name
+
+
+def pixels(path):
+    """A PNG of 8 or 16 bits, its channels red, green and blue."""
+    found = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    return found if found.ndim == 2 else found[..., ::-1]
+
+
+def table(path):
+    """The rows of a text with a line of column names, as mappings."""
+    names, *rows = (line.split() for line in Path(path).read_text().splitlines())
+    assert all(len(row) == len(names) for row in rows)
+    return [dict(zip(names, row, strict=True)) for row in rows]
+
+
+def numbers(row, *names):
+    return np.array([float(row[name]) for name in names])
+
+
+def about(axis, angle):
+    """The rotation about one axis, right-handed."""
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    found = np.eye(3)
+    found[[i, i, j, j], [i, j, i, j]] = c, -s, s, c
+    return found
+
+
+def projected(K, points):
+    """Points (N, 3) before the camera in pixels."""
+    found = points @ np.asarray(K).T
+    return found[:, :2] / found[:, 2:]
+
+
+def known(o):
+    return np.isfinite(o.box3d_pixels).all()
+
+
+def near_and_far(depth, sample, unit, top):
+    """Compare decoded depth: what is told is the label within half a unit, the rest is nothing, or farther than can be told."""
+    told = np.isfinite(depth)
+    assert not np.isfinite(sample.depth[~told & (sample.depth < top)]).any()
+    assert told.any()
+    return depth[told], sample.depth[told], unit / 2 + 1e-6
+
+
+# ---- Virtual KITTI -------------------------------------------------------------------------------------------------------
+
+UNREAL_FRAME = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
+"""From the data set's world (z up) to Virtual KITTI's (y down): `rotation_world_space`, `world_space` and extrinsics."""
+
+
+def vkitti_flow(path):
+    """README: (2 / 65535 v - 1) (W - 1), likewise of the height; blue 0 is invalid."""
+    found = pixels(path).astype(float)
+    height, width = found.shape[:2]
+    flow = (2 / 65535 * found[..., :2] - 1) * [width - 1, height - 1]
+    flow[found[..., 2] == 0] = np.nan
+    return flow
+
+
+def vkitti_scene_flow(path):
+    return (pixels(path).astype(float) * 2 / 65535 - 1) * 10
+
+
+def vkitti_depth(path):
+    found = pixels(path)
+    assert found.dtype == np.uint16
+    return np.where(found == 65535, np.inf, found / 100)
+
+
+def turned(y, x, z):
+    """What turns a car of Virtual KITTI (x to its right, y down, z ahead; rotation 0 looks along x)."""
+    return about("y", y + np.pi / 2) @ about("x", x) @ about("z", z)
+
+
+CAR = np.array([[-1, 0, 0], [0, 0, -1], [0, -1, 0]], float)
+"""From the axes right, down, ahead to those of the data set's objects (x to their left, -y ahead, z up)."""
+
+
+def vkitti_corners(place, size, rotation):
+    """Corners in the order of the data set of a box that stands on `place`."""
+    width, height, length = size
+    left, ahead, up = (np.array(s, float) for s in zip(*SIGNS, strict=True))
+    ahead = -ahead
+    local = np.stack([-left * width / 2, -(up + 1) / 2 * height, ahead * length / 2], axis=-1)
+    return local @ rotation.T + place
+
+
+SIGNS = [(1, 1, -1), (1, -1, -1), (-1, -1, -1), (-1, 1, -1), (1, 1, 1), (1, -1, 1), (-1, -1, 1), (-1, 1, 1)]
+
+
+def check_flows(name, sample, flow, label):
+    """Flow is the label within half a step where it is told; untold is what is unknown, or leads too far."""
+    height, width = flow.shape[:2]
+    far = (np.abs(label) > [width - 1, height - 1]).any(axis=-1)
+    assert np.array_equal(np.isnan(flow[..., 0]), np.isnan(label[..., 0]) | far)
+    told = ~np.isnan(flow[..., 0])
+    if told.any():
+        step = max(width, height) / 65535
+        close("vkitti", f"second reader: {name}", flow[told], label[told], "px", atol=step + 1e-5)
+    return int((np.abs(label[told]) > 1).sum())
+
+
+def check_scene_flow(found, label):
+    told = np.isfinite(label).all(axis=-1) & (np.abs(label) < 10).all(axis=-1)
+    close("vkitti", "second reader: scene flow", found[told], label[told], "m", atol=10 / 65535 + 1e-6)
+
+
+def points_of(sample):
+    """The seen points (H, W, 3) in the camera, metres, by the labels' depth."""
+    rows, columns = np.indices(sample.depth.shape) + CENTRE
+    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(sample.camera.K).T
+    return rays * sample.depth.astype(float)[..., None]
+
+
+def rigid(camera):
+    return np.vstack([np.column_stack([camera.R, camera.t]), [0, 0, 0, 1]])
+
+
+def motion_back(sample, before):
+    """The motion of the seen points to the instant before, each in its own camera's axes, by poses of objects and cameras."""
+    points = points_of(sample)
+    found = np.full(points.shape, np.nan)
+    earlier = {o.id: o.camera_from_object for o in before.objects}
+    motions = {o.id: earlier[o.id] @ np.linalg.inv(o.camera_from_object) for o in sample.objects}
+    motions[0] = rigid(before.camera) @ np.linalg.inv(rigid(sample.camera))
+    for number, motion in motions.items():
+        there = (sample.instances == number) & np.isfinite(sample.depth)
+        found[there] = points[there] @ motion[:3, :3].T + motion[:3, 3] - points[there]
+    return found
+
+
+@pytest.fixture(scope="module")
+def vkitti2(videos, tmp_path_factory):
+    return written(videos, tmp_path_factory.mktemp("vkitti2"), "vkitti", version="2")
+
+
+def scenes(dataset):
+    """Samples by sequence, by the order of sensors and the instant."""
+    found: dict[str, dict] = {}
+    for sample in dataset:
+        cameras = found.setdefault(sample.sequence, {})
+        cameras[sample.instant, ("left", "right").index(sample.sensor) if sample.sensor != "camera" else 0] = sample
+    return found
+
+
+def test_vkitti_2_pictures(videos, vkitti2):
+    moved = 0
+    for sequence, samples in scenes(videos).items():
+        frames = vkitti2 / f"Scene{sequence}" / "clone" / "frames"
+        last = max(instant for instant, _ in samples)
+        colors = {tuple(map(int, numbers(row, "r", "g", "b"))): row["Category"] for row in table(frames.parent / "colors.txt")}
+        for (instant, camera), sample in samples.items():
+
+            def at(kind, name, instant=instant, camera=camera, frames=frames):
+                return frames / kind / f"Camera_{camera}" / f"{name}_{instant:05d}.png"
+
+            found, expected, atol = near_and_far(vkitti_depth(at("depth", "depth")), sample, 0.01, 655.34)
+            close("vkitti", "second reader: depth", found, expected, "m", atol=atol)
+            with Image.open(at("instanceSegmentation", "instancegt")) as picture:
+                assert picture.mode in ("P", "L")
+                equal("vkitti", "second reader: instances", np.asarray(picture), sample.instances)  # track id + 1
+            classes = pixels(at("classSegmentation", "classgt"))
+            for o in sample.objects:
+                names = {colors[tuple(map(int, c))] for c in np.unique(classes[o.mask], axis=0)}
+                assert not o.area or names == {"Car" if o.category == "car" else o.category}
+            assert at("forwardFlow", "flow").exists() == (instant < last)
+            assert at("backwardFlow", "backwardFlow").exists() == (instant > 0)
+            if instant < last:
+                flow = vkitti_flow(at("forwardFlow", "flow"))
+                moved += check_flows("flow", sample, flow, sample.flow)
+                check_scene_flow(vkitti_scene_flow(at("forwardSceneFlow", "sceneFlow")), sample.scene_flow)
+            if instant:
+                flow = vkitti_flow(at("backwardFlow", "backwardFlow"))
+                check_flows("backward flow", sample, flow, sample.flow_backward)
+                label = motion_back(sample, samples[instant - 1, camera])
+                check_scene_flow(vkitti_scene_flow(at("backwardSceneFlow", "backwardSceneFlow")), label)
+    assert moved > 1000
+
+
+def test_vkitti_2_texts(videos, vkitti2):
+    for sequence, samples in scenes(videos).items():
+        folder = vkitti2 / f"Scene{sequence}" / "clone"
+        texts = {name: table(folder / f"{name}.txt") for name in ("intrinsic", "extrinsic", "bbox", "pose", "info")}
+        of = {name: {} for name in texts}
+        for name in ("intrinsic", "extrinsic", "bbox", "pose"):
+            for row in texts[name]:
+                key = (int(row["frame"]), int(row["cameraID"]))
+                of[name].setdefault(key, {})[int(row.get("trackID", 0))] = row
+        labels = {int(row["trackID"]): row["label"] for row in texts["info"]}
+        assert of["intrinsic"].keys() == of["extrinsic"].keys() == samples.keys()
+        for key, sample in samples.items():
+            row = of["intrinsic"][key][0]
+            K = np.diag([*numbers(row, "K[0,0]", "K[1,1]"), 1.0])
+            K[:2, 2] = numbers(row, "K[0,2]", "K[1,2]") + CENTRE
+            close("vkitti", "second reader: intrinsics", K, sample.camera.K, "px", atol=1e-9)
+            line = next(x for x in (folder / "extrinsic.txt").read_text().splitlines()[1:] if x.split()[:2] == [*map(str, key)])
+            motion = np.array(line.split()[2:], float).reshape(4, 4)
+            seen = {o.id - 1: o for o in sample.objects if o.area}
+            assert of["bbox"].get(key, {}).keys() == of["pose"].get(key, {}).keys() == seen.keys()
+            for track, o in seen.items():
+                assert labels[track] == ("Car" if o.category == "car" else o.category)
+                check_vkitti_box(of["bbox"][key][track], o)
+                check_vkitti_pose(of["pose"][key][track], o, motion, K)
+
+
+def check_vkitti_box(row, o):
+    left, right, top, down = numbers(row, "left", "right", "top", "bottom")
+    close("vkitti", "second reader: boxes", (left, top, right + 1, down + 1), o.box2d, "px")
+    assert int(row["number_pixels"]) == o.area
+    close("vkitti", "second reader: truncation", float(row["truncation_ratio"]), o.truncation, atol=1e-9)
+    share = o.area / ((right - left + 1) * (down - top + 1))
+    close("vkitti", "second reader: occupancy", float(row["occupancy_ratio"]), share, atol=1e-9)
+    assert row["isMoving"] == str(bool(np.linalg.norm(o.velocity) > 1e-6))
+
+
+def check_vkitti_pose(row, o, motion, K):
+    size = numbers(row, "width", "height", "length")
+    x, y, z = o.box3d_object.max(axis=0) - o.box3d_object.min(axis=0)
+    close("vkitti", "second reader: sizes", size, (x, z, y), "m", atol=1e-6)
+    placed = {}
+    for space in ("world", "camera"):
+        place = numbers(row, *(f"{space}_space_{a}" for a in "XYZ"))
+        rotation = turned(*numbers(row, *(f"rotation_{space}_space_{a}" for a in "yxz")))
+        placed[space] = vkitti_corners(place, size, rotation)
+    close("vkitti", "second reader: corners in the camera", placed["camera"], o.box3d_camera, "m", atol=1e-6)
+    close("vkitti", "second reader: corners in the world", placed["world"], o.box3d @ UNREAL_FRAME.T, "m", atol=1e-6)
+    moved = placed["world"] @ motion[:3, :3].T + motion[:3, 3]
+    close("vkitti", "second reader: extrinsics", moved, o.box3d_camera, "m", atol=1e-6)
+    if known(o):
+        close("vkitti", "second reader: projected", projected(K, moved), o.box3d_pixels, "px", atol=1e-3)
+    at = numbers(row, "camera_space_X", "camera_space_Z")
+    alpha = float(row["rotation_camera_space_y"]) - np.arctan2(*at)
+    turn = (float(row["alpha"]) - alpha + np.pi) % (2 * np.pi) - np.pi
+    close("vkitti", "second reader: alpha", turn, 0, "rad", atol=1e-9)
+
+
+ONE_EYE = ["occlusion_level", "truncation_level", "velocity"]
+
+
+@pytest.fixture(scope="module")
+def one_eye(tmp_path_factory):
+    """Videos of one camera, which version 1.3.1 wants."""
+    out = tmp_path_factory.mktemp("one_eye") / "data"
+    channels = ["rgb", "depth", "instances", "semantic", "flow", "flow_state"]
+    return Dataset(Path(generate_one(out, channels)))
+
+
+def generate_one(out, channels):
+    told = {"rig": None, "channels": channels, "tracks": None, "time": {"frames": 3, "fps": 10}, "annotations": ONE_EYE}
+    generate(videos_recipe(**told), out, workers=0)
+    return out
+
+
+def test_vkitti_1(one_eye, tmp_path):
+    root = written(one_eye, tmp_path, "vkitti", version="1.3.1")
+    for sequence, samples in scenes(one_eye).items():
+        (told,) = (root / "vkitti_1.3.1_motgt").glob(f"{sequence}_*.txt")
+        variation = told.stem.removeprefix(f"{sequence}_")
+        rows = table(told)
+        extrinsics = np.loadtxt(root / "vkitti_1.3.1_extrinsicsgt" / told.name, skiprows=1)
+        assert len(rows[0]) == 25 and extrinsics.shape[1] == 17
+        encoding = table(root / "vkitti_1.3.1_scenegt" / f"{told.stem}_scenegt_rgb_encoding.txt")
+        last = max(instant for instant, _ in samples)
+        for (instant, _), sample in samples.items():
+
+            def at(kind, instant=instant, sequence=sequence, variation=variation):
+                return root / f"vkitti_1.3.1_{kind}" / sequence / variation / f"{instant:05d}.png"
+
+            equal("vkitti", "second reader: pictures", pixels(at("rgb")), sample.rgb)
+            found, expected, atol = near_and_far(vkitti_depth(at("depthgt")), sample, 0.01, 655.34)
+            close("vkitti", "second reader: depth", found, expected, "m", atol=atol)
+            assert at("flowgt").exists() == (instant < last)
+            if instant < last:
+                check_flows("flow", sample, vkitti_flow(at("flowgt")), sample.flow)
+            check_scene_colours(pixels(at("scenegt")), encoding, sample)
+            motion = extrinsics[extrinsics[:, 0] == instant][0, 1:].reshape(4, 4)
+            mine = [row for row in rows if int(row["frame"]) == instant]
+            seen = {o.id - 1: o for o in sample.objects if o.area}
+            assert {int(row["tid"]) for row in mine} == seen.keys()
+            for row in mine:
+                check_motgt(row, seen[int(row["tid"])], motion)
+
+
+def check_scene_colours(found, encoding, sample):
+    """Every object, and every class of all else, is of the colour that the text says."""
+    names = list(encoding[0])
+    told = {row[names[0]]: tuple(int(row[name]) for name in names[1:4]) for row in encoding}
+    by = {}
+    for o in sample.objects:
+        if o.area:
+            (colour,) = {tuple(map(int, c)) for c in found[o.mask]}
+            by[o.id] = colour
+            assert colour in told.values()
+    assert len(set(by.values())) == len(by)
+    assert not {tuple(map(int, c)) for c in np.unique(found[sample.instances == 0], axis=0)} & set(by.values())
+
+
+def check_motgt(row, o, motion):
+    left, top, right, down = numbers(row, *"ltrb")
+    close("vkitti", "second reader: boxes", (left, top, right + 1, down + 1), o.box2d, "px")
+    size = numbers(row, "w3d", "h3d", "l3d")
+    corners = vkitti_corners(numbers(row, "x3d", "y3d", "z3d"), size, turned(*numbers(row, "ry", "rx", "rz")))
+    close("vkitti", "second reader: corners in the camera", corners, o.box3d_camera, "m", atol=1e-6)
+    world = (corners - motion[:3, 3]) @ motion[:3, :3]
+    close("vkitti", "second reader: extrinsics", world, o.box3d @ UNREAL_FRAME.T, "m", atol=1e-6)
+    close("vkitti", "second reader: truncation", float(row["truncr"]), o.truncation, atol=1e-9)
+    box = (right - left + 1) * (down - top + 1)
+    close("vkitti", "second reader: occupancy", float(row["occupr"]), o.area / box, atol=1e-9)
+    assert int(row["occluded"]) == o.occlusion_level
+    assert row["label"] == ("Car" if o.category == "car" else o.category)
+    assert row["moving"] == str(int(np.linalg.norm(o.velocity) > 1e-6))
+
+
+# ---- a camera that is rolled, which the shared data sets have not ---------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def tilted(tmp_path_factory):
+    """Pictures of a camera that rolls, looks down and up, at models one at a time, some of them cut off."""
+    out = tmp_path_factory.mktemp("tilted") / "data"
+    views = {"azimuth": [40, 250], "elevation": [25, -15], "tilt": [30], "distance": 2.0}
+    generate(poses_recipe(viewpoints=views, scene={"ground": False}), out, workers=0)
+    return Dataset(out)
+
+
+@pytest.fixture(scope="module", params=["stills", "tilted"])
+def views(request):
+    return request.getfixturevalue(request.param)
+
+
+# ---- CARLA ---------------------------------------------------------------------------------------------------------------
+
+TAGS = {"sky": 11, "ground": 25, "car": 14, "chair": 21, "post_box": 21}
+
+
+def carla_matrix(transform):
+    """What `carla.Transform` does: from the thing's axes (ahead, right, up) to Unreal's world, left-handed."""
+    turn = transform["rotation"]
+    (cp, cy, cr), (sp, sy, sr) = (
+        [f(np.radians(turn[n])) for n in ("pitch", "yaw", "roll")] for f in (np.cos, np.sin)
+    )
+    found = np.eye(4)
+    found[:3, :3] = [
+        [cp * cy, cy * sp * sr - sy * cr, -cy * sp * cr - sy * sr],
+        [cp * sy, sy * sp * sr + cy * cr, -sy * sp * cr + cy * sr],
+        [sp, -cp * sr, cp * cr],
+    ]
+    found[:3, 3] = [transform["location"][a] for a in "xyz"]
+    return found
+
+
+def carla_K(row):
+    width, height = row["image_size_x"], row["image_size_y"]
+    focal = width / (2 * np.tan(np.radians(row["fov"]) / 2))
+    return np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
+
+
+def test_carla(views, tmp_path):
+    root = written(views, tmp_path, "carla")
+    for split in views.splits:
+        folder = root / split / "camera"
+        frames = {row["frame"]: row for row in json.loads((folder / "transforms.json").read_text())}
+        samples = {sample.index: sample for sample in views if sample.split == split}
+        assert frames.keys() == samples.keys()
+        for index, sample in samples.items():
+            name = f"{index:08d}"
+            code = pixels(folder / "depth" / f"{name}.png").astype(np.int64) @ [1, 256, 65536]
+            depth = 1000 * code / (256**3 - 1)
+            told = np.isfinite(sample.depth)
+            close("carla", "second reader: depth", depth[told], sample.depth[told], "m", atol=3.1e-5)
+            assert (depth[~told] == 1000).all()
+            tags = pixels(folder / "semantic_segmentation" / f"{name}.png")
+            expected = np.full(tags.shape[:2], TAGS["sky"])
+            expected[sample.semantic == 2] = TAGS["ground"]
+            for o in sample.objects:
+                expected[sample.instances == o.id] = TAGS[o.category]
+            equal("carla", "second reader: tags", tags[..., 0], expected)
+            instances = pixels(folder / "instance_segmentation" / f"{name}.png").astype(int)
+            equal("carla", "second reader: tags", instances[..., 0], expected)
+            equal("carla", "second reader: instances", instances[..., 1:] @ [1, 256], sample.instances)
+            row = frames[index]
+            check_carla_boxes(json.loads((folder / "bounding_boxes" / f"{name}.json").read_text()), row, sample)
+
+
+def check_carla_boxes(boxes, row, sample):
+    to_camera = np.linalg.inv(carla_matrix(row["transform"]))
+    close("carla", "second reader: intrinsics", carla_K(row), sample.camera.K, "px", atol=1e-9)
+    assert {box["id"] for box in boxes} == {o.id for o in sample.objects}
+    for box in boxes:
+        (o,) = (o for o in sample.objects if o.id == box["id"])
+        assert box["type_id"] == o.category and box["semantic_tag"] == TAGS[o.category]
+        left, back, up = np.array(SIGNS, float).T
+        local = np.stack([-back, -left, up], axis=-1) * [box["extent"][a] for a in "xyz"]
+        motion = carla_matrix(box["transform"])
+        world = local @ motion[:3, :3].T + motion[:3, 3]
+        close("carla", "second reader: corners in the world", world * [1, -1, 1], o.box3d, "m", atol=1e-6)
+        seen = world @ to_camera[:3, :3].T + to_camera[:3, 3]
+        seen = np.stack([seen[:, 1], -seen[:, 2], seen[:, 0]], axis=-1)
+        close("carla", "second reader: corners in the camera", seen, o.box3d_camera, "m", atol=1e-6)
+        if known(o):
+            found = projected(carla_K(row), seen)
+            close("carla", "second reader: projected", found, o.box3d_pixels, "px", atol=1e-3)
+
+
+# ---- AirSim --------------------------------------------------------------------------------------------------------------
+
+AIRSIM = ["scene", "depth_planar", "depth_perspective", "segmentation", "infrared"]
+
+
+def airsim_pfm(path):
+    """Rows from the top, as AirSim writes them."""
+    kind, size, scale, body = path.read_bytes().split(b"\n", 3)
+    width, height = map(int, size.split())
+    assert kind == b"Pf"
+    return np.frombuffer(body, "<f4" if float(scale) < 0 else ">f4").reshape(height, width)
+
+
+def airsim_log(folder):
+    names, *rows = ((folder / "airsim_rec.txt").read_text().rstrip("\n")).split("\n")
+    return [dict(zip(names.split("\t"), row.split("\t"), strict=True)) for row in rows]
+
+
+def quaternion_matrix(w, x, y, z):
+    """q p q*, of a unit quaternion."""
+    v, I = np.array([x, y, z]), np.eye(3)  # noqa: E741
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return (w * w - v @ v) * I + 2 * np.outer(v, v) + 2 * w * cross
+
+
+def check_airsim_pose(row, sample):
+    turn = quaternion_matrix(*numbers(row, "Q_W", "Q_X", "Q_Y", "Q_Z"))
+    place = numbers(row, "POS_X", "POS_Y", "POS_Z")
+    for o in sample.objects:
+        east, north, up = o.box3d.T
+        body = (np.stack([north, east, -up], axis=-1) - place) @ turn
+        found = np.stack([body[:, 1], body[:, 2], body[:, 0]], axis=-1)
+        close("airsim", "second reader: corners in the camera", found, o.box3d_camera, "m", atol=1e-6)
+
+
+def check_airsim_images(folder, row, sample, colours):
+    files = {int(name.split("_")[-2]): folder / "images" / name for name in row["ImageFile"].split(";")}
+    equal("airsim", "second reader: pictures", pixels(files[0]), sample.rgb)
+    for kind, label in ((1, sample.depth), (2, sample.depth_ray)):
+        told, found = np.isfinite(label), airsim_pfm(files[kind])
+        close("airsim", "second reader: depth", found[told], label[told], "m")
+        assert (found[~told] == 65504).all()
+    if 4 in files:
+        told, found = np.isfinite(sample.disparity), airsim_pfm(files[4]).astype(float) * sample.width
+        close("airsim", "second reader: disparity", found[told], sample.disparity[told], "px", atol=1e-5)
+        assert (found[~told] == 0).all()
+    equal("airsim", "second reader: segmentation", pixels(files[5]), colours[sample.instances])
+    shade = pixels(files[7])
+    equal("airsim", "second reader: infrared", shade, np.broadcast_to(sample.instances[..., None], shade.shape))
+
+
+def airsim_colours(root):
+    rows = [line.split("\t") for line in (root / "seg_rgbs.txt").read_text().splitlines()]
+    assert [int(number) for number, _ in rows] == list(range(len(rows)))
+    return np.array([json.loads(colour) for _, colour in rows])
+
+
+def test_airsim_videos(videos, tmp_path):
+    root = written(videos, tmp_path, "airsim", images=[*AIRSIM, "disparity_normalized"])
+    colours = airsim_colours(root)
+    for sequence, samples in scenes(videos).items():
+        rows = airsim_log(root / sequence)
+        assert len(rows) == len(samples)
+        for row in rows:
+            (sample,) = (
+                s for s in samples.values() if s.sensor == row["VehicleName"] and round(s.time * 1000) == int(row["TimeStamp"])
+            )
+            check_airsim_pose(row, sample)
+            check_airsim_images(root / sequence, row, sample, colours)
+
+
+def test_airsim_pictures(views, tmp_path):
+    root = written(views, tmp_path, "airsim", images=AIRSIM)
+    for split in views.splits:
+        settings = json.loads((root / split / "settings.json").read_text())
+        told = settings["Vehicles"]["camera"]["Cameras"]["0"]["CaptureSettings"][0]
+        for row in airsim_log(root / split):
+            (sample,) = (s for s in views if s.index == int(row["TimeStamp"]))
+            assert sample.split == split
+            focal = told["Width"] / 2 / np.tan(np.radians(told["FOV_Degrees"]) / 2)
+            close("airsim", "second reader: angle of view", focal, sample.camera.K[0, 0], "px", atol=1e-9)
+            check_airsim_pose(row, sample)
+            check_airsim_images(root / split, row, sample, airsim_colours(root))
+
+
+# ---- NOCS ----------------------------------------------------------------------------------------------------------------
+
+UPRIGHT = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
+"""From the axes of the data set's objects (x left, -y ahead, z up) to those of NOCS' models (x left, y up, z ahead)."""
+
+
+def obj_vertices(path):
+    return np.array([line.split()[1:4] for line in path.read_text().splitlines() if line.startswith("v ")], float)
+
+
+def test_nocs(views, tmp_path):
+    root = written(views, tmp_path, "nocs")
+    for sample in views:
+        (colour,) = (root / "real" / sample.split).glob(f"*/{sample.index % 1000:04d}_color.png")
+        beginning = str(colour).removesuffix("color.png")
+        depth = cv2.imread(beginning + "depth.png", -1)
+        assert depth.dtype == np.uint16 and depth.ndim == 2
+        told = np.isfinite(sample.depth) & (sample.depth < 65.535)
+        close("nocs", "second reader: depth", depth[told] / 1000, sample.depth[told], "m", atol=5.1e-4)
+        assert not depth[~told].any()
+        mask = cv2.imread(beginning + "mask.png")[..., 2].astype(int)
+        equal("nocs", "second reader: mask", np.where(mask == 255, 0, mask), sample.instances)
+        coord = cv2.imread(beginning + "coord.png")[..., (2, 1, 0)] / 255
+        coord[..., 2] = 1 - coord[..., 2]
+        inside = sample.instances > 0
+        expected = (sample.nocs[inside] - 0.5) @ UPRIGHT.T + 0.5
+        close("nocs", "second reader: coordinates", coord[inside], expected, "", atol=0.5 / 255 + 1e-6)
+        rows = [line.split() for line in Path(beginning + "meta.txt").read_text().splitlines()]
+        assert [(int(a), int(b), c) for a, b, c in rows] == [(o.id, o.category_id, o.key) for o in sample.objects]
+        scene = colour.parent.name
+        found = pickle.loads(
+            (root / "gts" / f"real_{sample.split}" / f"results_real_{sample.split}_{scene}_{sample.index % 1000:04d}.pkl").read_bytes()
+        )
+        models = {o.key: root / "obj_models" / f"real_{sample.split}" / f"{o.key}.obj" for o in sample.objects}
+        check_nocs_poses(found, sample, models, coord)
+
+
+def check_nocs_poses(found, sample, models, coord):
+    seen = [o for o in sample.objects if o.area]
+    assert list(found["gt_class_ids"]) == [o.category_id for o in seen]
+    boxes = np.array(found["gt_bboxes"])[:, [1, 0, 3, 2]]
+    close("nocs", "second reader: boxes", boxes, [o.box2d for o in seen], "px")
+    K = found["intrinsics"] + np.array([[0, 0, CENTRE], [0, 0, CENTRE], [0, 0, 0]])
+    close("nocs", "second reader: intrinsics", K, sample.camera.K, "px", atol=1e-9)
+    for o, pose, scales in zip(seen, found["gt_RTs"], found["gt_scales"], strict=True):
+        local = np.array(SIGNS) @ UPRIGHT.T * scales / 2
+        corners = local @ pose[:3, :3].T + pose[:3, 3]
+        close("nocs", "second reader: corners in the camera", corners, o.box3d_camera, "m", atol=1e-5)
+        diagonal = np.cbrt(np.linalg.det(pose[:3, :3]))
+        points = (coord[o.mask] - 0.5) @ pose[:3, :3].T + pose[:3, 3]
+        error = 0.5 / 255 * diagonal * np.sqrt(3)
+        close("nocs", "second reader: points in the camera", points, points_of(sample)[o.mask], "m", atol=error + 1e-5)
+        extents = np.loadtxt(models[o.key].with_suffix(".txt"))
+        close("nocs", "second reader: extents", extents, scales * diagonal, "m", atol=1e-6)
+        vertices = obj_vertices(models[o.key])
+        close("nocs", "second reader: mesh", np.ptp(vertices, axis=0), extents, "m", atol=1e-6)
+        if o.box2d_unclipped:
+            shown = projected(K, vertices / diagonal @ pose[:3, :3].T + pose[:3, 3])
+            around = (*shown.min(axis=0), *shown.max(axis=0))
+            close("nocs", "second reader: projected mesh", around, o.box2d_unclipped, "px", atol=1e-3)
+
+
+# ---- Omni3D --------------------------------------------------------------------------------------------------------------
+
+
+def test_omni3d(views, tmp_path):
+    root = written(views, tmp_path, "omni3d")
+    read = 0
+    for split in views.splits:
+        told = json.loads((root / "Omni3D" / f"viewsphere_{split}.json").read_text())
+        images = {image["id"]: image for image in told["images"]}
+        names = {category["id"]: category["name"] for category in told["categories"]}
+        for found in told["annotations"]:
+            image = images[found["image_id"]]
+            (sample,) = (s for s in views if s.index == int(Path(image["file_path"]).stem))
+            assert sample.split == split and (root / image["file_path"]).is_file()
+            close("omni3d", "second reader: intrinsics", image["K"], sample.camera.K, "px", atol=1e-9)
+            (o,) = (o for o in sample.objects if o.id == found["track_id"])
+            assert names[found["category_id"]] == found["category_name"] == o.category
+            check_omni3d(found, o, image)
+            read += 1
+    assert read == sum(len(sample.objects) for sample in views)
+
+
+def check_omni3d(found, o, image):
+    width, height, length = found["dimensions"]
+    center, turn = np.array(found["center_cam"]), np.array(found["R_cam"])
+    close("omni3d", "second reader: rotation", np.linalg.det(turn), 1, atol=1e-9)
+    left, back, up = np.array(SIGNS, float).T
+    local = np.stack([-back * length / 2, -up * height / 2, left * width / 2], axis=-1)
+    corners = local @ turn.T + center
+    close("omni3d", "second reader: corners in the camera", corners, o.box3d_camera, "m", atol=1e-6)
+    ordered = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)])
+    told = np.array(found["bbox3D_cam"])  # as Cube R-CNN orders them: length along x, height along y, width along z
+    close("omni3d", "second reader: bbox3D_cam", told, ordered * [length, height, width] / 2 @ turn.T + center, "m", atol=1e-6)
+    if not found["behind_camera"]:
+        shown = projected(image["K"], told)
+        around = np.array((*shown.min(axis=0), *shown.max(axis=0)))
+        close("omni3d", "second reader: bbox2D_proj", found["bbox2D_proj"], around, "px", atol=1e-6)
+        cut = np.clip(around, 0, [image["width"], image["height"]] * 2)
+        if (cut[2:] > cut[:2]).all():
+            close("omni3d", "second reader: bbox2D_trunc", found["bbox2D_trunc"], cut, "px", atol=1e-6)
+    assert found["behind_camera"] == bool((o.box3d_camera[:, 2] <= 0).any())
+    close("omni3d", "second reader: bbox2D_tight", found["bbox2D_tight"], o.box2d or [-1] * 4, "px")
+    close("omni3d", "second reader: visibility", found["visibility"], o.visibility, atol=1e-9)
+    close("omni3d", "second reader: truncation", found["truncation"], o.truncation, atol=1e-9)
+    assert found["segmentation_pts"] == o.area and found["lidar_pts"] == -1 and found["depth_error"] == -1
