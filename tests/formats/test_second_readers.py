@@ -538,7 +538,7 @@ def test_nocs(views, tmp_path):
         assert depth.dtype == np.uint16 and depth.ndim == 2
         told = np.isfinite(sample.depth) & (sample.depth < 65.535)
         close("nocs", "second reader: depth", depth[told] / 1000, sample.depth[told], "m", atol=5.1e-4)
-        assert not depth[~told].any()
+        assert (depth[~told] == np.where(np.isfinite(sample.depth[~told]), 65535, 0)).all()  # farther counts as 65.535 m
         mask = cv2.imread(beginning + "mask.png")[..., 2].astype(int)
         equal("nocs", "second reader: mask", np.where(mask == 255, 0, mask), sample.instances)
         coord = cv2.imread(beginning + "coord.png")[..., (2, 1, 0)] / 255
@@ -626,3 +626,231 @@ def check_omni3d(found, o, image):
     close("omni3d", "second reader: visibility", found["visibility"], o.visibility, atol=1e-9)
     close("omni3d", "second reader: truncation", found["truncation"], o.truncation, atol=1e-9)
     assert found["segmentation_pts"] == o.area and found["lidar_pts"] == -1 and found["depth_error"] == -1
+
+
+# ---- KITTI: depth, and tracking ------------------------------------------------------------------------------------------
+
+
+def calibration(path):
+    lines = (line.replace(":", " ").split() for line in path.read_text().splitlines())
+    found = {name: rest for name, *rest in lines}
+    return {name: np.array(rest, float) for name, rest in found.items() if all(_is_number(value) for value in rest)}
+
+
+def _is_number(text):
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def centred(P):
+    """A projection whose origin is the first pixel's centre, for pixels from the picture's corner."""
+    return np.array([[1, 0, CENTRE], [0, 1, CENTRE], [0, 0, 1]]) @ P.reshape(3, 4)
+
+
+def test_kitti_depth(videos, tmp_path):
+    root = written(videos, tmp_path, "kitti_depth")
+    for sequence, samples in scenes(videos).items():
+        for (instant, camera), sample in samples.items():
+            folder = root / sample.split / sequence
+            name = f"image_0{2 + camera}"
+            equal("kitti_depth", "second reader: pictures", pixels(folder / name / "data" / f"{instant:010d}.png"), sample.rgb)
+            depth = pixels(folder / "proj_depth" / "groundtruth" / name / f"{instant:010d}.png")
+            assert depth.dtype == np.uint16
+            told = depth > 0
+            assert (told == (np.isfinite(sample.depth) & (sample.depth < 255.99))).mean() > 0.999
+            assert not np.isfinite(sample.depth[~told & (sample.depth < 255.99)]).any()
+            close("kitti_depth", "second reader: depth", depth[told] / 256, sample.depth[told], "m", atol=1 / 512 + 1e-5)
+            told = calibration(folder / "calib_cam_to_cam.txt")
+            size = told[f"S_rect_0{2 + camera}"]
+            assert list(size) == [sample.width, sample.height]
+            P = centred(told[f"P_rect_0{2 + camera}"])
+            left = samples[instant, 0]
+            for o, other in zip(sample.objects, left.objects, strict=True):
+                assert o.id == other.id
+                corners = np.column_stack([other.box3d_camera, np.ones(8)])
+                close("kitti_depth", "second reader: projected", projected(P, corners), o.box3d_pixels, "px", atol=1e-6)
+
+
+TRACKING = "frame id type truncated occluded alpha left top right bottom height width length x y z rotation_y".split()
+
+
+def test_kitti_tracking(drives, tmp_path):
+    root = written(drives, tmp_path, "kitti", task="tracking")
+    training = root / "training"
+    names = [line.split() for line in (root / "evaluate_tracking.seqmap.training").read_text().splitlines()]
+    sequences: dict[str, list] = {}
+    for sample in drives:
+        sequences.setdefault(sample.sequence, []).append(sample)
+    assert [(int(row[0]), int(row[-1]) - int(row[-2])) for row in names] == [(0, 5), (1, 5)]
+    for number, samples in enumerate(sequences.values()):
+        told = calibration(training / "calib" / f"{number:04d}.txt")
+        rows = [line.split(" ") for line in (training / "label_02" / f"{number:04d}.txt").read_text().splitlines()]
+        rows = [dict(zip(TRACKING, row, strict=True)) for row in rows]
+        for sample in samples:
+            if sample.sensor == "top":
+                left = next(s for s in samples if s.instant == sample.instant and s.sensor == "left")
+                cloud = np.fromfile(training / "velodyne" / f"{number:04d}" / f"{sample.instant:06d}.bin", "<f4").reshape(-1, 4)
+                check_velodyne(cloud, told["Tr_velo_cam"].reshape(3, 4), sample, left)
+            else:
+                P = centred(told["P2" if sample.sensor == "left" else "P3"])
+                left = next(s for s in samples if s.instant == sample.instant and s.sensor == "left")
+                for o, other in zip(sample.objects, left.objects, strict=True):
+                    corners = np.column_stack([other.box3d_camera, np.ones(8)])
+                    close("kitti", "second reader: projected", projected(P, corners), o.box3d_pixels, "px", atol=1e-6)
+            if sample.sensor == "left":
+                mine = {int(row["id"]): row for row in rows if int(row["frame"]) == sample.instant}
+                seen = {o.id: o for o in sample.objects if o.area}
+                assert mine.keys() == seen.keys()
+                for track, row in mine.items():
+                    check_kitti_row(row, seen[track])
+
+
+def check_kitti_row(row, o):
+    assert row["type"] == ("Car" if o.category == "car" else o.category)
+    left, top, right, down = numbers(row, "left", "top", "right", "bottom")
+    close("kitti", "second reader: boxes", (left, top, right + 1, down + 1), o.box2d, "px")
+    assert int(row["truncated"]) == o.truncation_level and int(row["occluded"]) == o.occlusion_level
+    x, y, z = np.ptp(o.box3d_object, axis=0)
+    close("kitti", "second reader: sizes", numbers(row, "width", "height", "length"), (x, z, y), "m", rtol=1e-8)
+    middle = numbers(row, "x", "y", "z") - [0, float(row["height"]) / 2, 0]
+    close("kitti", "second reader: middles", middle, o.box3d_camera.mean(axis=0), "m", atol=1e-7)
+    ahead = o.camera_from_object[:3, :3] @ [0, -1, 0]  # its heading, seen along the camera's y
+    yaw = np.arctan2(-ahead[2], ahead[0])
+    alpha = yaw - np.arctan2(float(row["x"]), float(row["z"]))
+    turns = numbers(row, "rotation_y", "alpha") - (yaw, alpha)
+    close("kitti", "second reader: headings", (turns + np.pi) % (2 * np.pi) - np.pi, 0, "rad", atol=1e-7)
+
+
+def check_velodyne(cloud, motion, sample, left):
+    """Points of the LiDAR lie where the left camera's depth is, but for what only one of the two sees."""
+    points = cloud[:, :3].astype(float) @ motion[:, :3].T + motion[:, 3]
+    points = points[points[:, 2] > 0.1]
+    x, y = projected(left.camera.K, points).T
+    inside = (x >= 0) & (y >= 0) & (x < left.width) & (y < left.height)
+    assert inside.sum() > 100 and sample.lidar.shape[0] == len(cloud)
+    # where each point is in the world, from the camera's pose and by the ground that it must lie on, or an object's box
+    world = (points - left.camera.t) @ left.camera.R
+    ground = np.abs(world[:, 2]) < 1e-4
+    near = np.zeros(len(world), bool)
+    for o in left.objects:
+        local = (np.column_stack([world, np.ones(len(world))]) @ np.linalg.inv(o.world_from_object).T)[:, :3]
+        near |= ((local >= o.box3d_object.min(axis=0) - 1e-4) & (local <= o.box3d_object.max(axis=0) + 1e-4)).all(axis=1)
+    assert (ground | near).all()
+    assert near.sum() > 20
+    close("kitti", "second reader: LiDAR on the ground", world[ground & ~near][:, 2], 0, "m", atol=1e-4)
+
+
+# ---- SYNTHIA -------------------------------------------------------------------------------------------------------------
+
+SWAPPED = np.array([[1, 0, 0], [0, 0, 1], [0, 1, 0]], float)
+"""SYNTHIA's world: left-handed, y up."""
+
+
+def test_synthia_sequences(videos, tmp_path):
+    root = written(videos, tmp_path, "synthia", layout="seqs")
+    numbers_of: dict[str, set] = {}
+    for sequence, samples in scenes(videos).items():
+        folder = root / f"SYNTHIA-SEQS-{sequence}"
+        focal, cx, cy, baseline = map(float, (folder / "CameraParams" / "intrinsics.txt").read_text().splitlines()[0:7:2])
+        K = np.array([[focal, 0, cx], [0, focal, cy], [0, 0, 1]])
+        places = {}
+        for (instant, camera), sample in samples.items():
+            end = Path(("Stereo_Left", "Stereo_Right")[camera]) / "Omni_F" / f"{instant:06d}.png"
+            equal("synthia", "second reader: pictures", pixels(folder / "RGB" / end), sample.rgb)
+            depth = pixels(folder / "Depth" / end)
+            assert depth.dtype == np.uint16 and (depth == depth[..., :1]).all()
+            found = np.where(depth[..., 0] == 65535, np.inf, depth[..., 0] / 100)
+            found, expected, atol = near_and_far(found, sample, 0.01, 655.34)
+            close("synthia", "second reader: depth", found, expected, "m", atol=atol)
+            labels = pixels(folder / "GT" / "LABELS" / end)
+            assert labels.dtype == np.uint16
+            equal("synthia", "second reader: instances", labels[..., 1], sample.instances)
+            check_synthia_classes(labels[..., 0], sample, numbers_of)
+            motion = np.loadtxt((folder / "CameraParams" / end).with_suffix(".txt")).reshape(4, 4).T
+            places[instant, camera] = motion[:3, 3]
+            for o in sample.objects:
+                local = (o.box3d @ SWAPPED.T - motion[:3, 3]) @ np.linalg.inv(motion[:3, :3]).T
+                local = local * [1, -1, 1]
+                close("synthia", "second reader: corners in the camera", local, o.box3d_camera, "m", atol=1e-6)
+                if known(o):
+                    close("synthia", "second reader: projected", projected(K, local), o.box3d_pixels, "px", atol=1e-3)
+        for instant in {instant for instant, _ in samples}:
+            apart = np.linalg.norm(places[instant, 0] - places[instant, 1])
+            close("synthia", "second reader: baseline", apart, baseline, "m", atol=1e-9)
+    assert numbers_of["car"] == {8} and all(len(found) == 1 and min(found) > 15 for n, found in numbers_of.items() if n != "car")
+
+
+def check_synthia_classes(found, sample, numbers_of):
+    assert set(np.unique(found[sample.semantic == 1])) <= {1}  # Sky
+    assert set(np.unique(found[sample.semantic == 2])) <= {0}  # Void
+    for o in sample.objects:
+        if o.area:
+            numbers_of.setdefault(o.category, set()).update(np.unique(found[o.mask]).tolist())
+
+
+# ---- Render for CNN ------------------------------------------------------------------------------------------------------
+
+
+def rfc_name(name):
+    """`int()` of what follows the letters, and degrees from 0 to 359, as the tools' reader does."""
+    synset, md5, *rest = Path(name).stem.split("_")
+    angles = [int(part[1:]) for part in rest[:4]]
+    assert [part[0] for part in rest[:4]] == list("aetd")
+    return synset, md5, [angle % 360 for angle in angles[:3]], angles[3], [int(part) for part in rest[4:6]]
+
+
+def rfc_up(sample, o):
+    """The roll of the picture against the vertical of the object, clockwise seen from behind, by projecting it."""
+    up = o.camera_from_object[:3, :3] @ [0, 0, 1]
+    return np.degrees(np.arctan2(up[0], -up[1]))
+
+
+@pytest.mark.parametrize("world", ["poses", "tilted"])
+def test_render_for_cnn(world, request, tmp_path):
+    dataset = request.getfixturevalue(world)
+    root = written(dataset, tmp_path, "render_for_cnn")
+    samples = {sample.index: sample for sample in dataset}
+    synsets = [line.split()[1] for line in (root / "synsets.txt").read_text().splitlines()]
+    models = dict(line.split() for line in (root / "models.txt").read_text().splitlines())
+    read: dict[str, list] = {}
+    for split in dataset.splits:
+        for line in (root / "syn_lmdbs" / f"all_{split}.txt").read_text().splitlines():
+            path, number, *angles = line.split()
+            _, md5, named, distance, (index, ident) = rfc_name(path)
+            (o,) = (o for o in samples[index].objects if o.id == ident)
+            assert samples[index].split == split and synsets[int(number)] == o.category and models[md5] == o.key
+            assert list(map(int, angles)) == named
+            view = o.view
+            told = np.array([view.azimuth_deg, view.elevation_deg])
+            turns = (np.array(named[:2]) - told + 180) % 360 - 180
+            close("render_for_cnn", "second reader: angles", turns, 0, "degrees", atol=0.5 + 1e-9)
+            assert abs(distance - view.distance) <= 0.5 + 1e-9
+            with Image.open(root / path) as picture:
+                x0, y0, x1, y1 = o.box2d
+                assert picture.size == (x1 - x0, y1 - y0)
+                crop = samples[index].rgb[int(y0) : int(y1), int(x0) : int(x1)].astype(int)
+                assert np.abs(np.asarray(picture).astype(int) - crop).mean() < 8
+            # PASCAL3D+'s camera, from the angles of the name alone: where is the object's up in the picture?
+            e, t = np.radians(named[1]), np.radians(named[2])
+            upright = about("z", -t) @ np.array([0, -np.cos(e), -np.sin(e)])
+            seen = np.array([0, 0, 1]) @ o.camera_from_object[:3, :3].T
+            if np.allclose(samples[index].camera.R @ (o.box3d.mean(axis=0) - samples[index].camera.center) / view.distance, [0, 0, 1], atol=1e-6):
+                close("render_for_cnn", "second reader: upward in the camera", upright, seen, atol=0.02)
+            read.setdefault(o.category, []).append((o, samples[index]))
+    for category, found in read.items():
+        name = category.replace("_", "-")
+        rows = np.loadtxt(root / "view_distribution" / f"{name}.txt", ndmin=2)
+        by_index = sorted(found, key=lambda pair: pair[1].index)
+        for row, (o, _) in zip(rows, by_index, strict=True):
+            v = o.view
+            expected = (v.azimuth_deg, v.elevation_deg, -v.tilt_deg, v.distance)
+            close("render_for_cnn", "second reader: views", row, expected, "degrees", atol=1e-9)
+        rows = np.loadtxt(root / "truncation_distribution" / f"{name}.txt", ndmin=2)
+        whole = [pair[0] for pair in by_index if pair[0].box2d_unclipped]
+        for row, o in zip(rows, whole, strict=True):
+            x0, y0, x1, y1 = o.box2d_unclipped
+            expected = (np.array(o.box2d) - o.box2d_unclipped) / [x1 - x0, y1 - y0, x1 - x0, y1 - y0]
+            close("render_for_cnn", "second reader: truncation", row, expected, atol=1e-9)
