@@ -4,6 +4,7 @@ project's reference), by readers that were written without a look at what writes
 
 from __future__ import annotations
 
+import configparser
 import json
 import pickle
 from pathlib import Path
@@ -854,3 +855,167 @@ def test_render_for_cnn(world, request, tmp_path):
             x0, y0, x1, y1 = o.box2d_unclipped
             expected = (np.array(o.box2d) - o.box2d_unclipped) / [x1 - x0, y1 - y0, x1 - x0, y1 - y0]
             close("render_for_cnn", "second reader: truncation", row, expected, atol=1e-9)
+
+
+# ---- SSCNet --------------------------------------------------------------------------------------------------------------
+
+GRID = (240, 144, 240)  # along the world's y, z and x, the first the fastest
+CELL = 0.02
+
+
+def sscnet_depth(path):
+    found = pixels(path)
+    assert found.dtype == np.uint16
+    return np.bitwise_or(found >> 3, found << 13) / 1000
+
+
+def sscnet_grid(path):
+    """Its corner, the motion from the camera to the world, and the classes by the world's x, z and y."""
+    body = path.read_bytes()
+    corner, motion = np.frombuffer(body, "<f4", 3), np.frombuffer(body, "<f4", 16, 12).reshape(4, 4)
+    classes, counts = np.frombuffer(body, "<u4", offset=76).reshape(-1, 2).T
+    assert counts.sum() == np.prod(GRID)
+    return corner.astype(float), motion.astype(float), np.repeat(classes, counts).reshape(GRID[::-1])
+
+
+def sscnet_class(sample):
+    """The class of what each pixel shows; 0: nothing."""
+    found = np.where(sample.semantic == 2, 2, 0)
+    for o in sample.objects:
+        found[sample.instances == o.id] = {"chair": 6}.get(o.category, 36)
+    return found
+
+
+def test_sscnet(views, tmp_path):
+    root = written(views, tmp_path, "sscnet")
+    kinds: set[int] = set()
+    for sample in list(views)[:6]:
+        path = root / "depthbin" / sample.split / f"{sample.index:08d}_still_fl000_rm0000_0000.png"
+        depth = sscnet_depth(path)
+        told = np.isfinite(sample.depth) & (sample.depth < 65.5)
+        close("sscnet", "second reader: depth", depth[told], sample.depth[told], "m", atol=5.1e-4)
+        assert not depth[~np.isfinite(sample.depth)].any()
+        corner, motion, classes = sscnet_grid(path.with_suffix(".bin"))
+        close("sscnet", "second reader: bottom of the grid", corner[2], -0.05, "m", atol=1e-6)
+        close("sscnet", "second reader: upright", motion[2, :3], sample.camera.R.T[2], "", atol=1e-6)
+        close("sscnet", "second reader: height", motion[2, 3], sample.camera.center[2], "m", atol=1e-5)
+        points = points_of(sample)[told] @ motion[:3, :3].T + motion[:3, 3]
+        cells = (points - corner) / CELL  # along x, y and z
+        x, y, z = np.floor(cells).astype(int).T
+        inside = (cells >= 0).all(axis=1) & (cells < [GRID[2], GRID[0], GRID[1]]).all(axis=1)
+        clear = inside & (np.abs(cells - np.round(cells)) > 0.01).all(axis=1)  # of no other cell
+        assert clear.sum() > 1000
+        there = classes[x[clear], z[clear], y[clear]]
+        expected = sscnet_class(sample)[told][clear]
+        close("sscnet", "second reader: empty cells of what is seen", (there == 0).mean(), 0, "", atol=0)
+        same = there == expected
+        close("sscnet", "second reader: other classes than seen", (~same).mean(), 0, "", atol=0.03)
+        kinds |= set(np.unique(there[same]).tolist())
+        check_before(classes, corner, motion, sample)
+    assert kinds >= {36, 6}
+
+
+def check_before(classes, corner, motion, sample):
+    """Cells that lie well before what their pixel shows are empty."""
+    i, k, j = np.nonzero(classes)
+    points = corner + (np.stack([i, j, k], axis=-1) + 0.5) * CELL
+    seen = (points - motion[:3, 3]) @ motion[:3, :3]
+    ahead = seen[:, 2] > 0.1
+    x, y = np.floor(projected(sample.camera.K, seen[ahead])).astype(int).T
+    inside = (x >= 0) & (y >= 0) & (x < sample.width) & (y < sample.height)
+    assert inside.all() and ahead.all()  # what is outside of the picture is empty
+    shown = cv2.erode(np.minimum(sample.depth, 100), np.ones((9, 9)))[y, x]
+    assert (seen[ahead][:, 2] > shown - 0.05).all()
+
+
+# ---- MOTChallenge --------------------------------------------------------------------------------------------------------
+
+
+def test_mot(videos, tmp_path):
+    root = written(videos, tmp_path, "mot")
+    for sequence, samples in scenes(videos).items():
+        for camera, sensor in enumerate(("left", "right")):
+            mine = [s for (_, number), s in samples.items() if number == camera]
+            folder = root / mine[0].split / f"{sequence}-{sensor}"
+            told = configparser.ConfigParser()
+            told.read(folder / "seqinfo.ini")
+            info = told["Sequence"]
+            assert (info.getint("seqLength"), info.getfloat("frameRate")) == (len(mine), 10)
+            assert (info.getint("imWidth"), info.getint("imHeight")) == (mine[0].width, mine[0].height)
+            rows = np.loadtxt(folder / "gt" / "gt.txt", delimiter=",", ndmin=2)
+            classes = (folder / "gt" / "labels.txt").read_text().split("\n")
+            seen = {(s.instant + 1, o.id): o for s in mine for o in s.objects if o.area}
+            assert {(int(row[0]), int(row[1])) for row in rows} == seen.keys() and len(rows) == len(seen)
+            for frame, ident, left, top, width, height, conf, number, visibility in rows:
+                o = seen[frame, ident]
+                x, y = left - 1, top - 1
+                close("mot", "second reader: boxes", (x, y, x + width, y + height), o.box2d, "px", atol=1e-9)
+                close("mot", "second reader: visibility", visibility, o.visibility, atol=1e-6)
+                assert conf == 1 and classes[int(number) - 1] == o.category
+            for s in mine:
+                name = f"{s.instant + 1:06d}{info['imExt']}"
+                equal("mot", "second reader: pictures", pixels(folder / info["imDir"] / name), s.rgb)
+
+
+# ---- MPI Sintel ----------------------------------------------------------------------------------------------------------
+
+
+def sintel_map(path, components):
+    body = path.read_bytes()
+    assert body[:4] == b"PIEH"
+    width, height = np.frombuffer(body, "<i4", 2, 4)
+    return np.frombuffer(body, "<f4", offset=12).reshape(height, width, components)
+
+
+def sintel_camera(path):
+    """M, and N, of x = M N X."""
+    body = path.read_bytes()
+    assert body[:4] == b"PIEH" and len(body) == 4 + 21 * 8
+    found = np.frombuffer(body, "<f8", offset=4)
+    return found[:9].reshape(3, 3), found[9:].reshape(3, 4)
+
+
+def test_sintel(videos, tmp_path):
+    root = written(videos, tmp_path, "sintel", stereo=True)
+    for sequence, samples in scenes(videos).items():
+        last = max(instant for instant, _ in samples)
+        for (instant, camera), sample in samples.items():
+            if camera:
+                continue
+
+            def at(kind, ending, folder=root / "training", name=f"{sequence}/frame_{instant + 1:04d}"):
+                return folder / kind / f"{name}.{ending}"
+
+            equal("sintel", "second reader: pictures", pixels(at("clean", "png")), sample.rgb)
+            equal("sintel", "second reader: depth", sintel_map(at("depth", "dpt"), 1)[..., 0], sample.depth)
+            ids = pixels(at("segmentation", "png")).astype(int) @ [65536, 256, 1]
+            equal("sintel", "second reader: instances", ids, sample.instances)
+            M, N = sintel_camera(at("camdata_left", "cam"))
+            for o in sample.objects:
+                found = projected(M, np.column_stack([o.box3d, np.ones(8)]) @ N.T) + CENTRE
+                close("sintel", "second reader: projected", found, o.box3d_pixels, "px", atol=1e-6)
+            assert at("flow", "flo").exists() == (instant < last)
+            if instant < last:
+                check_sintel_flow(sintel_map(at("flow", "flo"), 2), at, sample)
+            check_sintel_stereo(lambda kind, at=at: at(kind, "png", root / "stereo" / "training"), sample, samples[instant, 1])
+
+
+def check_sintel_flow(flow, at, sample):
+    unknown = (np.abs(flow) > 1e9).any(axis=-1)
+    equal("sintel", "second reader: unknown flow", unknown, np.isnan(sample.flow[..., 0]))
+    equal("sintel", "second reader: flow", flow[~unknown], sample.flow[~unknown])
+    equal("sintel", "second reader: invalid", pixels(at("invalid", "png")) > 0, unknown)
+    hidden = pixels(at("occlusions", "png")) > 0
+    equal("sintel", "second reader: occlusions", hidden[~unknown], sample.flow_state[~unknown] > 0)
+
+
+def check_sintel_stereo(at, left, right):
+    equal("sintel", "second reader: pictures", pixels(at("clean_left")), left.rgb)
+    equal("sintel", "second reader: pictures", pixels(at("clean_right")), right.rgb)
+    red, green, blue = np.moveaxis(pixels(at("disparities")).astype(float), -1, 0)
+    disparity = 4 * red + green / 64 + blue / 16384
+    outside, hidden = (pixels(at(kind)) > 0 for kind in ("outofframe", "occlusions"))
+    told = np.isfinite(left.disparity)
+    close("sintel", "second reader: disparity", disparity[told], left.disparity[told], "px", atol=1 / 16384 + 1e-6)
+    equal("sintel", "second reader: out of frame", outside[told], left.disparity_state[told] == 2)
+    equal("sintel", "second reader: stereo occlusions", hidden[told & ~outside], left.disparity_state[told & ~outside] > 0)
