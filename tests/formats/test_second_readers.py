@@ -77,7 +77,7 @@ def near_and_far(depth, sample, unit, top):
 
 # ---- Virtual KITTI -------------------------------------------------------------------------------------------------------
 
-UNREAL_FRAME = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
+VKITTI_WORLD = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
 """From the data set's world (z up) to Virtual KITTI's (y down): `rotation_world_space`, `world_space` and extrinsics."""
 
 
@@ -190,7 +190,7 @@ def test_vkitti_2_pictures(videos, vkitti2):
             found, expected, atol = near_and_far(vkitti_depth(at("depth", "depth")), sample, 0.01, 655.34)
             close("vkitti", "second reader: depth", found, expected, "m", atol=atol)
             with Image.open(at("instanceSegmentation", "instancegt")) as picture:
-                assert picture.mode in ("P", "L")
+                assert picture.mode in ("P", "L")  # a palette's numbers, or shades
                 equal("vkitti", "second reader: instances", np.asarray(picture), sample.instances)  # track id + 1
             classes = pixels(at("classSegmentation", "classgt"))
             for o in sample.objects:
@@ -256,7 +256,7 @@ def check_vkitti_pose(row, o, motion, K):
         rotation = turned(*numbers(row, *(f"rotation_{space}_space_{a}" for a in "yxz")))
         placed[space] = vkitti_corners(place, size, rotation)
     close("vkitti", "second reader: corners in the camera", placed["camera"], o.box3d_camera, "m", atol=1e-6)
-    close("vkitti", "second reader: corners in the world", placed["world"], o.box3d @ UNREAL_FRAME.T, "m", atol=1e-6)
+    close("vkitti", "second reader: corners in the world", placed["world"], o.box3d @ VKITTI_WORLD.T, "m", atol=1e-6)
     moved = placed["world"] @ motion[:3, :3].T + motion[:3, 3]
     close("vkitti", "second reader: extrinsics", moved, o.box3d_camera, "m", atol=1e-6)
     if known(o):
@@ -335,11 +335,12 @@ def check_motgt(row, o, motion):
     corners = vkitti_corners(numbers(row, "x3d", "y3d", "z3d"), size, turned(*numbers(row, "ry", "rx", "rz")))
     close("vkitti", "second reader: corners in the camera", corners, o.box3d_camera, "m", atol=1e-6)
     world = (corners - motion[:3, 3]) @ motion[:3, :3]
-    close("vkitti", "second reader: extrinsics", world, o.box3d @ UNREAL_FRAME.T, "m", atol=1e-6)
+    close("vkitti", "second reader: extrinsics", world, o.box3d @ VKITTI_WORLD.T, "m", atol=1e-6)
     close("vkitti", "second reader: truncation", float(row["truncr"]), o.truncation, atol=1e-9)
     box = (right - left + 1) * (down - top + 1)
     close("vkitti", "second reader: occupancy", float(row["occupr"]), o.area / box, atol=1e-9)
     assert int(row["occluded"]) == o.occlusion_level
+    assert int(row["truncated"]) == (o.truncation > 0) + (o.truncation > 0.5)
     assert row["label"] == ("Car" if o.category == "car" else o.category)
     assert row["moving"] == str(int(np.linalg.norm(o.velocity) > 1e-6))
 
@@ -369,9 +370,7 @@ TAGS = {"sky": 11, "ground": 25, "car": 14, "chair": 21, "post_box": 21}
 def carla_matrix(transform):
     """What `carla.Transform` does: from the thing's axes (ahead, right, up) to Unreal's world, left-handed."""
     turn = transform["rotation"]
-    (cp, cy, cr), (sp, sy, sr) = (
-        [f(np.radians(turn[n])) for n in ("pitch", "yaw", "roll")] for f in (np.cos, np.sin)
-    )
+    (cp, cy, cr), (sp, sy, sr) = ([f(np.radians(turn[n])) for n in ("pitch", "yaw", "roll")] for f in (np.cos, np.sin))
     found = np.eye(4)
     found[:3, :3] = [
         [cp * cy, cy * sp * sr - sy * cr, -cy * sp * cr - sy * sr],
@@ -551,7 +550,9 @@ def test_nocs(views, tmp_path):
         assert [(int(a), int(b), c) for a, b, c in rows] == [(o.id, o.category_id, o.key) for o in sample.objects]
         scene = colour.parent.name
         found = pickle.loads(
-            (root / "gts" / f"real_{sample.split}" / f"results_real_{sample.split}_{scene}_{sample.index % 1000:04d}.pkl").read_bytes()
+            (
+                root / "gts" / f"real_{sample.split}" / f"results_real_{sample.split}_{scene}_{sample.index % 1000:04d}.pkl"
+            ).read_bytes()
         )
         models = {o.key: root / "obj_models" / f"real_{sample.split}" / f"{o.key}.obj" for o in sample.objects}
         check_nocs_poses(found, sample, models, coord)
@@ -661,7 +662,6 @@ def test_kitti_depth(videos, tmp_path):
             depth = pixels(folder / "proj_depth" / "groundtruth" / name / f"{instant:010d}.png")
             assert depth.dtype == np.uint16
             told = depth > 0
-            assert (told == (np.isfinite(sample.depth) & (sample.depth < 255.99))).mean() > 0.999
             assert not np.isfinite(sample.depth[~told & (sample.depth < 255.99)]).any()
             close("kitti_depth", "second reader: depth", depth[told] / 256, sample.depth[told], "m", atol=1 / 512 + 1e-5)
             told = calibration(folder / "calib_cam_to_cam.txt")
@@ -675,7 +675,8 @@ def test_kitti_depth(videos, tmp_path):
                 close("kitti_depth", "second reader: projected", projected(P, corners), o.box3d_pixels, "px", atol=1e-6)
 
 
-TRACKING = "frame id type truncated occluded alpha left top right bottom height width length x y z rotation_y".split()
+TRACKING = ["frame", "id", "type", "truncated", "occluded", "alpha", "left", "top", "right", "bottom"]
+TRACKING += ["height", "width", "length", "x", "y", "z", "rotation_y"]
 
 
 def test_kitti_tracking(drives, tmp_path):
@@ -781,7 +782,9 @@ def test_synthia_sequences(videos, tmp_path):
         for instant in {instant for instant, _ in samples}:
             apart = np.linalg.norm(places[instant, 0] - places[instant, 1])
             close("synthia", "second reader: baseline", apart, baseline, "m", atol=1e-9)
-    assert numbers_of["car"] == {8} and all(len(found) == 1 and min(found) > 15 for n, found in numbers_of.items() if n != "car")
+    assert numbers_of["car"] == {8} and all(
+        len(found) == 1 and min(found) > 15 for n, found in numbers_of.items() if n != "car"
+    )
 
 
 def check_synthia_classes(found, sample, numbers_of):
@@ -803,12 +806,6 @@ def rfc_name(name):
     return synset, md5, [angle % 360 for angle in angles[:3]], angles[3], [int(part) for part in rest[4:6]]
 
 
-def rfc_up(sample, o):
-    """The roll of the picture against the vertical of the object, clockwise seen from behind, by projecting it."""
-    up = o.camera_from_object[:3, :3] @ [0, 0, 1]
-    return np.degrees(np.arctan2(up[0], -up[1]))
-
-
 @pytest.mark.parametrize("world", ["poses", "tilted"])
 def test_render_for_cnn(world, request, tmp_path):
     dataset = request.getfixturevalue(world)
@@ -825,8 +822,8 @@ def test_render_for_cnn(world, request, tmp_path):
             assert samples[index].split == split and synsets[int(number)] == o.category and models[md5] == o.key
             assert list(map(int, angles)) == named
             view = o.view
-            told = np.array([view.azimuth_deg, view.elevation_deg])
-            turns = (np.array(named[:2]) - told + 180) % 360 - 180
+            told = np.array([view.azimuth_deg, view.elevation_deg, view.tilt_deg])
+            turns = (np.array(named) - told + 180) % 360 - 180
             close("render_for_cnn", "second reader: angles", turns, 0, "degrees", atol=0.5 + 1e-9)
             assert abs(distance - view.distance) <= 0.5 + 1e-9
             with Image.open(root / path) as picture:
@@ -838,8 +835,7 @@ def test_render_for_cnn(world, request, tmp_path):
             e, t = np.radians(named[1]), np.radians(named[2])
             upright = about("z", -t) @ np.array([0, -np.cos(e), -np.sin(e)])
             seen = np.array([0, 0, 1]) @ o.camera_from_object[:3, :3].T
-            if np.allclose(samples[index].camera.R @ (o.box3d.mean(axis=0) - samples[index].camera.center) / view.distance, [0, 0, 1], atol=1e-6):
-                close("render_for_cnn", "second reader: upward in the camera", upright, seen, atol=0.02)
+            close("render_for_cnn", "second reader: upward in the camera", upright, seen, atol=0.02)
             read.setdefault(o.category, []).append((o, samples[index]))
     for category, found in read.items():
         name = category.replace("_", "-")
@@ -898,13 +894,15 @@ def test_sscnet(views, tmp_path):
         corner, motion, classes = sscnet_grid(path.with_suffix(".bin"))
         close("sscnet", "second reader: bottom of the grid", corner[2], -0.05, "m", atol=1e-6)
         close("sscnet", "second reader: upright", motion[2, :3], sample.camera.R.T[2], "", atol=1e-6)
+        close("sscnet", "second reader: the camera looks along y", motion[0, 2], 0, "", atol=1e-6)
+        assert motion[1, 2] > 0
         close("sscnet", "second reader: height", motion[2, 3], sample.camera.center[2], "m", atol=1e-5)
         points = points_of(sample)[told] @ motion[:3, :3].T + motion[:3, 3]
         cells = (points - corner) / CELL  # along x, y and z
         x, y, z = np.floor(cells).astype(int).T
         inside = (cells >= 0).all(axis=1) & (cells < [GRID[2], GRID[0], GRID[1]]).all(axis=1)
         clear = inside & (np.abs(cells - np.round(cells)) > 0.01).all(axis=1)  # of no other cell
-        assert clear.sum() > 1000
+        assert clear.sum() > 100
         there = classes[x[clear], z[clear], y[clear]]
         expected = sscnet_class(sample)[told][clear]
         close("sscnet", "second reader: empty cells of what is seen", (there == 0).mean(), 0, "", atol=0)
@@ -920,12 +918,16 @@ def check_before(classes, corner, motion, sample):
     i, k, j = np.nonzero(classes)
     points = corner + (np.stack([i, j, k], axis=-1) + 0.5) * CELL
     seen = (points - motion[:3, 3]) @ motion[:3, :3]
-    ahead = seen[:, 2] > 0.1
-    x, y = np.floor(projected(sample.camera.K, seen[ahead])).astype(int).T
-    inside = (x >= 0) & (y >= 0) & (x < sample.width) & (y < sample.height)
-    assert inside.all() and ahead.all()  # what is outside of the picture is empty
+    assert (seen[:, 2] > 0.1).all()
+    place = projected(sample.camera.K, seen)
+    within = np.clip(place, 0, [sample.width - 1e-6, sample.height - 1e-6])
+    # What is outside of the picture is empty, but for cells of which the picture's rim shows a point.
+    beyond = np.abs(place - within).max(axis=1) * seen[:, 2] / sample.camera.K[0, 0] / CELL
+    close("sscnet", "second reader: cells beyond the picture", beyond, 0, "cells", atol=np.sqrt(3) / 2)
+    assert (beyond > 0).mean() < 0.005
+    x, y = np.floor(within).astype(int).T
     shown = cv2.erode(np.minimum(sample.depth, 100), np.ones((9, 9)))[y, x]
-    assert (seen[ahead][:, 2] > shown - 0.05).all()
+    assert (seen[:, 2] > shown - 0.05).all()
 
 
 # ---- MOTChallenge --------------------------------------------------------------------------------------------------------
