@@ -24,7 +24,7 @@ def stereo(scope: Scope) -> Iterator[str]:
     """Of a format of rectified pairs."""
     if scope.rig is None or not scope.rig.rectified:
         found = "none" if scope.rig is None else ", ".join(sensor.name for sensor in scope.rig.sensors)
-        yield f"expected two rectified cameras (rig: {{stereo: ...}}); found {found}"
+        yield f"expected two rectified cameras (rig: {{kind: stereo, baseline: 0.1}}); found {found}"
 
 
 def pinhole(scope: Scope) -> Iterator[str]:

@@ -159,13 +159,17 @@ def functions(kind: type[Tree]) -> Functions:
 
 @contextmanager
 def _lacking_told(tree: Tree, sample: Sample) -> Generator[None]:
-    """Raises UserError for a channel that the sample lacks, as those of imported data sets may."""
+    """Raises UserError for a channel, or a label of objects, that the sample lacks, as those of imported data sets may."""
     try:
         yield
     except KeyError as error:
         if error.args and error.args[0] in channels():
             lacking = f"expected channel {error.args[0]}, found none: leave this format out"
             raise UserError(f"{tree.dataset.root}: frame {sample.index}: {lacking}") from None
+        raise
+    except AttributeError as error:
+        if str(error).startswith("an object has no "):
+            raise UserError(f"{tree.dataset.root}: frame {sample.index}: {error}") from None
         raise
 
 
@@ -226,7 +230,9 @@ class _Collected:
             sections = self.files.setdefault(piece.path, {})
             if piece.section not in sections:
                 self._count += 1
-                sections[piece.section] = _Section(self._folder / str(self._count))
+                folder = self._folder / f"{self._count // FOLDER_SIZE}"
+                folder.mkdir(exist_ok=True)
+                sections[piece.section] = _Section(folder / str(self._count))
             section = sections[piece.section]
             with section.file.open("ab") as file:
                 file.write(piece.between + piece.data if section.count else piece.data)

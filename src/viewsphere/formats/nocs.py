@@ -7,7 +7,7 @@
 A scene is a sequence, and a picture's number its instant; the scene of a sensor that is not named `camera` is
 `<sequence>-<sensor>`. A thousand still pictures are a scene.
 
-- depth: 16 bits, millimetres along z, 0 where nothing is; farther than 65.535 m counts as that.
+- depth: 16 bits, millimetres along z, 0 where nothing is; what is farther than 65.535 m has 65535.
 - mask: 8 bits, the object's id; 255 is background. Loaders take at most 18 objects in a picture, and at least a pixel of
   background.
 - coord: 8 bits, red x, green y, blue 1 - z of the place in the object's box, whose diagonal is 1, times 255; black is
@@ -111,10 +111,11 @@ def _coord(sample: Sample) -> NDArray[np.uint8]:
 
 
 def _meta(sample: Sample) -> str:
-    """A line for each id up to the last one that is known: loaders find an object's line by its id."""
+    """A line for each id up to the last one that is known, or in the mask: loaders find an object's line by its id."""
     known = {o.id: (o.category_id, o.key) for o in sample.objects}
+    most = max([*known, int(sample.channels["instances"].max(initial=0))])
     distractor = (0, next((key for _, key in known.values()), ""))
-    rows = ((number, *known.get(number, distractor)) for number in range(1, max(known, default=0) + 1))
+    rows = ((number, *known.get(number, distractor)) for number in range(1, most + 1))
     return "".join(f"{number} {category} {key}\n" for number, category, key in rows)
 
 

@@ -37,7 +37,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import JPEG_QUALITY, opaque
 from viewsphere.formats._tree import File, Piece, Tree, functions, line
-from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sample import ObjectAnnotation, ObjectView, Sample
 from viewsphere.store import Dataset
 
 CHANNELS = ("rgb",)
@@ -81,13 +81,13 @@ class RenderForCnn(Tree):
         for o in sample.objects:
             if o.box2d is None:
                 continue
-            path, name, view = self._path(sample, o), _word(o.category), o.view
+            path, name, view = self._path(sample, o), _word(o.category), _rounded(o.view)
             angles = (round(angle) % 360 for angle in (view.azimuth_deg, view.elevation_deg, view.tilt_deg))
             listed = (path, self._numbers[o.category], *angles)
             yield File(path, _cut(sample, o))
             yield line(f"syn_lmdbs/{name}_{split}.txt", *listed)
             yield line(f"syn_lmdbs/all_{split}.txt", *listed)
-            seen_from = (view.azimuth_deg % 360, view.elevation_deg, -view.tilt_deg, view.distance)
+            seen_from = (view.azimuth_deg % 360, view.elevation_deg, 0.0 - view.tilt_deg, view.distance)
             yield line(f"view_distribution/{name}.txt", *map(float, seen_from))
             if o.box2d_unclipped is not None:
                 yield line(f"truncation_distribution/{name}.txt", *_truncation(o.box2d, o.box2d_unclipped))
@@ -99,10 +99,15 @@ class RenderForCnn(Tree):
         yield File("models.txt", "".join(f"{_md5(info.key)} {info.key}\n" for info in self.dataset.models).encode())
 
     def _path(self, sample: Sample, o: ObjectAnnotation) -> str:
-        synset, md5, view = _synset(o.category), _md5(o.key), o.view
+        synset, md5, view = _synset(o.category), _md5(o.key), _rounded(o.view)
         turned = f"a{round(view.azimuth_deg) % 360:03}_e{round(view.elevation_deg):03}_t{round(view.tilt_deg) % 360:03}"
         name = f"{synset}_{md5}_{turned}_d{round(view.distance):03}_{sample.index:08}_{o.id}.jpg"
         return f"{PICTURES}/{synset}/{md5}/{name}"
+
+
+def _rounded(view: ObjectView) -> ObjectView:
+    """The view to nine decimal places: the last digits differ between processors, and a name may hang on them."""
+    return ObjectView(*(round(value, 9) + 0.0 for value in vars(view).values()))
 
 
 def _synset(category: str) -> str:

@@ -12,43 +12,48 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import Format
-from viewsphere.labels import Sight, annotated, channel_labels, labels, on_request, sample_values
+from viewsphere.labels import Needs, Sight, annotated, channel_labels, labels, on_request, sample_values
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.scenery import Scenery
-from viewsphere.run.scope import needs_of
+from viewsphere.run.scope import needs_of, shots_of_parts
 from viewsphere.run.sights import Sights
 from viewsphere.store import Choice, Dataset, Exported
 
 
 def lacking(dataset: Dataset, module: Format, entry: FormatEntry) -> tuple[str, ...]:
-    """The labels that a format needs and a data set does not keep, all of which can be computed of its shots; none of a data
-    set without shots, such as an imported one, of which formats take what there is.
+    """The labels that a format needs and a part of a data set does not keep, all of which can be computed of its shots; none of
+    a data set without shots, such as an imported one, of which formats take what there is.
 
-    Raises UserError for those that cannot: passes, which an engine has to paint, and points that a recipe has to name.
+    Raises UserError for those that cannot: passes, which an engine has to paint, points that a recipe has to name, and any of
+    pictures that were imported among others.
     """
-    shot = next((dataset.labelled(row.key) for row in dataset.rows[:1]), None)
-    if shot is None:
-        return ()
-    asked = {name for part in dataset.plan.parts for name in part.recipe.get("annotations", ())}
-    wanted, names = needs_of(module, entry), dict[str, None]()
-    for sensor in shot.rig.sensors:
-        absent = missing(wanted, {*sensor.kept(dataset.plan.channels), *asked})
-        names |= dict.fromkeys(name for name in absent if sensor.lidar is None or name not in PASSES)
-    painted = [name for name in names if name in PASSES]
+    wanted, names, unknown = needs_of(module, entry), dict[str, None](), dict[str, None]()
+    shots = shots_of_parts(dataset)
+    for part, shot in zip(dataset.plan.parts, shots, strict=True):
+        asked = set(part.recipe.get("annotations", ()))
+        if shot is None:
+            unknown |= dict.fromkeys(missing(wanted, {*part.channels, *asked}))
+            continue
+        for sensor in shot.rig.sensors:
+            absent = missing(wanted, {*sensor.kept(part.channels), *asked})
+            names |= dict.fromkeys(name for name in absent if sensor.lidar is None or name not in PASSES)
+    supplied = {name for part in dataset.plan.parts for _, added in part.supplies for name in added}
+    painted = [name for name in names if name in PASSES and name not in supplied]
+    where = f"{dataset.root}: format {entry.name}"
     if painted:
         raise UserError(
-            f"{dataset.root}: format {entry.name}: expected channel {', '.join(painted)}, found none: an engine has to paint "
-            "it: add it to the recipe's channels, and render with --append"
+            f"{where}: expected channel {', '.join(painted)}, found none: an engine has to paint it: add it to the recipe's "
+            "channels, and render with --append"
         )
     for name in names:
-        needs = labels()[name].needs
+        needs = labels()[name].needs if name in labels() else Needs()
         if needs.tracks or needs.lidar or needs.looks:
-            raise UserError(
-                f"{dataset.root}: format {entry.name}: expected label {name}, found none: add it to the recipe, and render"
-            )
-    return tuple(names)
+            raise UserError(f"{where}: expected label {name}, found none: add it to the recipe, and render")
+    if unknown and any(shots):
+        raise UserError(f"{where}: expected label {next(iter(unknown))} of all pictures; found imported ones that lack it")
+    return tuple(name for name in names if name not in PASSES)
 
 
 class Completed(Exported):
@@ -74,7 +79,7 @@ class Completed(Exported):
 
     @cached_property
     def _sights(self) -> Sights:
-        return Sights(self, self._scenery, {info.key: info for info in self.models})
+        return Sights(self, self._scenery, {info.key: info for info in Dataset(self.root).models})  # chosen or not
 
     def _with(self, sample: Sample, names: list[str]) -> Sample:
         if not self._sights.is_possible(sample):
@@ -92,7 +97,9 @@ class Completed(Exported):
 
     def _sight(self, sample: Sample, names: list[str]) -> Sight:
         asked = [name for name in names if name in on_request()]
-        sight = self._sights.of(sample, [*sample.files, *names], asked, continued=True)
+        needs = [labels()[name].needs for name in names]
+        compares = any(need.instants or need.poses for need in needs)
+        sight = self._sights.of(sample, [*sample.files, *names], asked, continued=compares)
         if sight is None:
             raise StoreError(f"frame {sample.index}: expected scenery as it was rendered: {'; '.join(self._scenery.notes)}")
         return sight

@@ -16,7 +16,7 @@ from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_for
 from viewsphere.run.completed import lacking
 from viewsphere.run.preparing import Entries, leaves_out, prepared, targets
 from viewsphere.run.progress import Listener, Progress, unheard
-from viewsphere.run.scope import check_held, scope_of
+from viewsphere.run.scope import refusals, scope_of
 from viewsphere.store import Choice, Dataset, located, new_folder
 from viewsphere.store.checksums import write_checksums, written_credits, written_frames, written_least, written_options
 from viewsphere.store.credits import credits_digest
@@ -49,10 +49,12 @@ def export(
         raise UserError(f"--output: expected a folder outside of the data set's store; found {place}")
     entries = tuple(entry.over(_known_options(dataset, entry.name)) for entry in read_formats(formats))
     scope = scope_of(dataset)
-    for entry in entries:  # before the first of them is written
-        module = writable(entry.name)
-        check_held(module, entry, scope, str(dataset.root))
-        lacking(dataset, module, entry)
+    modules = {entry.name: writable(entry.name) for entry in entries}
+    refused = [f"format {e.name}: {problem}" for e in entries for problem in refusals(modules[e.name], e, scope)]
+    if refused:  # before the first of them is written
+        raise UserError("\n".join(f"{dataset.root}: {problem}" for problem in refused))
+    for entry in entries:
+        lacking(dataset, modules[entry.name], entry)
     if not entries:
         return ()
     with ExitStack() as whole:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib.metadata import version
 
-from viewsphere.errors import RecipeError, StoreError
+from viewsphere.errors import RecipeError, StoreError, UserError
 from viewsphere.formats import Format, Scope
 from viewsphere.labels import on_request
 from viewsphere.model.channel import PASSES, missing
@@ -14,7 +14,7 @@ from viewsphere.model.rig import Sensor
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import writable
-from viewsphere.run.scope import check_held, needs_of, scope_of_plan
+from viewsphere.run.scope import needs_of, not_held, scope_of_plan
 from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.sampling.extension import Portion, extend, resumed, whole
 from viewsphere.sampling.fitting import LOOK
@@ -42,10 +42,11 @@ def check_formats(planned: Plan, wanted: Iterable[FormatEntry], channels: Sequen
     with planned.recipe.located():
         for entry in wanted:
             module = writable(entry.name)
+            for problem in not_held(module, entry, scope):
+                raise UserError(f"formats: format {entry.name}: {problem}")
             for sensor in planned.rig.sensors:
                 _check_channels(entry, module, channels, sensor)
             _check_annotations(entry, module, scope)
-            check_held(module, entry, scope, "formats")
 
 
 def _check_annotations(entry: FormatEntry, module: Format, scope: Scope) -> None:

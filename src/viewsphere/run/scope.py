@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from viewsphere.errors import UserError
 from viewsphere.formats import Format, Scope
 from viewsphere.labels import channel_labels, on_request
 from viewsphere.model.channel import PASSES, missing
+from viewsphere.model.shot import Shot
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Dataset
+from viewsphere.store import Dataset, Row
 
 
 def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
@@ -29,19 +29,31 @@ def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
 
 def scope_of(dataset: Dataset) -> Scope:
     """What is known of a data set that is there; of one whose shots are kept all labels can be computed."""
-    key = next((row.key for row in dataset.rows), None)
-    shot = dataset.labelled(key) if key else None
-    parts = dataset.plan.parts
-    asked = dict.fromkeys(name for part in parts for name in part.recipe.get("annotations", ()))
+    shots, parts = shots_of_parts(dataset), dataset.plan.parts
+    is_known = bool(shots) and all(shots)
+    asked = [set(part.recipe.get("annotations", ())) for part in parts]
+    kept, annotations = dataset.plan.channels, tuple(sorted(set.intersection(*asked))) if asked else ()
     return Scope(
         categories=dataset.categories,
         splits=dataset.splits,
-        rig=shot and shot.rig,
+        rig=shots[0].rig if is_known and shots[0] else None,
         is_moving=any(part.recipe.get("time") for part in parts),
         most_objects=dataset.max_objects,
-        channels=dataset.plan.channels if shot is None else tuple(dict.fromkeys((*dataset.plan.channels, *channel_labels()))),
-        annotations=tuple(asked if shot is None else on_request()),
+        channels=tuple(dict.fromkeys((*kept, *channel_labels()))) if is_known else kept,
+        annotations=tuple(on_request()) if is_known else annotations,
     )
+
+
+def shots_of_parts(dataset: Dataset) -> tuple[Shot | None, ...]:
+    """A finished shot of each part of a data set; None for a part whose shots are not kept, such as an imported one, and for
+    one of which nothing is finished, another part's.
+    """
+    rows: dict[int, Row] = {}
+    for row in dataset.rows:
+        rows.setdefault(row.part, row)
+    found = {part: dataset.labelled(row.key) for part, row in rows.items()}
+    some = next(iter(found.values()), None)
+    return tuple(found.get(number, some) for number in range(len(dataset.plan.parts)))
 
 
 def needs_of(module: Format, entry: FormatEntry) -> tuple[str, ...]:
@@ -53,11 +65,16 @@ def needs_of(module: Format, entry: FormatEntry) -> tuple[str, ...]:
 
 def refusals(module: Format, entry: FormatEntry, scope: Scope) -> Iterator[str]:
     """What of a data set a format cannot hold, as these options want it."""
+    yield from not_held(module, entry, scope)
+    if not getattr(module, "LIDAR", False):
+        yield from _pointless(module, entry, scope)
+
+
+def not_held(module: Format, entry: FormatEntry, scope: Scope) -> Iterator[str]:
+    """The same but for a LiDAR's frames, which a run that is planned tells by its sensors' channels."""
     refuses: Callable[..., Iterator[str]] | None = getattr(module, "refuses", None)
     if refuses:
         yield from refuses(scope, *entry.arguments())
-    if not getattr(module, "LIDAR", False):
-        yield from _pointless(module, entry, scope)
 
 
 def _pointless(module: Format, entry: FormatEntry, scope: Scope) -> Iterator[str]:
@@ -67,9 +84,3 @@ def _pointless(module: Format, entry: FormatEntry, scope: Scope) -> Iterator[str
         lacking = missing(needed, sensor.kept(scope.channels))
         if sensor.lidar is not None and lacking:
             yield f"expected channel {lacking[0]} of every sensor; found none of the LiDAR {sensor.name}"
-
-
-def check_held(module: Format, entry: FormatEntry, scope: Scope, where: str) -> None:
-    """Raise UserError for the first thing of a data set that a format cannot hold."""
-    for problem in refusals(module, entry, scope):
-        raise UserError(f"{where}: format {entry.name}: {problem}")

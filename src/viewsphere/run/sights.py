@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.exported import read_exported
 from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import StoreError
 from viewsphere.labels import Placement, Sight, labels
 from viewsphere.model.model_spec import ModelSpec, step_key
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -20,7 +21,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.run.scenery import Scenery
 from viewsphere.run.tasks import SceneryRecord
-from viewsphere.store import Dataset, ModelInfo
+from viewsphere.store import Dataset, ModelInfo, Row
 from viewsphere.truth.geometry import Geometry, build_geometry, present
 from viewsphere.truth.shot_views import SampleViews, ShotViews, views_of
 from viewsphere.truth.visibility import rasterize
@@ -76,14 +77,22 @@ class Sights:
         if made is None or row is None or not made.shot.sequence:
             return made
         for number, place in ((row.first - 1, -1), (row.first + row.count, 0)):
-            other = self._beside(number) if 0 <= number < self._dataset.plan.frames else None
+            other = self._beside(number, row) if 0 <= number < self._dataset.plan.frames else None
             if other is not None and other.shot.sequence == made.shot.sequence:
                 made = made.with_instant(other, place)
         return made
 
-    def _beside(self, frame: int) -> _Made | None:
+    def _beside(self, frame: int, own: Row) -> _Made | None:
+        """The shot of a frame; raises StoreError where it is of the same sequence as another, and is not finished."""
         row = self._dataset.plan.row_at(frame)
-        return self._made(row.key) if self._dataset.store.has_shot(row.key) else None
+        if self._dataset.store.has_shot(row.key):
+            return self._made(row.key)
+        if row.subject == own.subject:
+            raise StoreError(
+                f"shot {own.key}: expected {row.key} beside it, with which labels compare it, found it unfinished: render the "
+                "rest first"
+            )
+        return None
 
     def _placement(self, o: ObjectAnnotation | None, sample: Sample, shot: Shot) -> Placement | None:
         if o is None:

@@ -17,9 +17,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from hashlib import sha256
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
@@ -27,7 +29,7 @@ from viewsphere.assets.load import load_model
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.normalise import normalise
 from viewsphere.errors import StoreError, UserError
-from viewsphere.geometry.rotation import rigid
+from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.camera import Scan
 from viewsphere.model.files import Files
 from viewsphere.model.instant import Instant
@@ -124,7 +126,7 @@ def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Shot, Instant, Sam
     for key, places in group.places.items():
         known = dataset.store.shot(key)
         for place, sample in zip(places, dataset.samples_of(key, places), strict=True):
-            shot, instant = known or _lit_anyhow(key, sample), place if known else 0
+            shot, instant = _taken(known, key, place, sample)
             yield shot.model_copy(update={"things": shot.things_at(instant)}), shot.instants[instant], sample
 
 
@@ -136,8 +138,26 @@ def _stored(dataset: Dataset, key: str) -> tuple[Shot | None, bytes]:
 
 def _scene(known: Shot | None, alike: bytes, key: str, place: int, sample: Sample) -> object:
     """A value that is equal for frames that can share a file."""
-    shot, instant = known or _lit_anyhow(key, sample), place if known else 0
-    return alike or _alike(shot), shot.poses_at(instant), *_seen(shot, instant, sample)
+    shot, instant = _taken(known, key, place, sample)
+    return alike or _alike(shot), sample.sensor, shot.poses_at(instant), *_seen(shot, instant, sample)
+
+
+def _taken(known: Shot | None, key: str, place: int, sample: Sample) -> tuple[Shot, int]:
+    """The shot of a sample, whose rig is the sample's own sensor alone, and its instant there."""
+    if known is None:
+        return _lit_anyhow(key, sample), 0
+    _, instant, number = next(islice(known.samples, place, None))
+    sensor = known.rig.sensors[number]
+    if len(known.rig.sensors) == 1:
+        return known, instant
+    zooms = sensor.intrinsics == known.rig.sensors[0].intrinsics
+    lenses = (now.intrinsics if zooms else None for now in known.instants)
+    poses = (compose(now.world_from_rig, sensor.rig_from_sensor) for now in known.instants)
+    instants = tuple(
+        now.model_copy(update={"world_from_rig": _plain(pose), "viewpoint": known.viewpoint(i, number), "intrinsics": lens})
+        for i, (now, pose, lens) in enumerate(zip(known.instants, poses, lenses, strict=True))
+    )
+    return known.model_copy(update={"rig": Rig.of(sensor.intrinsics), "instants": instants}), instant
 
 
 def _alike(shot: Shot) -> bytes:
@@ -174,7 +194,11 @@ def _as_taken(sample: Sample) -> Instant:
 
 
 def _matrix(o: ObjectAnnotation) -> Matrix4:
-    a, b, c, d = ((x, y, z, w) for x, y, z, w in o.world_from_object.tolist())
+    return _plain(o.world_from_object)
+
+
+def _plain(matrix: NDArray[np.float64]) -> Matrix4:
+    a, b, c, d = ((x, y, z, w) for x, y, z, w in matrix.tolist())
     return a, b, c, d
 
 

@@ -115,7 +115,7 @@ def _stem(dataset: Dataset, sample: Sample) -> str:
 
 def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
     """COCO's image entry of a sample, with the paper's keys; of an imported one its own entry with new id and file name."""
-    if sample.known_camera is None:
+    if sample.known_camera is None or sample.known_pose is None:
         source = dict(sample.source or {})
         named = {"imported_file_name": source["file_name"]} if "file_name" in source else {}
         size = {"width": sample.width, "height": sample.height}
