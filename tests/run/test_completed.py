@@ -1,13 +1,17 @@
 """Labels that a data set does not keep are computed for exports: they are those that it would have kept."""
 
+import shutil
+
 import numpy as np
 import pytest
 
 from viewsphere import Dataset, generate
-from viewsphere.errors import UserError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.completed import Completed, lacking
 from viewsphere.run.exporting import export
+from viewsphere.run.merging import merge
+from viewsphere.store import Choice
 from worlds import rendered, shared_place, stills, videos
 
 FEW = {"channels": ["rgb", "tracks"], "annotations": []}
@@ -53,3 +57,37 @@ def test_exports_of_few_channels_are_those_of_many(tmp_path, tmp_path_factory):
              for file in (tmp_path / "whole").rglob("*.txt")]  # fmt: skip
     assert len(pairs) == len(whole)
     assert all(one.read_bytes() == other.read_bytes() for one, other in pairs)
+
+
+def test_a_choice_of_frames_is_computed_as_all_are(tmp_path):
+    generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
+    for choice, place in ((Choice(), "all"), (Choice(frames=((0, 2),)), "some"), (Choice(models=("car*",)), "cars")):
+        export(tmp_path / "few", [{"yolo": {"task": "obb"}}], output=tmp_path / place, choice=choice)
+    labels = {place: {file.name: file.read_text() for file in (tmp_path / place).rglob("labels/**/*.txt")}
+              for place in ("all", "some", "cars")}  # fmt: skip
+    assert 0 < len(labels["some"]) < len(labels["all"]) == 12 and labels["cars"]
+    assert all(text == labels["all"][name] for place in ("some", "cars") for name, text in labels[place].items())
+
+
+def test_parts_of_which_only_some_keep_a_label_are_completed(tmp_path):
+    generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
+    generate(stills(channels=["rgb", "depth"], annotations=["keypoints"], seed=4), tmp_path / "more")
+    merge([tmp_path / "few", tmp_path / "more"], tmp_path / "both", mixed=True)
+    merge([tmp_path / "more", tmp_path / "few"], tmp_path / "turned", mixed=True)
+    for name in ("both", "turned"):
+        export(tmp_path / name, [{"yolo": {"task": "pose"}}, "tum"], output=tmp_path / f"{name} out")
+        shown = [file.read_text() for file in (tmp_path / f"{name} out" / "yolo" / "labels").rglob("*.txt")]
+        assert len(shown) == 24
+        assert all(" 2 " in text or " 1 " in text or text.rstrip().endswith((" 1", " 2")) for text in shown if text)
+        assert len(list((tmp_path / f"{name} out" / "tum").rglob("depth/*.png"))) == 24
+
+
+def test_what_an_unfinished_neighbour_would_tell_is_asked_for(tmp_path):
+    generate(videos(**FEW, shot_frames=4), tmp_path / "few")
+    dataset = Dataset(tmp_path / "few")
+    second = [key for key, _ in dataset.shots()][1]
+    shutil.rmtree(dataset.store.shot_folder(second))
+    completed = Completed(tmp_path / "few", None, None, ("flow",))
+    with pytest.raises(StoreError, match="beside it, with which labels compare it, found it unfinished: render the rest first"):
+        _ = [sample.flow for sample in completed]
+    export(tmp_path / "few", "pointcloud", output=tmp_path / "out")  # depth needs no other instant
