@@ -268,3 +268,22 @@ def test_blend_is_a_format_that_cannot_be_imported():
     assert "blend" in plugins.names("formats")
     assert not hasattr(blend, "read")
     assert blend._spec("a", "a.glb").centring == "as_is" and isinstance(blend._spec("a", "a.glb"), ModelSpec)
+
+
+@pytest.mark.parametrize("world", ["videos", "drives"])
+def test_each_sensor_of_a_rig_has_files_of_its_own(asked, world, request, tmp_path):
+    dataset = request.getfixturevalue(world)
+    export(dataset.root, ["blend"], output=tmp_path)
+    cameras = {sample.index: sample.camera for sample in dataset if sample.sensor != "top"}
+    written = [sample.index for told in asked.values() for sample in told.samples]
+    assert sorted(written) == sorted(cameras)
+    for told in asked.values():
+        assert len({sample.sensor for sample in told.samples}) == 1
+        for number, sample in enumerate(told.samples):
+            camera = told.shot.camera(number)
+            np.testing.assert_allclose(camera.R, cameras[sample.index].R, atol=1e-12)
+            np.testing.assert_allclose(camera.t, cameras[sample.index].t, atol=1e-12)
+            assert camera.intrinsics == cameras[sample.index].intrinsics
+            for thing in told.shot.objects:
+                there = {o.id: o.world_from_object for o in sample.objects}
+                np.testing.assert_array_equal(thing.motion.at(0), there[thing.id])
