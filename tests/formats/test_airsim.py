@@ -102,7 +102,7 @@ def test_what_it_needs_and_refuses(stills, videos):
         Options(images=("lidar",))
     scope = scope_of(stills)
     assert list(refuses(scope, Options())) == []
-    told = "expected two rectified cameras (rig: {stereo: ...}); found camera"
+    told = "expected two rectified cameras (rig: {kind: stereo, baseline: 0.1}); found camera"
     assert list(refuses(scope, Options(images=("disparity_normalized",)))) == [told]
     many = replace(scope, most_objects=300)
     assert list(refuses(many, Options())) == ["expected at most 255 objects in a picture; found 300"]

@@ -170,5 +170,5 @@ def test_what_is_refused(videos, stills):
     assert list(flyingthings.refuses(scope, options)) == []
     assert "expected sequences" in next(flyingthings.refuses(scope_of(stills), options))
     one, other = (list(flyingthings.refuses(Scope(**{**vars(scope), "rig": rig}), options)) for rig in (lone, three))
-    assert one == ["expected two rectified cameras (rig: {stereo: ...}); found left"]
+    assert one == ["expected two rectified cameras (rig: {kind: stereo, baseline: 0.1}); found left"]
     assert other == ["expected one camera, or two that are rectified; found left, right, third"]

@@ -173,7 +173,7 @@ def test_what_is_refused(videos, stills):
     three = Scope(**{**vars(scope), "rig": scope.rig.model_copy(update={"sensors": (*scope.rig.sensors, third)})})
     assert list(middlebury.refuses(scope, options)) == []
     assert list(middlebury.refuses(scope_of(stills), options)) == [
-        "expected two rectified cameras (rig: {stereo: ...}); found camera"
+        "expected two rectified cameras (rig: {kind: stereo, baseline: 0.1}); found camera"
     ]
     assert list(middlebury.refuses(three, options)) == [
         "expected one camera, or two that are rectified; found left, right, third"
