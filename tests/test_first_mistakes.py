@@ -328,7 +328,7 @@ def test_values_of_another_shape_show_the_right_one(field, value, told, tmp_path
 def test_formats_are_known_before_anything_is_printed(tmp_path):
     file = tmp_path / "recipe.yaml"
     file.write_text(small_recipe().to_yaml())
-    answer = viewsphere("render", file, "-o", tmp_path / "out", "--format", "yolo")
+    answer = viewsphere("render", file, "-o", tmp_path / "out", "--format", "yolov")
     assert answer.stdout == ""
     assert answer.stderr.startswith("viewsphere: --format: expected one of ")
     assert not (tmp_path / "out").exists()

@@ -91,7 +91,7 @@ def test_tiff_keeps_every_bit():
     [
         np.zeros((4, 4), np.int64),
         np.zeros((4, 4, 2), np.uint8),
-        np.zeros((4, 4, 3), np.uint16),
+        np.zeros((4, 4, 3), np.uint32),
         np.zeros((0, 4), np.uint8),
         np.zeros((4, 4, 3), np.bool_),
         np.zeros(4, np.uint8),

@@ -102,7 +102,7 @@ def test_appending_keeps_the_options_of_the_exports_that_are_there(tmp_path):
 def test_changed_options_are_damage(small_dataset):
     file = small_dataset.root / "coco" / "checksums.xxh128"
     text = file.read_text()
-    assert text.startswith('# options {"category_ids":"contiguous","pictures":"images"}\n')
+    assert text.startswith('# options {"category_ids":"contiguous","pictures":"images","segmentation":"polygons"}\n')
     file.write_text(text.replace("contiguous", "coco"))
     assert not is_proved(small_dataset.root)
     found = {finding.message for finding in check(small_dataset, rays=False, sample=0).findings}
@@ -149,7 +149,7 @@ def test_render_takes_them_too(tmp_path):
 
 WRONG = {
     "coco.category_ids=oco": "coco.category_ids: expected one of contiguous, coco; found 'oco'; did you mean 'coco'?",
-    "coco.ids=coco": "coco.ids: expected one of category_ids, pictures; found 'ids'",
+    "coco.ids=coco": "coco.ids: expected one of category_ids, pictures, segmentation; found 'ids'",
     "coco=coco": "coco=coco: expected format.option=value; found no option",
     "coco.category_ids": "coco.category_ids: expected field=value, such as coco.category_ids=coco; found no '='",
     "csv.a=1": "csv.a: expected one of coco; found 'csv': add it to the formats",

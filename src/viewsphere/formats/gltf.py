@@ -115,7 +115,7 @@ class _Scenes:
         inside = "" if number is None else f"{number:04d}/"
         name, first = self._files.setdefault(scene, (f"{inside}{sample.index:08d}.glb", place))
         if (camera := _looking(sample)) is not None:
-            with (self.aside / str(first)).open("a", encoding="utf-8") as file:
+            with (self.aside / str(first)).open("a", encoding="utf-8", newline="") as file:
                 file.write(json.dumps(asdict(camera), default=np.ndarray.tolist) + "\n")
         return name
 

@@ -39,8 +39,7 @@ def lacking(dataset: Dataset, module: Format, entry: FormatEntry) -> tuple[str, 
         for sensor in shot.rig.sensors:
             absent = missing(wanted, {*sensor.kept(part.channels), *asked})
             names |= dict.fromkeys(name for name in absent if sensor.lidar is None or name not in PASSES)
-    supplied = {name for part in dataset.plan.parts for _, added in part.supplies for name in added}
-    painted = [name for name in names if name in PASSES and name not in supplied]
+    painted = [name for name in names if name in PASSES and name not in dataset.plan.channels]
     where = f"{dataset.root}: format {entry.name}"
     if painted:
         raise UserError(

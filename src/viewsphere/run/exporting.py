@@ -13,7 +13,6 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Format
 from viewsphere.model.mistakes import one_of
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
-from viewsphere.run.completed import lacking
 from viewsphere.run.preparing import Entries, leaves_out, prepared, targets
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.scope import refusals, scope_of
@@ -48,15 +47,17 @@ def export(
     if place.resolve().is_relative_to(dataset.store.folder.resolve()):
         raise UserError(f"--output: expected a folder outside of the data set's store; found {place}")
     entries = tuple(entry.over(_known_options(dataset, entry.name)) for entry in read_formats(formats))
+    if not entries:
+        return ()
     scope = scope_of(dataset)
+    from viewsphere.run.completed import lacking  # which loads what reads and draws models
+
     modules = {entry.name: writable(entry.name) for entry in entries}
     refused = [f"format {e.name}: {problem}" for e in entries for problem in refusals(modules[e.name], e, scope)]
     if refused:  # before the first of them is written
         raise UserError("\n".join(f"{dataset.root}: {problem}" for problem in refused))
     for entry in entries:
         lacking(dataset, modules[entry.name], entry)
-    if not entries:
-        return ()
     with ExitStack() as whole:
         if is_own:
             dataset.store.make_ready()

@@ -19,7 +19,6 @@ from viewsphere.model.channel import missing
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.completed import Completed, lacking
 from viewsphere.run.in_order import in_order
 from viewsphere.store import Dataset, Exported
 
@@ -55,12 +54,16 @@ class Views:
         """The data set with the labels that a format needs, and without annotations of what is seen no more than `least`, but
         for a format that writes scenes. Raises UserError for needs that cannot be met.
         """
+        from viewsphere.run.completed import lacking  # which loads what reads and draws models
+
         module = plugins.load("formats", entry.name)
         return self._seen(least if leaves_out(module) else None, lacking(self._dataset, module, entry))
 
     def _made(self, least: float | None, names: tuple[str, ...]) -> Dataset:
         if least is None and not names:
             return self._dataset
+        from viewsphere.run.completed import Completed
+
         root, choice = self._dataset.root, self._dataset.choice
         shown = Completed(root, choice, least, names) if names else Exported(root, choice, least or 0.0)
         shown.link_kinds, shown.made = self._dataset.link_kinds, self._dataset.made
