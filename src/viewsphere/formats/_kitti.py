@@ -63,9 +63,13 @@ def calibration(rig: Rig, car: Car, intrinsics: Intrinsics) -> Mapping[str, Floa
     velo = CAMERA_FROM_LIDAR
     if car.lidar is not None:
         velo = compose(compose(unmoved(left), mounted(rig, car.lidar)), CAMERA_FROM_LIDAR)
-    lens = centred(intrinsics.K)
-    two, three = (product(lens, [[1, 0, 0, -along], [0, 1, 0, 0], [0, 0, 1, 0]]) for along in (0.0, _along(left, right)))
+    two, three = (projection(intrinsics, along) for along in (0.0, _along(left, right)))
     return {"P0": two, "P1": three, "P2": two, "P3": three, "velo": velo[:3]}
+
+
+def projection(lens: Intrinsics, along: float = 0.0) -> Float:
+    """The matrix (3, 4) from a camera's axes to the pixels, (0, 0) a centre, of one with its lens so far along its x axis."""
+    return product(centred(lens.K), [[1, 0, 0, -along], [0, 1, 0, 0], [0, 0, 1, 0]])
 
 
 def _along(left: Float, right: Float) -> float:
@@ -82,6 +86,16 @@ def calibration_text(calibrated: Mapping[str, Float], *others: tuple[str, Float]
     """Lines of the four projections, and of other matrices, each with the word that its line begins with."""
     projections = ((f"{name}:", calibrated[name]) for name in ("P0", "P1", "P2", "P3"))
     return "".join(f"{name} {printed(matrix)}\n" for name, matrix in (*projections, *others)).encode()
+
+
+def rectified(sample: Sample, baseline: float) -> bytes:
+    """The lines of calib_cam_to_cam.txt of the colour cameras, 02 and, where the baseline is not 0, 03; the sample is the left
+    one's.
+    """
+    eyes = {"02": 0.0, "03": baseline} if baseline else {"02": 0.0}
+    size = f"{sample.width} {sample.height}"
+    lines = (f"S_rect_{i}: {size}\nP_rect_{i}: {printed(projection(sample.camera.intrinsics, x))}\n" for i, x in eyes.items())
+    return "".join(lines).encode()
 
 
 def velodyne(sample: Sample) -> bytes:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -73,7 +74,7 @@ LIST: Layout = (b"[\n", "", b"\n]\n")
 OBJECT: Layout = (b"{\n", "", b"\n}\n")
 
 
-class Tree:
+class Tree(ABC):
     """What a format makes of a data set; below it, a class for each format. Errors of the data set that only then are known are
     raised as UserError, and leave nothing written.
     """
@@ -88,11 +89,11 @@ class Tree:
         folder = self.dataset.plan.folder_of(sample.index, FOLDER_SIZE)
         return "/".join((sample.split or "all", *([] if folder is None else [f"{folder:04d}"]), f"{sample.index:08d}"))
 
+    @abstractmethod
     def of(self, sample: Sample) -> Iterator[File | Piece]:
         """What a sample adds. Samples may come in any order, in several processes; their pieces are put together in the order
         of frames.
         """
-        raise NotImplementedError
 
     def rest(self) -> Iterator[File]:
         """Files that belong to no sample."""

@@ -25,7 +25,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats import _refusals as refusals
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._flow_files import steps_png
-from viewsphere.formats._kitti_calibration import rectified
+from viewsphere.formats._kitti import rectified
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._sequences import Eyes, check_whole, instants, number, scene, two_eyes
 from viewsphere.formats._tree import File, Tree, functions

@@ -42,7 +42,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats import _refusals as refusals
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._flow_files import flow_png, steps_png
-from viewsphere.formats._kitti_calibration import projection, rectified
+from viewsphere.formats._kitti import printed, projection, rectified
 from viewsphere.formats._pictures import ids_png, picture
 from viewsphere.formats._sequences import Eyes, check_whole, instants, number, two_eyes
 from viewsphere.formats._tree import File, Tree, functions
@@ -118,7 +118,8 @@ class KittiFlow(Tree):
         baseline = self._eyes.pair(sample).baseline
         if self._has_motion:
             return File(f"{root}/calib_cam_to_cam/{name}.txt", rectified(sample, baseline))
-        lines = (f"P{i}: {projection(sample, baseline * (i % 2))}\n" for i in range(4))  # grey and coloured, left and right
+        lens = sample.camera.intrinsics  # grey and coloured, left and right
+        lines = (f"P{i}: {printed(projection(lens, baseline * (i % 2)))}\n" for i in range(4))
         return File(f"{root}/calib/{name}.txt", "".join(lines).encode())
 
 

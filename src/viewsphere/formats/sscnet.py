@@ -113,7 +113,7 @@ class Sscnet(Tree):
 
     def notes(self) -> Iterator[str]:
         """That SSCNet's own code expects another camera."""
-        shot = next((self.dataset.labelled(row.key) for row in self.dataset.rows), None)
+        shot = next(iter(self.dataset.shots_of_parts), None)
         lens = shot and shot.rig.sensors[0].intrinsics
         if lens and lens != EXPECTED:
             found = f"{lens.width} x {lens.height} and {lens.fx:.6g}"

@@ -17,7 +17,7 @@ from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.scenery import Scenery
-from viewsphere.run.scope import needs_of, shots_of_parts
+from viewsphere.run.scope import needs_of
 from viewsphere.run.sights import Sights
 from viewsphere.store import Choice, Dataset, Exported
 
@@ -30,7 +30,7 @@ def lacking(dataset: Dataset, module: Format, entry: FormatEntry) -> tuple[str, 
     pictures that were imported among others.
     """
     wanted, names, unknown = needs_of(module, entry), dict[str, None](), dict[str, None]()
-    shots = shots_of_parts(dataset)
+    shots = dataset.shots_of_parts
     for part, shot in zip(dataset.plan.parts, shots, strict=True):
         asked = set(part.recipe.get("annotations", ()))
         if shot is None:

@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from viewsphere.formats import Format, Scope
 from viewsphere.labels import channel_labels, on_request
 from viewsphere.model.channel import PASSES, missing
-from viewsphere.model.shot import Shot
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Dataset, Row
+from viewsphere.store import Dataset
 
 
 def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
@@ -29,7 +28,7 @@ def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
 
 def scope_of(dataset: Dataset) -> Scope:
     """What is known of a data set that is there; of one whose shots are kept all labels can be computed."""
-    shots, parts = shots_of_parts(dataset), dataset.plan.parts
+    shots, parts = dataset.shots_of_parts, dataset.plan.parts
     is_known = bool(shots) and all(shots)
     asked = [set(part.recipe.get("annotations", ())) for part in parts]
     kept, annotations = dataset.plan.channels, tuple(sorted(set.intersection(*asked))) if asked else ()
@@ -42,18 +41,6 @@ def scope_of(dataset: Dataset) -> Scope:
         channels=tuple(dict.fromkeys((*kept, *channel_labels()))) if is_known else kept,
         annotations=tuple(on_request()) if is_known else annotations,
     )
-
-
-def shots_of_parts(dataset: Dataset) -> tuple[Shot | None, ...]:
-    """A finished shot of each part of a data set; None for a part whose shots are not kept, such as an imported one, and for
-    one of which nothing is finished, another part's.
-    """
-    rows: dict[int, Row] = {}
-    for row in dataset.rows:
-        rows.setdefault(row.part, row)
-    found = {part: dataset.labelled(row.key) for part, row in rows.items()}
-    some = next(iter(found.values()), None)
-    return tuple(found.get(number, some) for number in range(len(dataset.plan.parts)))
 
 
 def needs_of(module: Format, entry: FormatEntry) -> tuple[str, ...]:

@@ -134,6 +134,18 @@ class Dataset(Shown, Sequence[Sample]):
                 starts.append(total)
         return shots, starts
 
+    @cached_property
+    def shots_of_parts(self) -> tuple[Shot | None, ...]:
+        """A finished shot of each part; None for a part whose shots are not kept, such as an imported one, and for one of which
+        nothing is finished, another part's.
+        """
+        first: dict[int, Row] = {}
+        for row in self.rows:
+            first.setdefault(row.part, row)
+        found = {part: self.labelled(row.key) for part, row in first.items()}
+        some = next(iter(found.values()), None)
+        return tuple(found.get(number, some) for number in range(len(self.plan.parts)))
+
     def __len__(self) -> int:
         return self._shots[1][-1]
 

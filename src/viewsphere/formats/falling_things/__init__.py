@@ -102,7 +102,7 @@ class FallingThings(Tree):
         self._classes = {key: number for number, key in enumerate(dataset.plan.models, 1)}
         if len(self._classes) >= SINGLE:
             raise UserError(f"falling_things: expected fewer than {SINGLE} models; found {len(self._classes):,}")
-        shot = next((dataset.labelled(row.key) for row in dataset.rows[:1]), None)
+        shot = next(iter(dataset.shots_of_parts), None)
         self._sides = (shot and _sides(shot.rig)) or {}
         lenses = {} if shot is None else {sensor.name: sensor.intrinsics for sensor in shot.rig.sensors}
         self._lenses = [(side, lenses[name]) for name, side in self._sides.items()]

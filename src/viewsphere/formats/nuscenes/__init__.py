@@ -90,7 +90,7 @@ class NuScenes(Tree):
         self._version = options.version
         self._timeline = Timeline(dataset)
         self._story = lru_cache(maxsize=2)(partial(story_of, self._timeline))
-        shot = next((dataset.labelled(key) for key, _ in dataset.shots()), None)
+        shot = next(iter(dataset.shots_of_parts), None)
         self._kinds = {} if shot is None else dict(zip(channels_of(shot.rig), modalities(shot.rig), strict=True))
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
