@@ -8,10 +8,12 @@ import pytest
 from viewsphere import Dataset, generate
 from viewsphere.errors import StoreError, UserError
 from viewsphere.recipe.formats import FormatEntry
+from viewsphere.run import sights
 from viewsphere.run.completed import Completed, lacking
 from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Choice
+from viewsphere.truth.visibility import rasterize
 from worlds import rendered, shared_place, stills, videos
 
 FEW = {"channels": ["rgb", "tracks"], "annotations": []}
@@ -91,3 +93,11 @@ def test_what_an_unfinished_neighbour_would_tell_is_asked_for(tmp_path):
     with pytest.raises(StoreError, match="beside it, with which labels compare it, found it unfinished: render the rest first"):
         _ = [sample.flow for sample in completed]
     export(tmp_path / "few", "pointcloud", output=tmp_path / "out")  # depth needs no other instant
+
+
+def test_formats_that_lack_the_same_see_each_frame_once(tmp_path, monkeypatch):
+    generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
+    seen = []
+    monkeypatch.setattr(sights, "rasterize", lambda *arguments, **more: seen.append(1) or rasterize(*arguments, **more))
+    export(tmp_path / "few", ["pointcloud", "tum", "coco_panoptic"], output=tmp_path / "out")
+    assert len(seen) == len(Dataset(tmp_path / "few"))

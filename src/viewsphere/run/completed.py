@@ -61,7 +61,7 @@ class Completed(Exported):
     def __init__(
         self, root: str | os.PathLike[str], choice: Choice | None, least: float | None, names: tuple[str, ...]
     ) -> None:
-        super().__init__(root, choice, -1.0 if least is None else least)
+        super().__init__(root, choice, least)
         self._names = names
 
     def __reduce__(self) -> tuple[Any, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -73,15 +73,13 @@ class Completed(Exported):
         return super().shown(self._with(sample, wanted) if wanted else sample)
 
     @cached_property
-    def _scenery(self) -> Scenery:
-        return Scenery(self)
-
-    @cached_property
-    def _sights(self) -> Sights:
-        return Sights(self, self._scenery, {info.key: info for info in Dataset(self.root).models})  # chosen or not
+    def sights(self) -> Sights:
+        """What its sensors saw; several data sets of one root may share it."""
+        whole = Dataset(self.root)  # chosen or not, and with what is hidden
+        return Sights(whole, Scenery(whole), {info.key: info for info in whole.models})
 
     def _with(self, sample: Sample, names: list[str]) -> Sample:
-        if not self._sights.is_possible(sample):
+        if not self.sights.is_possible(sample):
             raise StoreError(
                 f"frame {sample.index}: expected a shot of which {names[0]} is computed; found an imported picture"
             )
@@ -98,9 +96,9 @@ class Completed(Exported):
         asked = [name for name in names if name in on_request()]
         needs = [labels()[name].needs for name in names]
         compares = any(need.instants or need.poses for need in needs)
-        sight = self._sights.of(sample, [*sample.files, *names], asked, continued=compares)
+        sight = self.sights.of(sample, names, asked, continued=compares)
         if sight is None:
-            raise StoreError(f"frame {sample.index}: expected scenery as it was rendered: {'; '.join(self._scenery.notes)}")
+            raise StoreError(f"frame {sample.index}: expected scenery as it was rendered: {'; '.join(self.sights.notes)}")
         return sight
 
 
@@ -110,14 +108,12 @@ class _Computed(Mapping[str, NDArray[Any]]):
     def __init__(self, kept: Mapping[str, NDArray[Any]], names: list[str], sight: Callable[[], Sight]) -> None:
         self._kept, self._names, self._sight = kept, names, sight
         self._made: dict[str, NDArray[Any]] = {}
-        self._seen: Sight | None = None
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self._names:
             return self._kept[name]
         if name not in self._made:
-            self._seen = self._seen or self._sight()
-            self._made[name] = channel_labels()[name].compute(self._seen)
+            self._made[name] = channel_labels()[name].compute(self._sight())
         return self._made[name]
 
     def __contains__(self, name: object) -> bool:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from itertools import chain, repeat
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
@@ -21,6 +21,9 @@ from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.in_order import in_order
 from viewsphere.store import Dataset, Exported
+
+if TYPE_CHECKING:
+    from viewsphere.run.completed import Completed
 
 PATIENCE_S, WORTH_S = 2.0, 8.0
 """Seconds after which this process looks how long it would take for what is left; and for how many of them others help, each
@@ -49,6 +52,7 @@ class Views:
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset
         self._seen = cache(self._made)
+        self._completed: Completed | None = None
 
     def of(self, entry: FormatEntry, least: float | None) -> Dataset:
         """The data set with the labels that a format needs, and without annotations of what is seen no more than `least`, but
@@ -65,7 +69,12 @@ class Views:
         from viewsphere.run.completed import Completed
 
         root, choice = self._dataset.root, self._dataset.choice
-        shown = Completed(root, choice, least, names) if names else Exported(root, choice, least or 0.0)
+        if names:
+            shown = Completed(root, choice, least, names)
+            self._completed = self._completed or shown
+            shown.sights = self._completed.sights  # so that formats which need the same see it once
+        else:
+            shown = Exported(root, choice, least)
         shown.link_kinds, shown.made = self._dataset.link_kinds, self._dataset.made
         return shown
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.exported import read_exported
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
-from viewsphere.labels import Placement, Sight, labels
+from viewsphere.labels import Needs, Placement, Sight, labels
 from viewsphere.model.model_spec import ModelSpec, step_key
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4
@@ -31,13 +31,16 @@ MODELS = 200
 
 
 class Sights:
-    """Gives the sights of a data set's samples; the last geometry is kept, because samples of one follow one another."""
+    """Gives the sights of a data set's samples; the last geometry, and the last sight, are kept: samples of one geometry follow
+    one another, and several ask for the same sample.
+    """
 
     def __init__(self, dataset: Dataset, scenery: Scenery, models: Mapping[str, ModelInfo]) -> None:
         self._dataset, self._scenery, self._models = dataset, scenery, models
         self._mesh = lru_cache(maxsize=MODELS)(self._read)
         self._geometry: tuple[object, Geometry | None] = None, None
-        self._views: tuple[str, ShotViews | None] = "", None
+        self._views: tuple[object, ShotViews | None] = None, None
+        self._last: tuple[object, Sight | None] | None = None
         self._continued = lru_cache(maxsize=4)(self._joined)
         self._keys: dict[int, str] = {}  # of the objects of the views' shot: merged data sets have names of their own
 
@@ -46,17 +49,28 @@ class Sights:
         known = self._scenery.shot(self._scenery.key_of(sample.index)) is not None
         return known and sample.known_camera is not None and all(o.source is None for o in sample.objects)
 
+    @property
+    def notes(self) -> list[str]:
+        """What of the scenery is not what it was."""
+        return self._scenery.notes
+
     def of(self, sample: Sample, names: Iterable[str], asked: Iterable[str] = (), continued: bool = False) -> Sight | None:
         """What a sample's sensor saw, for labels of these names, and with the labels on request that were or are `asked` for;
         None where scenery is not what it was. `continued`: labels may compare it with instants of the shots before and after.
         """
+        known = labels()
+        needs = tuple(dict.fromkeys(known[name].needs for name in (*names, *asked) if name in known))
+        key = sample.index, tuple(asked), continued, needs
+        if self._last is None or self._last[0] != key:
+            self._last = key, self._seen(sample, needs, tuple(asked), continued)
+        return self._last[1]
+
+    def _seen(self, sample: Sample, needs: Sequence[Needs], asked: tuple[str, ...], continued: bool) -> Sight | None:
         key = self._scenery.key_of(sample.index)
         made = self._continued(key) if continued else self._made(key)
         assert made is not None
-        around, shot = (
-            made.around,
-            made.shot.model_copy(update={"labels": {**made.shot.labels, **sample.options}}),
-        )  # those of channels added later, too
+        options = {**made.shot.labels, **sample.options}  # those of channels added later, too
+        around, shot = made.around, made.shot.model_copy(update={"labels": options})
         geometry = self._built(sample, shot, around)
         if geometry is None:
             return None
@@ -64,7 +78,7 @@ class Sights:
         placed = tuple(self._placement(by_id.get(i + 1), sample, shot) for i in range(geometry.object_count))
         visibility = rasterize(geometry, camera, keeps_exact=True)
         annotations = tuple(dict.fromkeys((*shot.annotations, *asked)))
-        views = self._compared(sample, shot, around, (*names, *annotations))
+        views = self._compared(sample, shot, around, (*needs, *(labels()[name].needs for name in shot.annotations)))
         return Sight(geometry, camera, visibility, placed, views, annotations, shot.labels)
 
     def _made(self, key: str) -> _Made | None:
@@ -120,19 +134,18 @@ class Sights:
             self._geometry = now, built
         return self._geometry[1]
 
-    def _compared(self, sample: Sample, shot: Shot, around: SceneryRecord, names: Iterable[str]) -> SampleViews | None:
+    def _compared(self, sample: Sample, shot: Shot, around: SceneryRecord, needs: Sequence[Needs]) -> SampleViews | None:
         """What labels of motion and stereo compare a sample with; None without one, and where scenery is not what it was.
 
         Points are picked here, before any label asks for triangles, which would be written over.
         """
-        known = labels()
-        needs = [known[name].needs for name in names if name in known]
         if not any(need.is_some for need in needs):
             return None
         keys = {o.id: o.track or o.key for o in sample.objects}
-        if self._views[0] != shot.key:
+        known = shot.key, len(shot.instants)  # with neighbours or without
+        if self._views[0] != known:
             self._keys = keys  # before the views are made, which ask for meshes
-            self._views = shot.key, self._shot_views(shot, around)
+            self._views = known, self._shot_views(shot, around)
         self._keys.update(keys)
         views, (instant, sensor) = self._views[1], self._scenery.taken(sample, shot)
         if views and any(need.tracks for need in needs):
