@@ -272,9 +272,10 @@ FORMAT_LIST = """# All formats
 
 `viewsphere formats` lists them, too. Each is one file in `src/viewsphere/formats/`. Labels that a format needs and a data set
 does not keep are computed by `viewsphere export` from its shots and models; passes, such as `rgb`, have to be kept. `viewsphere
-check` proves every export: each file is what would be written now. The table says which programs read the written trees back in
-tests, what of them was compared with the data set's own labels, and the largest difference; *own reader* is a small one written
-from the format's documentation.
+check` proves every export: each file is what would be written now. The column *read by* names programs that a format is made
+for. The one beside it says what read written trees back in tests, what was compared with the data set's own labels, and the
+largest difference; *own reader* and *second reader* are small ones written from the format's documentation, the second by
+somebody who had not seen the writer.
 
 | format | holds | needs | read by | compared in tests: largest difference | test |
 |---|---|---|---|---|---|

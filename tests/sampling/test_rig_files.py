@@ -116,6 +116,16 @@ def test_cv2_agrees(tmp_path):
     np.testing.assert_allclose(shows(rig, 1, POINTS), theirs + 0.5, atol=1e-9)
 
 
+@pytest.mark.parametrize("sizes", ["[ 5 ]", "[ 5, 1 ]", "[ 1, 5 ]"])
+def test_opencv_5_writes_vectors_in_another_way(sizes, tmp_path):
+    vector = f"D1: !!opencv-nd-matrix\n   sizes: {sizes}\n   dt: d\n   data: [ {', '.join(map(repr, D1))} ]\n"
+    text = opencv(K1=K1, D1=D1, K2=K2, D2=D2, R=R, T=T[:, None])
+    begin, end = text.index("D1:"), text.index("K2:")
+    assert read(tmp_path, text[:begin] + vector + text[end:]) == read(tmp_path, text)
+    with pytest.raises(RecipeError, match=r"rig.yaml:\d+: .*sizes of a vector or a matrix were expected; found \[5, 1, 1\]"):
+        read(tmp_path, text[:begin] + vector.replace(sizes, "[5, 1, 1]") + text[end:])
+
+
 def test_rectified_opencv_has_a_baseline(tmp_path):
     p1 = np.array([[400.0, 0, 320, 0], [0, 400, 240, 0], [0, 0, 1, 0]])
     p2 = p1 + np.array([[0, 0, 0, -400 * BASELINE], [0] * 4, [0] * 4])

@@ -18,14 +18,25 @@ Float = NDArray[np.float64]
 
 
 class _Loader(ShallowLoader):
-    """Plain data; `!!opencv-matrix` is the mapping that follows."""
+    """Plain data; `!!opencv-matrix` is the mapping that follows, and OpenCV 5's `!!opencv-nd-matrix` of a vector one column."""
 
 
 def _as_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
     return loader.construct_mapping(node, deep=True)
 
 
+def _as_columns(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+    entry = _as_mapping(loader, node)
+    sizes = entry.get("sizes")
+    if not isinstance(sizes, list) or len(cast("list[Any]", sizes)) not in (1, 2):
+        problem = f"sizes of a vector or a matrix were expected; found {sizes!r:.40}"
+        raise yaml.constructor.ConstructorError(problem=problem, problem_mark=node.start_mark)
+    rows, columns = (*cast("list[Any]", sizes), 1)[:2]
+    return entry | {"rows": rows, "cols": columns}
+
+
 _Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _as_mapping)
+_Loader.add_constructor("tag:yaml.org,2002:opencv-nd-matrix", _as_columns)
 
 
 def read_document(path: Path) -> dict[str, Any]:
