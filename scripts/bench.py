@@ -4,8 +4,8 @@ Reference scene (bench_scene.py): a zoo car cut to about 75,000 triangles with 1
 occlusion-roughness-metallic, normals) on every material, the ground, an environment with a sun, 640x480; files: RGB PNG,
 instance PNG, float32 depth and normals, annotations. `--scaling` measures how cost grows instead and draws
 docs/images/scaling.svg. `--labels` measures each label (bench_labels.py), `--motion` sequences (bench_motion.py), `--training`
-how fast frames reach a training loop (bench_training.py, with PyTorch), `--cycles` and `--endurance` the Cycles
-engine (bench_cycles.py).
+how fast frames reach a training loop (bench_training.py, with PyTorch), `--exports` 25 formats at once (bench_exports.py),
+`--cycles` and `--endurance` the Cycles engine (bench_cycles.py).
 """
 
 from __future__ import annotations
@@ -264,6 +264,24 @@ def slow(args: argparse.Namespace) -> None:
         endurance(args.endurance)
 
 
+def in_folder(args: argparse.Namespace, folder: Path) -> None:
+    """Measure what writes files, in an empty folder."""
+    if args.exports:
+        from bench_exports import exports
+
+        exports(args.frames, folder)
+        return
+    write_reference(folder)
+    if args.motion:
+        from bench_motion import motion
+
+        motion(folder)
+    else:
+        from bench_training import training
+
+        training(folder)
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--frames", type=int, default=48)
@@ -271,6 +289,7 @@ def main() -> None:
     options.add_argument("--scaling", action="store_true", help="measure how cost grows, and draw it")
     options.add_argument("--motion", action="store_true", help="measure what flow, states, tracks and moving pictures cost")
     options.add_argument("--labels", action="store_true", help="measure what each label costs, with 1 and 20 objects")
+    options.add_argument("--exports", action="store_true", help="measure 25 formats in one pass, and what they encode")
     options.add_argument("--training", action="store_true", help="measure reading and rendering for a training loop")
     options.add_argument("--cycles", type=int, metavar="FRAMES", help="measure the Cycles engine beside BlenderProc's way")
     options.add_argument("--threads", type=int, default=0, help="of BlenderProc's Blender, beside --cycles; 0: all cores")
@@ -289,19 +308,9 @@ def main() -> None:
 
         report(max(1, args.frames // 12), embree)
         return
-    if args.motion:
-        from bench_motion import motion
-
+    if args.motion or args.exports or args.training:
         with tempfile.TemporaryDirectory() as name:
-            write_reference(Path(name))
-            motion(Path(name))
-        return
-    if args.training:
-        from bench_training import training
-
-        with tempfile.TemporaryDirectory() as name:
-            write_reference(Path(name))
-            training(Path(name))
+            in_folder(args, Path(name))
         return
     if args.cycles or args.endurance:
         slow(args)
