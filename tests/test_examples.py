@@ -27,8 +27,8 @@ def test_a_camera_is_calibrated_from_rendered_chessboards(tmp_path, monkeypatch,
     exact, seen = found["camera"]["from_keypoints"], found["camera"]["from_pictures"]
     assert exact["views"] == 12 and seen["views"] >= 6
     assert exact["focal_share"] < 2e-4 and exact["principal_point_px"] < 0.05 and exact["distortion_share"] < 0.01
-    assert found["camera"]["corners_px"] < 0.1 and seen["reprojection_px"] < 0.1
-    assert seen["focal_share"] < 2e-3 and seen["principal_point_px"] < 2 and seen["distortion_share"] < 0.05
+    assert found["camera"]["corners_px"] < 0.03 and seen["reprojection_px"] < 0.04
+    assert seen["focal_share"] < 4e-4 and seen["principal_point_px"] < 0.4 and seen["distortion_share"] < 0.03
     assert found["camera"]["pnp_deg"] < 0.05
     assert found["stereo"]["pairs"] >= 3 and found["stereo"]["baseline_m"] < 1e-4 and found["stereo"]["rotation_deg"] < 0.05
 
