@@ -11,14 +11,13 @@ import resource
 import time
 from collections import defaultdict
 from collections.abc import Generator, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
-from viewsphere import Dataset, Recipe, generate
-from viewsphere.recipe.formats import FormatEntry, read_formats
-from viewsphere.run.preparing import targets
-from viewsphere.store.checksums import write_checksums
+from viewsphere import Dataset, Recipe, export, generate
+from viewsphere.run.preparing import Target
 
 TRAINERS = ("yolo", "voc", "coco", "coco_panoptic", "cityscapes", "mot", "imagefolder", "csv")
 POSES = (
@@ -76,63 +75,54 @@ class Times:
             self._inner[-1] += took
 
 
-def timed_links(times: Times) -> None:
-    """Time what `Dataset.link` takes by itself."""
-    plain = Dataset.link
+@contextmanager
+def clocks(times: Times) -> Generator[None]:
+    """While this lasts, an export tells what reading, making and linking take of it."""
+    read, link, preparer = Dataset.samples_of, Dataset.link, Target.preparer
 
-    def link(self: Dataset, *args: Any) -> Any:
+    def timed_read(self: Dataset, *args: Any) -> Iterator[Any]:
+        samples = read(self, *args)
+        while True:
+            with times.timed("reading"):
+                sample = next(samples, None)
+                for name in sample.channels if sample is not None else ():
+                    getattr(sample, name)
+            if sample is None:
+                return
+            yield sample
+
+    def timed_link(self: Dataset, *args: Any) -> Any:
         with times.timed("links"):
-            return plain(self, *args)
+            return link(self, *args)
 
-    Dataset.link = link  # pyright: ignore[reportAttributeAccessIssue]
+    def timed_preparer(self: Target) -> Any:
+        prepare = preparer(self)
 
+        def timed(sample: Any) -> Any:
+            with times.timed(self.entry.name):
+                return prepare(sample)
 
-def exported(dataset: Dataset, entries: tuple[FormatEntry, ...], folder: Path, times: Times) -> None:
-    """What `viewsphere.run.exporting.write` does, in its order, with a clock at each of its steps."""
-    places = [(entry, folder / entry.name) for entry in entries]
-    for _, place in places:
-        place.mkdir(parents=True)
-    found = targets(dataset, places)
-    with ExitStack() as finish:
-        finish.enter_context(times.timed("common files"))
-        adds = {target.entry.name: finish.enter_context(target.writer(lambda _: None)) for target in found}
-        preparers = {target.entry.name: target.preparer() for target in found}
-        for sample in _read(dataset, times):
-            for name, prepare in preparers.items():
-                with times.timed(name):
-                    part = prepare(sample)
-                adds[name](part)
-    with times.timed("digests"):
-        for entry, place in places:
-            write_checksums(place, entry.whole().options, None, None, len(dataset))
+        return timed
 
-
-def _read(dataset: Dataset, times: Times) -> Iterator[Any]:
-    samples = iter(dataset)
-    while True:
-        with times.timed("reading"):
-            sample = next(samples, None)
-            for name in sample.channels if sample is not None else ():
-                getattr(sample, name)
-        if sample is None:
-            return
-        yield sample
+    with (
+        patch.object(Dataset, "samples_of", timed_read),
+        patch.object(Dataset, "link", timed_link),
+        patch.object(Target, "preparer", timed_preparer),
+    ):
+        yield
 
 
 def exports(frames: int, folder: Path) -> None:
     """Print the table for so many frames; all is made in this empty folder."""
     generate(recipe(frames), folder / "out", workers=2)
-    entries = read_formats(FORMATS)
-    dataset, times = Dataset(folder / "out"), Times()
-    timed_links(times)
-    begun = time.process_time()
-    exported(dataset, entries, folder / "all", times)
-    whole, count = time.process_time() - begun, len(dataset)
-    encoding = sum(times.of[entry.name] for entry in entries)
-    print(f"\n{count} frames, {len(entries)} formats\n\n| | CPU ms a frame |\n|---|---:|")
+    times = Times()
+    with clocks(times), times.timed("common files and digests"):
+        export(folder / "out", FORMATS, output=folder / "all")
+    made, whole = sum(times.of[name] for name in FORMATS), sum(times.of.values())
+    print(f"\n{frames} frames, {len(FORMATS)} formats\n\n| | CPU ms a frame |\n|---|---:|")
     for name, took in sorted(times.of.items(), key=lambda row: -row[1]):
-        print(f"| {name} | {1000 * took / count:.2f} |")
-    print(f"| all | {1000 * whole / count:.2f} |")
-    once = encoding + times.of["reading"]
-    print(f"\nall / (encoding + reading once): {whole / once:.3f}; all / encoding: {whole / encoding:.3f}")
+        print(f"| {name} | {1000 * took / frames:.2f} |")
+    print(f"| all | {1000 * whole / frames:.2f} |")
+    once = made + times.of["reading"]
+    print(f"\nall / (made + read once): {whole / once:.3f}; all / made: {whole / made:.3f}")
     print(f"most memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")

@@ -13,7 +13,7 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from enum import Enum
 from functools import partial
 from pathlib import Path
@@ -188,7 +188,7 @@ def painted(engine: str) -> tuple[str, ...]:
 
 
 def error_of(proof: dict[str, Any]) -> str:
-    return f"{proof['error']:g} {proof['unit']}".rstrip()
+    return f"{proof['error']:g} {proof['unit'].removeprefix('1')}".rstrip()
 
 
 def agree(what: str, found: Collection[str], wanted: Collection[str]) -> None:
@@ -289,7 +289,7 @@ def formats_page() -> str:
     text = NOTE + FORMAT_LIST
     for one in listed():
         found = proofs.get(one.name, [])
-        compared = "<br>".join(f"{proof['against']}: {error_of(proof)}" for proof in found)
+        compared = "<br>".join(by_reader(found))
         tests = "<br>".join(dict.fromkeys(f"`{proof['test'].removeprefix('tests/')}`" for proof in found))
         link = f"[`{one.name}`](formats.md#{one.name})" if one.name in described else f"[`{one.name}`](#{one.name})"
         needs = ", ".join(f"`{name}`" for name in one.needs)
@@ -300,6 +300,17 @@ def formats_page() -> str:
             if one.options:
                 text += options_table("formats", one.name)
     return text
+
+
+def by_reader(proofs: list[dict[str, Any]]) -> Iterator[str]:
+    """A line for each reader: what was compared by it, with the largest difference; what differs by nothing is equal."""
+    read: dict[str, dict[str, str]] = {}
+    for proof in proofs:
+        reader, is_named, what = proof["against"].partition(": ")
+        read.setdefault(reader if is_named else "tests", {})[what or reader] = error_of(proof) if proof["error"] else "equal"
+    for reader, errors in read.items():
+        same = {error: ", ".join(what for what in errors if errors[what] == error) for error in errors.values()}
+        yield f"*{reader}*: {'; '.join(f'{what} {error}' for error, what in same.items())}"
 
 
 def as_page(told: str) -> str:

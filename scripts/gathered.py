@@ -17,14 +17,16 @@ USE = "from proven import"
 Proofs = dict[str, list[dict[str, Any]]]
 
 
-def gathered(folder: str, pythons: Iterable[str] = (sys.executable,)) -> Proofs:
-    """The largest differences that the tests below a folder of tests/ find, by each of these Pythons; and their files."""
+def gathered(folder: str, pythons: Iterable[str] = (sys.executable,), *, slow: bool = False) -> Proofs:
+    """The largest differences that the tests below a folder of tests/ find, slow ones if wanted, by each of these Pythons; and
+    their files.
+    """
     files = sorted(str(path) for path in (ROOT / folder).rglob("test_*.py") if USE in path.read_text("utf-8"))
     with tempfile.TemporaryDirectory() as place:
         noted = Path(place) / "proven"
         for python in pythons:
             environment = {**os.environ, "VIEWSPHERE_PROVEN": str(noted)}
-            command = [python, "-m", "pytest", "-q", "-m", "not slow", *files]
+            command = [python, "-m", "pytest", "-q", *([] if slow else ["-m", "not slow"]), *files]
             is_own = python == sys.executable  # another one may lack what some tests need
             subprocess.run(command, cwd=ROOT, env=environment, check=is_own)
         return largest(noted)

@@ -18,7 +18,7 @@ from viewsphere import plugins
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--python", action="append", default=[], help="another Python that has viewsphere")
-    found = gathered("tests/formats", [sys.executable, *options.parse_args().python])
+    found = gathered("tests/formats", [sys.executable, *options.parse_args().python], slow=True)
     known = {name: found[name] for name in plugins.names("formats") if name in found}
     (ROOT / "docs" / "formats.json").write_text(json.dumps(known, indent=1, sort_keys=True) + "\n", "utf-8")
 
