@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.limits import limits
@@ -20,7 +20,8 @@ SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".bmp")
 MISTAKES = (OSError, ValueError, SyntaxError, UserError)
 """Errors of pictures and of texts that are broken, missing or outside."""
 
-TRAIN = "train"
+SPLITS = TRAIN, VAL, TEST = ("train", "val", "test")
+"""In the order in which they are told, before others."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,9 @@ class Listed:
     file: Path
     size: tuple[int, int]
     said: tuple[Path | None, ...]
+
+
+Picture = TypeVar("Picture", bound=Listed)
 
 
 def one_line(error: object) -> str:
@@ -57,10 +61,9 @@ def lists(root: Path, folder: str, problems: list[str]) -> Iterator[tuple[str, P
     lines that are not empty. `trainval` is passed over where there are train and val; the problems of the others are appended.
     """
     files = {file.stem: file for file in sorted((root / folder).glob("*.txt"))}
-    if {"train", "val"} <= files.keys():
+    if {TRAIN, VAL} <= files.keys():
         files.pop("trainval", None)
-    order = [name for name in ("train", "val", "test") if name in files]
-    for split in (*order, *(name for name in files if name not in order)):
+    for split in _ordered(files):
         try:
             rows = text_of(file_inside(root, files[split].relative_to(root).as_posix()))
         except MISTAKES as error:
@@ -72,10 +75,10 @@ def lists(root: Path, folder: str, problems: list[str]) -> Iterator[tuple[str, P
 
 def listed_dataset(
     path: Path,
-    pictures: Sequence[Listed],
+    pictures: Sequence[Picture],
     categories: Iterable[Category],
     most: int,
-    shown: Callable[[Listed, int], Sample],
+    shown: Callable[[Picture, int], Sample],
     problems: Sequence[str],
     keep_going: bool,
     models: Sequence[ForeignModel] = (),
@@ -94,7 +97,7 @@ def listed_dataset(
         name=(path.parent if path.is_file() else path).resolve().name,
         digest=_digest(pictures, (also, *problems)),
         categories=tuple(categories),
-        splits=tuple(dict.fromkeys(picture.split for picture in pictures)),
+        splits=_ordered(picture.split for picture in pictures),
         channels=("rgb",),
         count=len(pictures),
         poses=0,
@@ -103,6 +106,12 @@ def listed_dataset(
         models=tuple(models),
         left_out=tuple(problems),
     )
+
+
+def _ordered(splits: Iterable[str]) -> tuple[str, ...]:
+    """Each split once."""
+    found = dict.fromkeys(splits)
+    return (*(name for name in SPLITS if name in found), *(name for name in found if name not in SPLITS))
 
 
 def unposed(picture: Listed, index: int, objects: Sequence[Any], source: Mapping[str, Any]) -> Sample:
@@ -123,6 +132,6 @@ def _digest(pictures: Sequence[Listed], texts: Sequence[str]) -> str:
     return digest.hexdigest()
 
 
-def _frames(pictures: Sequence[Listed], shown: Callable[[Listed, int], Sample]) -> Iterator[ForeignFrame]:
+def _frames(pictures: Sequence[Picture], shown: Callable[[Picture, int], Sample]) -> Iterator[ForeignFrame]:
     for index, picture in enumerate(pictures):
         yield ForeignFrame(shown(picture, index), {"rgb": picture.file})

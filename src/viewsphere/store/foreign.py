@@ -78,6 +78,7 @@ def foreign_object(
     source: Mapping[str, Any],
     counts: str | None,
     box: Box | None,
+    /,
     **known: Any,
 ) -> ObjectAnnotation:
     """An object of which only its mask, the run-length code `counts`, or only its `box`, is known, and the fields in `known`;
