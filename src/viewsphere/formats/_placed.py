@@ -20,7 +20,8 @@ Float = NDArray[np.float64]
 def placed(box: Float, world_from_object: Float, camera_from_world: Float, lens: Intrinsics | None) -> dict[str, Any]:
     """Fields of an object with this box (8, 3) of its own axes, metres, and this pose: boxes, poses, view and size.
 
-    Matrices are rigid, (4, 4). Without a lens nobody knows the box's pixels. Raises ValueError for a matrix that is not rigid.
+    Matrices are rigid, (4, 4). Without a lens nobody knows the box's pixels. Where the box is NaN, the view is that of the
+    origin of the object's axes. Raises ValueError for a matrix that is not rigid.
     """
     camera_from_object = compose(camera_from_world, world_from_object)
     in_camera = transform(camera_from_object, box)
@@ -28,7 +29,7 @@ def placed(box: Float, world_from_object: Float, camera_from_world: Float, lens:
     if lens is not None:
         with np.errstate(over="ignore"):
             pixels, in_front = project(lens, in_camera)
-    view = view_of(camera_from_object, (box[2] + box[4]) / 2)
+    view = view_of(camera_from_object, np.nan_to_num((box[2] + box[4]) / 2))
     return {
         "box3d_object": box,
         "box3d": transform(world_from_object, box),

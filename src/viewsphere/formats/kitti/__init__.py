@@ -31,12 +31,12 @@ Data sets that were made elsewhere are imported by their folder: `viewsphere imp
 with image_2 and label_2 (a picture each) or image_02 and label_02 (sequences); splits are the lists in ImageSets, else all of
 `training` is in `train`. `testing`, which has no labels, and a list `test` of its pictures, are passed over. Read is the left
 colour camera alone: labels' boxes are of its picture; the right one, the grey ones, points and oxts are not. A picture's world
-has its z up and its origin in the reference camera, which looks along y: labels are what they say there. The lens and where
-the left camera stands (KITTI's own: 6 cm off), are P2's. Without a calibration nobody knows them. Exports have labels in
-the left camera's own axes, and P2 without its fourth column. `alpha`, a score, and the track id, are in an object's `source`;
-ids are the tracks', one more where tracks count from 0. `truncated` of tracking, and `occluded`, are the labels
-truncation_level and occlusion_level. DontCare regions are no objects: they are `dont_care` in the picture's `source`, half-open
-corners, and go out as they came, with the track -1. Sequences keep KITTI's numbers; when a picture was taken is not known.
+has its z up and its origin in the reference camera, which looks along y: labels are what they say there. The lens and where the
+left camera stands (KITTI's own: 6 cm off), are P2's. Without a calibration nobody knows them. Exports have labels in the left
+camera's own axes, and P2 without its fourth column. `alpha`, a score, and the track id, are in an object's `source`; ids are
+the tracks', one more where tracks count from 0. `truncated` of tracking, and `occluded`, are the labels truncation_level and
+occlusion_level. DontCare regions are no objects: they are `dont_care` in the picture's `source`, half-open corners, and go out
+as they came, with the track -1. Sequences keep KITTI's numbers; when a picture was taken is not known.
 
 Not checked against KITTI's own files: that a pixel's number is its centre, the tracking benchmark's names in calibrations, and
 the sequence map. Source: A. Geiger, P. Lenz, R. Urtasun, Are we ready for autonomous driving? The KITTI vision benchmark suite,
