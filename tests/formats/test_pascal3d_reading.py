@@ -199,7 +199,7 @@ def test_records_by_hand(imported):
     names, places = car.keypoint_names, car.keypoints
     assert (names, car.keypoint_states.tolist()) == (("left_wheel", "roof", "p_2nd"), [0, 1, 3])
     assert places[0].tolist() == [5, 6.75] and np.isnan(places[1:]).all()
-    assert car.mask.sum() == 170 and not bus.mask.any() and samples["n01"].objects[0].area == 200
+    assert car.mask.sum() == 170 and not bus.mask.any() and samples["n01"].objects[0].area == 18.5 * 12
     coarse, person = samples["n02"].objects
     assert (coarse.view.azimuth_deg, coarse.view.elevation_deg, coarse.pose_category) == (30, 10, "front-left")
     assert (

@@ -634,7 +634,13 @@ OF_STORES = (
 OF_STORES = tuple(f"store/{pattern}" for pattern in OF_STORES)
 OF_EXPORTS = ("coco/**/*.json", "native/**/*.json", "csv/**/*.*", "webdataset/**/*.*", "coco/**/*.*")
 OF_COCO = ("coco/annotations/*.json",) * 4 + ("coco/images/*/*.png",)
-OF_KITTI = ("kitti/training/label_2/*", "kitti/training/label_2/*", "kitti/training/calib/*", "kitti/ImageSets/*", "kitti/**/*.png")
+OF_KITTI = (
+    "kitti/training/label_2/*",
+    "kitti/training/label_2/*",
+    "kitti/training/calib/*",
+    "kitti/ImageSets/*",
+    "kitti/**/*.png",
+)
 OF_PASCAL3D = ("pascal3d/Annotations/*/*",) * 3 + ("pascal3d/CAD/*.mat", "pascal3d/PASCAL/**/*.*", "pascal3d/Images/*/*")
 OF_NATIVE = ("native/*.json", "native/*.json", "native/**/*.json", "native/Pose-*/**/*.*", "native/MODELS/**/*.*")
 
