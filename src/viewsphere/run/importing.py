@@ -41,7 +41,7 @@ def import_dataset(
     record = _plan_record(foreign)
     with store.opened_for(record):
         for model in foreign.models:
-            link_model(store, model.info.key, model.info, model.files)
+            link_model(store, model.info.key, model.info, model.files, model.write)
         _link_frames(foreign, store, record, listener)
         write_credits(Dataset(out))
     return foreign

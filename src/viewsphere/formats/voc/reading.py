@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,33 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.codecs.size import opened
-from viewsphere.errors import StoreError, UserError
+from viewsphere.errors import StoreError
+from viewsphere.formats._listed import MISTAKES, SUFFIXES, TRAIN, Listed, check_bytes, listed_dataset, lists, one_line, unposed
 from viewsphere.geometry.mask import encode_rle, mask_polygons
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Category
-from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
-from viewsphere.store.paths import file_inside, is_name
+from viewsphere.store.foreign import ForeignDataset, foreign_object, refuse_broken
+from viewsphere.store.paths import file_inside
 from viewsphere.urls.inside import is_inside
 
-SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".bmp")
 BOX = ("xmin", "ymin", "xmax", "ymax")
 FLAGS = ("truncated", "occluded", "difficult")
-LARGEST = 10_000_000
-"""Bytes of an XML."""
-
-MISTAKES = (OSError, ValueError, SyntaxError, UserError)
-
-
-@dataclass(frozen=True)
-class _Picture:
-    """A picture, its annotation, and its map of objects, None if it has none."""
-
-    split: str
-    name: str
-    file: Path
-    size: tuple[int, int]
-    xml: Path
-    masks: Path | None
 
 
 @dataclass(frozen=True)
@@ -63,34 +46,20 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     root = _kit(path)
     problems: list[str] = []
     pictures = tuple(_pictures(root, problems))
-    listed, digest, most = _listed_names(root), hashlib.sha256(), 1
+    listed, most = _listed_names(root), 1
     names = dict.fromkeys(listed)
     for picture in pictures:
         found = list(_objects(picture, listed, problems))
         names |= dict.fromkeys(o.name for o in found)
         most = max(most, len(found))
-        for file in (picture.xml, picture.masks):
-            digest.update(hashlib.sha256(file.read_bytes() if file else b"").digest())
-        digest.update(f"{picture.split}/{picture.name}\0".encode(errors="backslashreplace"))
     if not keep_going:
         refuse_broken(problems)
-    if not pictures or not names:
+    if not names:
         raise StoreError(f"{root}: expected pictures and objects that can be used; found none")
-    digest.update("\n".join([*listed, *problems]).encode(errors="backslashreplace"))
     ordered = listed or sorted(names)
     categories = {name: Category(number, name, "") for number, name in enumerate(ordered, 1)}
-    return ForeignDataset(
-        name=path.resolve().name,
-        digest=digest.hexdigest(),
-        categories=tuple(categories.values()),
-        splits=tuple(dict.fromkeys(picture.split for picture in pictures)),
-        channels=("rgb",),
-        count=len(pictures),
-        poses=0,
-        max_objects=most,
-        frames=partial(_frames, pictures, categories, listed),
-        left_out=tuple(problems),
-    )
+    shown = partial(_shown, categories, listed)
+    return listed_dataset(path, pictures, categories.values(), most, shown, problems, keep_going, also="\n".join(listed))
 
 
 def _kit(path: Path) -> Path:
@@ -114,7 +83,7 @@ def _listed_names(root: Path) -> list[str]:
     return list(dict.fromkeys(name for name in rows if name and name != "background"))
 
 
-def _pictures(root: Path, problems: list[str]) -> Iterator[_Picture]:
+def _pictures(root: Path, problems: list[str]) -> Iterator[Listed]:
     """The pictures of all lists, each in the first that has it."""
     seen = set[str]()
     for split, source, names in _lists(root, problems):
@@ -124,33 +93,23 @@ def _pictures(root: Path, problems: list[str]) -> Iterator[_Picture]:
                 try:
                     yield _picture(root, split, name)
                 except MISTAKES as error:
-                    problems.append(f"{source}: {name}: {' '.join(str(error).split())}")
+                    problems.append(f"{source}: {name}: {one_line(error)}")
 
 
 def _lists(root: Path, problems: list[str]) -> Iterator[tuple[str, Path, Sequence[str]]]:
     """Each split with its list and the names of its pictures; lists of categories, whose lines have a number too, are none."""
-    files = {file.stem: file for file in sorted((root / "ImageSets/Main").glob("*.txt"))}
-    if {"train", "val"} <= files.keys():
-        files.pop("trainval", None)
-    order = [name for name in ("train", "val", "test") if name in files]
     any_list = False
-    for split in (*order, *(name for name in files if name not in order)):
-        try:
-            rows = file_inside(root, files[split].relative_to(root).as_posix()).read_text("utf-8").splitlines()
-        except MISTAKES as error:
-            problems.append(f"{files[split]}: expected names of pictures; found: {' '.join(str(error).split())}")
-            continue
-        names = [row.strip() for row in rows if row.strip()]
-        if is_name(split) and not all(name.rpartition(" ")[2] in ("1", "-1", "0") and " " in name for name in names):
+    for split, file, names in lists(root, "ImageSets/Main", problems):
+        if not all(name.rpartition(" ")[2] in ("1", "-1", "0") and " " in name for name in names):
             any_list = True
-            yield split, files[split], names
+            yield split, file, names
     if not any_list and not problems:
         folder = root / "Annotations"
         found = sorted(folder.rglob("*.xml"))
-        yield "train", folder, [file.relative_to(folder).with_suffix("").as_posix() for file in found]
+        yield TRAIN, folder, [file.relative_to(folder).with_suffix("").as_posix() for file in found]
 
 
-def _picture(root: Path, split: str, name: str) -> _Picture:
+def _picture(root: Path, split: str, name: str) -> Listed:
     if not is_inside(name):
         raise StoreError("expected a picture below the folder; found a path that leads outside")
     xml = file_inside(root, f"Annotations/{name}.xml")
@@ -170,23 +129,26 @@ def _picture(root: Path, split: str, name: str) -> _Picture:
         with opened(masks) as found:
             if found.size != size or found.mode not in ("P", "L"):
                 raise StoreError(f"expected objects' numbers in {masks.name}, of the picture's size; found other pixels")
-    return _Picture(split, name, file, size, xml, masks if masks.is_file() else None)
+    return Listed(split, name, file, size, (xml, masks if masks.is_file() else None))
 
 
 def _parsed(xml: Path) -> ElementTree.Element:
+    check_bytes(xml, xml.stat().st_size)
     data = xml.read_bytes()
-    if len(data) > LARGEST or b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise StoreError(f"expected a plain annotation in {xml.name}; found one with entities, or of {len(data):,} bytes")
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise StoreError(f"expected a plain annotation in {xml.name}; found one with entities")
     return ElementTree.fromstring(data)
 
 
-def _objects(picture: _Picture, listed: Sequence[str], problems: list[str]) -> Iterator[_Object]:
+def _objects(picture: Listed, listed: Sequence[str], problems: list[str]) -> Iterator[_Object]:
     """The valid objects of an annotation."""
-    for place, element in enumerate(_parsed(picture.xml).findall("object"), 1):
+    xml = picture.said[0]
+    assert xml is not None
+    for place, element in enumerate(_parsed(xml).findall("object"), 1):
         try:
             yield _object(place, element, listed)
         except ValueError as error:
-            problems.append(f"{picture.xml}: object {place}: {error}")
+            problems.append(f"{xml}: object {place}: {error}")
 
 
 def _object(place: int, element: ElementTree.Element, listed: Sequence[str]) -> _Object:
@@ -209,20 +171,18 @@ def _object(place: int, element: ElementTree.Element, listed: Sequence[str]) -> 
     return _Object(place, name, (x0 - 1, y0 - 1, x1, y1), said)
 
 
-def _frames(pictures: Sequence[_Picture], categories: Mapping[str, Category], listed: Sequence[str]) -> Iterator[ForeignFrame]:
-    for index, picture in enumerate(pictures):
-        masks = None
-        if picture.masks:
-            with opened(picture.masks) as found:
-                masks = np.array(found)
-        found = _objects(picture, listed, [])
-        objects = tuple(_annotation(number, o, categories, picture, masks) for number, o in enumerate(found, 1))
-        said = {"file_name": picture.name + picture.file.suffix}
-        yield ForeignFrame(Sample(index, picture.split, None, None, objects, {}, {}, picture.size, said), {"rgb": picture.file})
+def _shown(categories: Mapping[str, Category], listed: Sequence[str], picture: Listed, index: int) -> Sample:
+    masks = None
+    if picture.said[1]:
+        with opened(picture.said[1]) as found:
+            masks = np.array(found)
+    found = _objects(picture, listed, [])
+    objects = [_annotation(number, o, categories, picture, masks) for number, o in enumerate(found, 1)]
+    return unposed(picture, index, objects, {"file_name": picture.name + picture.file.suffix})
 
 
 def _annotation(
-    number: int, o: _Object, categories: Mapping[str, Category], picture: _Picture, masks: NDArray[Any] | None
+    number: int, o: _Object, categories: Mapping[str, Category], picture: Listed, masks: NDArray[Any] | None
 ) -> ObjectAnnotation:
     """An object with its mask, and as COCO would have it in `source`."""
     x0, y0, x1, y1 = o.box

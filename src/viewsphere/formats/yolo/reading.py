@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, cast
@@ -14,12 +13,13 @@ import numpy as np
 import yaml
 
 from viewsphere.codecs.size import opened
-from viewsphere.errors import StoreError, UserError
+from viewsphere.errors import StoreError
+from viewsphere.formats._listed import MISTAKES, Listed, listed_dataset, one_line, text_of, unposed
 from viewsphere.formats.yolo.lines import Kind, Row, coco_of, kind_of, parsed_line
 from viewsphere.geometry.mask import rle_of_runs, rle_runs
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Category
-from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
+from viewsphere.store.foreign import ForeignDataset, foreign_object
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.urls.inside import is_inside
 
@@ -28,17 +28,6 @@ SPLITS = ("train", "val", "test")
 NO_SPLITS = frozenset({"path", "names", "nc", "kpt_shape", "flip_idx", "kpt_names", "download", "channels"})
 LARGEST_FILE = 10_000_000
 """Bytes of a data.yaml."""
-
-
-@dataclass(frozen=True)
-class _Picture:
-    """A picture, and its file of labels, None if it has none."""
-
-    split: str
-    name: str
-    file: Path
-    size: tuple[int, int]
-    labels: Path | None
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
@@ -52,30 +41,11 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     root, problems = file.parent, list[str]()
     categories = tuple(Category(number + 1, name, "") for number, name in enumerate(_names(told, file)))
     kind = kind_of(told, file)
-    pictures = tuple(_pictures(root, told, file, problems))
-    digest, most = hashlib.sha256(file.read_bytes()), 1
+    pictures, most = tuple(_pictures(root, told, file, problems)), 1
     for picture in pictures:
-        rows = list(_rows(picture, kind, len(categories), problems))
-        most = max(most, len(rows))
-        text = picture.labels.read_bytes() if picture.labels else b""
-        digest.update(f"{picture.split}/{picture.name}\0{hashlib.sha256(text).hexdigest()}".encode(errors="backslashreplace"))
-    if not keep_going:
-        refuse_broken(problems)
-    if not pictures:
-        raise StoreError(f"{file}: expected pictures that can be used; found none")
-    digest.update("\n".join(problems).encode(errors="backslashreplace"))
-    return ForeignDataset(
-        name=root.resolve().name,
-        digest=digest.hexdigest(),
-        categories=categories,
-        splits=tuple(dict.fromkeys(picture.split for picture in pictures)),
-        channels=("rgb",),
-        count=len(pictures),
-        poses=0,
-        max_objects=most,
-        frames=partial(_frames, pictures, categories, kind),
-        left_out=tuple(problems),
-    )
+        most = max(most, sum(1 for _ in _rows(picture, kind, len(categories), problems)))
+    also = hashlib.sha256(file.read_bytes()).hexdigest()
+    return listed_dataset(file, pictures, categories, most, partial(_shown, categories, kind), problems, keep_going, also=also)
 
 
 def _described(path: Path) -> Path:
@@ -92,7 +62,7 @@ def _load(file: Path) -> dict[str, Any]:
         data = file.read_bytes()
         told = yaml.safe_load(data) if len(data) <= LARGEST_FILE else None
     except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-        raise StoreError(f"{file}: expected YOLO's YAML; found: {' '.join(str(error).split())}") from None
+        raise StoreError(f"{file}: expected YOLO's YAML; found: {one_line(error)}") from None
     if not isinstance(told, dict):
         raise StoreError(f"{file}: expected names and folders of pictures; found something else")
     return cast(dict[str, Any], told)
@@ -112,7 +82,7 @@ def _names(told: Mapping[str, Any], file: Path) -> list[str]:
     return found
 
 
-def _pictures(root: Path, told: Mapping[str, Any], file: Path, problems: list[str]) -> Iterator[_Picture]:
+def _pictures(root: Path, told: Mapping[str, Any], file: Path, problems: list[str]) -> Iterator[Listed]:
     """The pictures of all splits, each in the first of those that have it."""
     seen = set[str]()
     base = str(told.get("path") or "")
@@ -159,7 +129,7 @@ def _listed(root: Path, relative: str, split: str, file: Path, problems: list[st
             return
         lines = place.read_text("utf-8").splitlines()
     except (StoreError, OSError, ValueError) as error:
-        problems.append(f"{file}: {split}: {' '.join(str(error).split())}")
+        problems.append(f"{file}: {split}: {one_line(error)}")
         return
     for said in filter(None, map(str.strip, lines)):
         name = (PurePosixPath(relative).parent / said).as_posix()
@@ -185,45 +155,43 @@ def _labels_of(picture: str) -> str:
     return str(PurePosixPath(f"{head}/labels/{tail}" if images else f"/{picture}").with_suffix(".txt"))[1:]
 
 
-def _picture(root: Path, split: str, name: str, file: Path, problems: list[str]) -> _Picture | None:
+def _picture(root: Path, split: str, name: str, file: Path, problems: list[str]) -> Listed | None:
     try:
         place, labels = file_inside(root, name), file_inside(root, _labels_of(name))
         with opened(place) as found:
             size = found.size
-        return _Picture(split, name, place, size, labels if labels.is_file() else None)
-    except (OSError, ValueError, SyntaxError, UserError) as error:
-        problems.append(f"{file}: {split}: expected a picture that can be read; found {name}: {' '.join(str(error).split())}")
+        return Listed(split, name, place, size, (labels if labels.is_file() else None,))
+    except MISTAKES as error:
+        problems.append(f"{file}: {split}: expected a picture that can be read; found {name}: {one_line(error)}")
         return None
 
 
-def _rows(picture: _Picture, kind: Kind, classes: int, problems: list[str]) -> Iterator[Row]:
+def _rows(picture: Listed, kind: Kind, classes: int, problems: list[str]) -> Iterator[Row]:
     """The valid lines of a picture's labels."""
-    if picture.labels is None:
+    (labels,) = picture.said
+    if labels is None:
         return
     try:
-        lines = picture.labels.read_text("utf-8").splitlines()
-    except (OSError, ValueError) as error:
-        problems.append(f"{picture.labels}: expected lines of numbers; found: {error}")
+        lines = text_of(labels)
+    except MISTAKES as error:
+        problems.append(f"{labels}: expected lines of numbers; found: {error}")
         return
     for number, text in enumerate(lines, 1):
         if text.strip():
             try:
                 yield parsed_line(text, kind, classes)
             except ValueError as error:
-                problems.append(f"{picture.labels}: line {number}: {error}")
+                problems.append(f"{labels}: line {number}: {error}")
 
 
-def _frames(pictures: Sequence[_Picture], categories: Sequence[Category], kind: Kind) -> Iterator[ForeignFrame]:
-    for index, picture in enumerate(pictures):
-        rows = _rows(picture, kind, len(categories), [])
-        objects = tuple(_object(number, row, categories, picture, kind) for number, row in enumerate(rows, 1))
-        said: dict[str, Any] = {"file_name": picture.name}
-        if kind.flips:
-            said["flip_idx"] = list(kind.flips)
-        yield ForeignFrame(Sample(index, picture.split, None, None, objects, {}, {}, picture.size, said), {"rgb": picture.file})
+def _shown(categories: Sequence[Category], kind: Kind, picture: Listed, index: int) -> Sample:
+    rows = _rows(picture, kind, len(categories), [])
+    objects = [_object(number, row, categories, picture, kind) for number, row in enumerate(rows, 1)]
+    flips = {"flip_idx": list(kind.flips)} if kind.flips else {}
+    return unposed(picture, index, objects, {"file_name": picture.name, **flips})
 
 
-def _object(number: int, row: Row, categories: Sequence[Category], picture: _Picture, kind: Kind) -> ObjectAnnotation:
+def _object(number: int, row: Row, categories: Sequence[Category], picture: Listed, kind: Kind) -> ObjectAnnotation:
     """An object with what its line says, and as COCO would have it in `source`."""
     source = coco_of(row, picture.size)
     more: dict[str, Any] = {}
