@@ -112,7 +112,7 @@ NO_ANGLE, NO_SHARE = -10.0, -1
 def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
     """A line of labels, without its end: of an object of this type, whose truncation is its share, or its grade."""
     assert o.box2d is not None
-    alpha, box = upright(o) if o.is_placed else (NO_ANGLE, NO_BOX)
+    alpha, box = upright(o) if o.is_boxed else (NO_ANGLE, NO_BOX)
     outside = NO_SHARE if math.isnan(o.truncation) else o.truncation_level if in_grades else o.truncation
     start = f"{kind} {outside:.6g} {_hidden(o)}"
     return " ".join([start, *(f"{number + 0.0:.9g}" for number in (alpha, *inclusive(o.box2d), *box))])

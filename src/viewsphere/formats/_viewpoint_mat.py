@@ -18,7 +18,7 @@ from pydantic import Field
 
 from viewsphere.errors import MissingExtraError, UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._refusals import pinhole, plain_names
+from viewsphere.formats._refusals import known_views, lenses, pinhole, plain_names
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -51,13 +51,11 @@ class Options(Frozen):
 
 def no_viewpoints(scope: Scope) -> Iterator[str]:
     """Viewpoints of other cameras than pinholes with square pixels, and names that are none in MATLAB."""
-    if scope.rig is None:
-        yield "expected pictures of known cameras; found imported ones"
+    yield from known_views(scope)
     yield from pinhole(scope)
-    for sensor in scope.rig.sensors if scope.rig else ():
-        lens = sensor.intrinsics
-        if sensor.lidar is None and (lens.skew or not math.isclose(lens.fx, lens.fy, rel_tol=SQUARE)):
-            yield f"expected square pixels; found fx {lens.fx:g}, fy {lens.fy:g}, skew {lens.skew:g} of {sensor.name}"
+    for name, lens in lenses(scope):
+        if lens.skew or not math.isclose(lens.fx, lens.fy, rel_tol=SQUARE):
+            yield f"expected square pixels; found fx {lens.fx:g}, fy {lens.fy:g}, skew {lens.skew:g} of {name}"
     yield from plain_names(scope, NAMES)
 
 
