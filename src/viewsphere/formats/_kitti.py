@@ -123,7 +123,7 @@ def nobody_cares(region: Box) -> str:
 def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
     """A line of labels, without its end: of an object of this type, whose truncation is its share, or its grade."""
     assert o.box2d is not None
-    alpha, box = upright(o) if o.is_placed else (NO_ANGLE, NO_BOX)
+    alpha, box = upright(o) if o.is_boxed else (NO_ANGLE, NO_BOX)
     alpha = (o.source or {}).get("alpha", alpha)
     start = f"{kind} {_outside(o, in_grades):.6g} {_hidden(o)}"
     return " ".join([start, *(f"{number + 0.0:.9g}" for number in (alpha, *inclusive(o.box2d), *box))])

@@ -18,7 +18,7 @@ from pydantic import Field
 
 from viewsphere.errors import MissingExtraError, UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._refusals import pinhole, plain_names
+from viewsphere.formats._refusals import lenses, pinhole, plain_names
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
@@ -58,9 +58,9 @@ class Options(Frozen):
 def no_viewpoints(scope: Scope) -> Iterator[str]:
     """Viewpoints of other cameras than pinholes with square pixels, and names that are none in MATLAB."""
     yield from pinhole(scope)
-    for sensor in scope.rig.sensors if scope.rig else ():
-        if sensor.lidar is None and (found := _oblong(sensor.intrinsics)):
-            yield f"expected square pixels; found {found} of {sensor.name}"
+    for name, lens in lenses(scope):
+        if found := _oblong(lens):
+            yield f"expected square pixels; found {found} of {name}"
     yield from plain_names(scope, NAMES)
 
 
