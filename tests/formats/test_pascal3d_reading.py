@@ -277,7 +277,7 @@ def test_pictures_whose_pixels_are_not_square(tmp_path):
     record(tmp_path / "mine/Annotations/car_pascal/a.mat", [thing()], K=np.array([[90.0, 0, 20], [0, 80, 20], [0, 0, 1]]))
     picture(tmp_path / "mine/Images/car_pascal/a.jpg")
     import_dataset("pascal3d", tmp_path / "mine", tmp_path / "in")
-    with pytest.raises(UserError, match="frame 0: expected a pinhole with square pixels; found fx 90, fy 80, skew 0"):
+    with pytest.raises(UserError, match="expected square pixels; found fx 90, fy 80, skew 0"):
         export(tmp_path / "in", "pascal3d")
 
 

@@ -56,7 +56,12 @@ class Options(Frozen):
 
 
 def no_viewpoints(scope: Scope) -> Iterator[str]:
-    """Viewpoints of other cameras than pinholes with square pixels, and names that are none in MATLAB."""
+    """Viewpoints that nobody knows, but for those of other trees of the kind, which may have some alone; those of other cameras
+    than pinholes with square pixels, and names that are none in MATLAB.
+    """
+    shown = [sample.known_camera is not None and o.is_placed for sample in scope.pictures for o in sample.objects]
+    if shown and not any(shown) and "keypoints" not in scope.annotations:
+        yield "expected pictures of known cameras and viewpoints; found imported ones"
     yield from pinhole(scope)
     for name, lens in lenses(scope):
         if found := _oblong(lens):
@@ -162,7 +167,7 @@ class Cads:
     def _anchors(self, o: ObjectAnnotation) -> dict[str, dict[str, Any]]:
         """Anchors by their names; those that are not visible have no place, but for imported ones."""
         fields, said = self._fields[o.category], o.source
-        if not self._has_anchors or (said is None and not fields):
+        if not self._has_anchors or (not fields if said is None else "keypoint_names" not in o.more):
             return {}
         known = (said or {}).get("anchors", {})
         names: Sequence[str] = o.keypoint_names

@@ -15,8 +15,9 @@ import yaml
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError
 from viewsphere.formats._listed import MISTAKES, Listed, listed_dataset, one_line, text_of, unposed
+from viewsphere.formats.yolo.describing import DARKNET, NAMES, darknet, unsaid
 from viewsphere.formats.yolo.lines import Kind, Row, coco_of, kind_of, parsed_line
-from viewsphere.geometry.mask import rle_of_runs, rle_runs
+from viewsphere.geometry.mask import rle_of_polygons
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, foreign_object
@@ -31,7 +32,8 @@ LARGEST_FILE = 10_000_000
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All pictures and labels of a folder with data.yaml, or of one such file: what viewsphere.formats.yolo says.
+    """All pictures and labels of a folder with data.yaml, or of one such file: what viewsphere.formats.yolo says. A folder with
+    obj.names and lists, as Darknet has them, and a data.yaml that names no splits, beside `images`, are read, too.
 
     Raises StoreError with every mistake: splits and pictures that are missing or outside, broken lines, classes that have no
     name; with `keep_going` these are left out and reported.
@@ -50,7 +52,8 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 def _described(path: Path) -> Path:
     """The file that describes the data set."""
-    found = [path] if path.is_file() else [path / "data.yaml", *sorted(path.glob("*.yaml")), *sorted(path.glob("*.yml"))]
+    named = [path / "data.yaml", *sorted(path.glob("*.yaml")), *sorted(path.glob("*.yml")), path / NAMES]
+    found = [path] if path.is_file() else named
     file = next((one for one in found if one.is_file()), None)
     if file is None:
         raise StoreError(f"{path}: expected a YOLO data set (data.yaml); found no such file")
@@ -58,6 +61,8 @@ def _described(path: Path) -> Path:
 
 
 def _load(file: Path) -> dict[str, Any]:
+    if file.name == NAMES:
+        return darknet(file)
     try:
         data = file.read_bytes()
         told = yaml.safe_load(data) if len(data) <= LARGEST_FILE else None
@@ -65,7 +70,8 @@ def _load(file: Path) -> dict[str, Any]:
         raise StoreError(f"{file}: expected YOLO's YAML; found: {one_line(error)}") from None
     if not isinstance(told, dict):
         raise StoreError(f"{file}: expected names and folders of pictures; found something else")
-    return cast(dict[str, Any], told)
+    said = cast(dict[str, Any], told)
+    return said if any(name not in NO_SPLITS and place for name, place in said.items()) else {**said, **unsaid(file.parent)}
 
 
 def _names(told: Mapping[str, Any], file: Path) -> list[str]:
@@ -132,8 +138,9 @@ def _listed(root: Path, relative: str, split: str, file: Path, problems: list[st
         problems.append(f"{file}: {split}: {one_line(error)}")
         return
     for said in filter(None, map(str.strip, lines)):
-        name = (PurePosixPath(relative).parent / said).as_posix()
-        if is_inside(said) and (root / name).is_file():
+        names = [(PurePosixPath(relative).parent / path).as_posix() for path in (said, said.removeprefix(DARKNET))]
+        name = next((name for name in names if is_inside(said) and (root / name).is_file()), None)
+        if name is not None:
             yield name
         else:
             problems.append(f"{place}: expected a picture below the folder; found no {said!r:.100}")
@@ -203,16 +210,6 @@ def _object(number: int, row: Row, categories: Sequence[Category], picture: List
     if row.corners is not None and len(row.corners) == 4:
         more["obb"] = row.corners * picture.size
     x, y, width, height = source["bbox"]
-    box, mask = (x, y, x + width, y + height), _mask(source.get("segmentation"), picture.size)
+    outline, box = source.get("segmentation"), (x, y, x + width, y + height)
+    mask = rle_of_polygons(picture.size[1], picture.size[0], outline) if outline else None
     return foreign_object(number, categories[row.number], picture.size, source, mask, box, **({"more": more} if more else {}))
-
-
-def _mask(outline: Any, size: tuple[int, int]) -> str | None:
-    """The run-length code of a polygon, as pycocotools draws it."""
-    if not outline:
-        return None
-    from pycocotools import mask as coco
-
-    width, height = size
-    code: Any = coco.merge(coco.frPyObjects(outline, height, width))
-    return rle_of_runs(height, width, rle_runs(height, width, code["counts"].decode("ascii")))
