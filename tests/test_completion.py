@@ -12,7 +12,7 @@ from deadline import DEADLINE
 from viewsphere import cli, plugins
 from viewsphere.cli import completion
 
-COMMANDS = ("new", "inspect", "plan", "preview", "render", "export", "check", "report", "view", "merge", "import")
+COMMANDS = ("new", "inspect", "plan", "preview", "render", "export", "check", "report", "view", "merge", "import", "convert")
 ZOO = [f"zoo:{name}" for name in plugins.families()]
 
 
@@ -58,6 +58,7 @@ def offered(*words, cwd=None):
         (("render", "a.yaml", "--format", "=", "na"), ["native"]),
         (("export", "out", "--format", "col"), ["colmap"]),
         (("import", "na"), ["native"]),
+        (("convert", "photos", "--from", "coco", "--to", "yolo,na"), ["yolo,native"]),
         (("preview", "a.yaml", "--draw", "boxes"), ["boxes", "boxes3d"]),
         (("plan", "a.yaml", "--set", "camera.f"), ["camera.fov_deg="]),
         (("plan", "a.yaml", "--set", "seed", "=", "1", "--set", "engine", "=", "r"), ["raster"]),
@@ -157,7 +158,7 @@ def test_a_command_without_arguments_says_what_to_write(name, tmp_path, monkeypa
         first, second = capsys.readouterr().err.splitlines()
         assert first.startswith(f"viewsphere: {name}: expected ")
         assert f"next: viewsphere {name} " in second
-        if found and name not in {"new", "import"}:
+        if found and name not in {"new", "import", "convert"}:
             assert "toys/" in second or "more-ds" in second
 
 

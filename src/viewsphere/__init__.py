@@ -19,6 +19,7 @@ from viewsphere.model.notebook import Shown
 
 if TYPE_CHECKING:
     from viewsphere.recipe.recipe import Recipe
+    from viewsphere.run.converting import convert
     from viewsphere.run.exporting import export
     from viewsphere.run.generate import generate
     from viewsphere.run.matching import matches
@@ -30,11 +31,12 @@ if TYPE_CHECKING:
 
     __version__: str
 
-__all__ = ["Dataset", "Recipe", "__version__", "export", "generate", "matches", "open", "plan", "render", "status"]
+__all__ = ["Dataset", "Recipe", "__version__", "convert", "export", "generate", "matches", "open", "plan", "render", "status"]
 
 _HOMES = {
     "Dataset": "store.Dataset",
     "Recipe": "recipe.recipe.Recipe",
+    "convert": "run.converting.convert",
     "export": "run.exporting.export",
     "generate": "run.generate.generate",
     "matches": "run.matching.matches",

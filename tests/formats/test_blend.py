@@ -180,7 +180,7 @@ def test_models_of_imported_frames_are_what_they_show(foreign):
 
 
 def test_frames_that_cannot_be_staged_are_one_line(asked, foreign, tmp_path):
-    with pytest.raises(UserError, match="expected frames for format blend, with known cameras, models and where they stand"):
+    with pytest.raises(UserError, match="format blend: expected frames with known cameras, models and where they stand"):
         export(foreign, ["blend"], output=tmp_path)
     assert not asked and not any(tmp_path.iterdir())
 

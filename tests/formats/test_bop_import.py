@@ -116,7 +116,7 @@ def test_of_others_less_is_known(tree, tmp_path):
     o = dataset[0].objects[0]
     np.testing.assert_array_equal(o.world_from_object, o.camera_from_object)
     assert np.isnan(o.visibility) and o.area and "amodal" not in o.more
-    with pytest.raises(UserError, match=r"frame 0: expected channel depth; found none"):
+    with pytest.raises(UserError, match=r"format bop: expected amodal of all pictures; .*, and expected depth of all pictures"):
         export(dataset.root, "bop", output=tmp_path / "again")
     assert not (tmp_path / "again" / "bop").exists()
 

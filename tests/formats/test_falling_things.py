@@ -189,9 +189,9 @@ def test_refusals(stills, drives):
     lens = stills[0].camera.intrinsics
     side = Sensor(name="side", intrinsics=lens, rig_from_sensor=[[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
     rig = Rig(sensors=(Sensor(name="front", intrinsics=lens), side))
-    (found,) = falling_things.refuses(SimpleNamespace(rig=rig), Options())
+    (found,) = falling_things.refuses(SimpleNamespace(rig=rig, pictures=()), Options())
     assert found == "expected one camera or a rectified pair; found front, side"
-    assert list(falling_things.refuses(SimpleNamespace(rig=None), Options())) == []
+    assert list(falling_things.refuses(SimpleNamespace(rig=None, pictures=()), Options())) == []
     with pytest.raises(UserError, match=r"falling_things: expected .*; found"):
         export(drives.root, "falling_things", output=drives.root.parent / "refused")
     many = SimpleNamespace(plan=SimpleNamespace(models=tuple(map(str, range(300)))))

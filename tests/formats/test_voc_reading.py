@@ -193,7 +193,7 @@ def test_pictures_and_annotations_that_cannot_be_used(tmp_path):
 def test_what_is_no_data_set_says_so(tmp_path):
     with pytest.raises(StoreError, match=r"expected a PASCAL VOC data set \(Annotations, JPEGImages, ImageSets\); found no"):
         import_dataset("voc", tmp_path, tmp_path / "out")
-    (tmp_path / "Annotations").mkdir()
+    (tmp_path / "Annotations").mkdir(), (tmp_path / "JPEGImages").mkdir()
     with pytest.raises(StoreError, match="expected pictures and objects that can be used; found none"):
         import_dataset("voc", tmp_path, tmp_path / "out")
 

@@ -590,6 +590,16 @@ def _store(root: Path, out: Path) -> None:
     )
 
 
+@cache
+def _others() -> Path:
+    """Trees of formats that are imported and whose texts are no JSON."""
+    from viewsphere.run.exporting import export
+
+    whole = _made(False)
+    export(whole, ["kitti", {"pascal3d": {"anchors": False}}], output=whole.parent / "others")
+    return whole.parent / "others"
+
+
 def _exports(root: Path, out: Path) -> None:
     from viewsphere.check import check
     from viewsphere.store import Dataset
@@ -624,6 +634,14 @@ OF_STORES = (
 OF_STORES = tuple(f"store/{pattern}" for pattern in OF_STORES)
 OF_EXPORTS = ("coco/**/*.json", "native/**/*.json", "csv/**/*.*", "webdataset/**/*.*", "coco/**/*.*")
 OF_COCO = ("coco/annotations/*.json",) * 4 + ("coco/images/*/*.png",)
+OF_KITTI = (
+    "kitti/training/label_2/*",
+    "kitti/training/label_2/*",
+    "kitti/training/calib/*",
+    "kitti/ImageSets/*",
+    "kitti/**/*.png",
+)
+OF_PASCAL3D = ("pascal3d/Annotations/*/*",) * 3 + ("pascal3d/CAD/*.mat", "pascal3d/PASCAL/**/*.*", "pascal3d/Images/*/*")
 OF_NATIVE = ("native/*.json", "native/*.json", "native/**/*.json", "native/Pose-*/**/*.*", "native/MODELS/**/*.*")
 
 TARGETS: dict[str, Files | Folders] = {
@@ -641,4 +659,6 @@ TARGETS: dict[str, Files | Folders] = {
     "exports": Folders(_exports, (partial(_made, False),), OF_EXPORTS, ("store", *EXPORTS)),
     "coco": Folders(partial(_import, "coco"), (partial(_made, False),), OF_COCO, ("coco",)),
     "native": Folders(partial(_import, "native"), (partial(_made, False),), OF_NATIVE, ("native",)),
+    "kitti": Folders(partial(_import, "kitti"), (_others,), OF_KITTI, ("kitti",)),
+    "pascal3d": Folders(partial(_import, "pascal3d"), (_others,), OF_PASCAL3D, ("pascal3d",)),
 }  # fmt: skip

@@ -16,7 +16,7 @@ QUICK = {
     "sky": 40,
     "recipe": 15,
 }
-LONG = {"store": 12, "records": 8, "exports": 6, "coco": 15, "native": 15}
+LONG = {"store": 12, "records": 8, "exports": 6, "coco": 15, "native": 15, "kitti": 15, "pascal3d": 15}
 """Inputs of each target; those of whole data sets take longest."""
 
 

@@ -125,13 +125,13 @@ def split(names: str | None) -> tuple[str, ...] | None:
     return None if names is None else tuple(name.strip() for name in names.split(",") if name.strip())
 
 
-def asked_formats(formats: str | None) -> tuple[str, ...] | None:
-    """The formats that --format names, None for None; UserError names one that cannot be written."""
+def asked_formats(formats: str | None, option: str = "--format") -> tuple[str, ...] | None:
+    """The formats that an option names, None for None; UserError names one that cannot be written."""
     from viewsphere.run.exporting import writable
 
     asked = split(formats)
     for name in asked or ():
-        writable(name, "--format")
+        writable(name, option)
     return asked
 
 

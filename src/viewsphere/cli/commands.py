@@ -40,3 +40,4 @@ for command in (
     app.command(cls=Command)(command)
 app.command("merge", cls=Command)(joining.merge)
 app.command("import", cls=Command)(joining.import_)
+app.command("convert", cls=Command)(joining.convert)

@@ -1,4 +1,4 @@
-"""Commands that make a data set of other data sets."""
+"""Commands that make a data set, or other formats, of other data sets."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, asked_formats, at, cores, with_options
+from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, Workers, asked_formats, at, cores, with_options
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json
 from viewsphere.errors import UserError
 
@@ -76,18 +76,85 @@ def import_(
     if json_:
         print_json({"root": str(target), "frames": foreign.count, "left_out": list(foreign.left_out), "notes": notes})
         return
-    for problem in foreign.left_out[:MOST_FINDINGS]:
-        typer.echo(f"left out {problem}", err=True)
-    if len(foreign.left_out) > MOST_FINDINGS:
-        typer.echo(f"and {len(foreign.left_out) - MOST_FINDINGS:,} more; --json lists all", err=True)
+    _tell_left_out(foreign.left_out)
     for note in notes:
         typer.echo(note)
     typer.echo(f"{target}: {foreign.count:,} frames; {', '.join(c.name for c in foreign.categories)}")
 
 
-def _needed(output: Path | None) -> Path:
+def convert(
+    source: Annotated[Path, typer.Argument(help="Folder of the data set, or COCO's JSON file.", show_default=False)],
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="FORMAT",
+            help="What it is: a format that `viewsphere formats` says can be imported.",
+            show_default=False,
+            autocompletion=completion.formats,
+        ),
+    ] = None,
+    formats: Annotated[
+        str | None,
+        typer.Option("--to", help="Formats, with commas.", show_default=False, autocompletion=completion.formats),
+    ] = None,
+    format_option: FormatOptions = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for the formats' folders.", show_default=False, callback=at)
+    ] = None,
+    keep_going: Annotated[bool, typer.Option(help="Leave out what is broken.")] = False,
+    workers: Workers = None,
+    durability: Durability = None,
+    json_: AsJson = False,
+) -> None:
+    """Write a data set that was made elsewhere in other formats, each in a folder of its name, and nothing else. The pictures
+    are linked or copied.
+    """
+    from viewsphere.run.converting import convert as write_formats
+    from viewsphere.run.exporting import writable_formats
+    from viewsphere.run.importing import readable_formats
+
+    if kind is None:
+        raise UserError(f"--from: expected one of {', '.join(readable_formats())}; found none")
+    names, target = asked_formats(formats, "--to") or (), _needed(output, "the formats' folders")
+    if not names:
+        raise UserError(f"--to: expected one or more of {', '.join(writable_formats())}; found none")
+    crew = cores() if workers is None else workers
+    try:
+        with ProgressBar(quiet=json_) as bar:
+            made = write_formats(
+                kind,
+                source,
+                with_options(names, format_option),
+                target,
+                keep_going=keep_going,
+                workers=crew,
+                listener=bar.show,
+            )
+    except KeyboardInterrupt:
+        typer.echo("stopped; nothing was written", err=True)
+        raise typer.Exit(130) from None
+    if json_:
+        told = {"left_out": list(made.left_out), "notes": list(made.notes)}
+        print_json({"formats": list(names), "frames": made.frames, **told})
+        return
+    _tell_left_out(made.left_out)
+    for note in made.notes:
+        typer.echo(note)
+    for name in names:
+        typer.echo(f"wrote {target / name}")
+
+
+def _tell_left_out(problems: Sequence[str]) -> None:
+    for problem in problems[:MOST_FINDINGS]:
+        typer.echo(f"left out {problem}", err=True)
+    if len(problems) > MOST_FINDINGS:
+        typer.echo(f"and {len(problems) - MOST_FINDINGS:,} more; --json lists all", err=True)
+
+
+def _needed(output: Path | None, what: str = "the new data set") -> Path:
     if output is None:
-        raise UserError("-o: expected a folder for the new data set; found none")
+        raise UserError(f"-o: expected a folder for {what}; found none")
     return output
 
 

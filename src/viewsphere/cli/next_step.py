@@ -42,6 +42,9 @@ def for_command(name: str) -> str:
             return f"merge: expected two data sets or more; found none\nnext: viewsphere merge {two} -o both"
         case "import":
             return "import: expected a format and a folder; found none\nnext: viewsphere import coco my-photos -o photos-ds"
+        case "convert":
+            need = "convert: expected a folder, --from and --to; found none"
+            return f"{need}\nnext: viewsphere convert my-photos --from coco --to yolo -o photos"
         case "export":
             return f"export: expected a data set and --format; found none\n{found}; next: viewsphere export {folder} -f coco"
         case _:

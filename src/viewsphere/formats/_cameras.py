@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -11,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.formats import Scope
 from viewsphere.formats._contents import Coded
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
@@ -26,13 +24,6 @@ MOST = 65535
 
 POINTS = 500
 """Points that are taken of a picture, about."""
-
-
-def unskewed(scope: Scope) -> Iterator[str]:
-    """Of a format whose pixels have right angles."""
-    for sensor in () if scope.rig is None else scope.rig.sensors:
-        if sensor.lidar is None and sensor.intrinsics.skew:
-            yield f"expected cameras without skew; found {sensor.intrinsics.skew:g} of {sensor.name}"
 
 
 def world_of(dataset: Dataset, sample: Sample) -> str:

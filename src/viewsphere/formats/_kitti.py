@@ -13,6 +13,8 @@ from viewsphere.formats import Scope
 from viewsphere.formats._mounting import CAMERA_FROM_LIDAR, Float, centred, measured, mounted, pointless, unmoved
 from viewsphere.geometry.rotation import compose, product, transform
 from viewsphere.labels.occlusion_level import LARGELY, PARTLY, UNKNOWN
+from viewsphere.labels.truncation_level import LARGELY as LARGELY_TRUNCATED
+from viewsphere.labels.truncation_level import TRUNCATED
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
@@ -108,22 +110,42 @@ NO_BOX = (-1.0, -1.0, -1.0, -1000.0, -1000.0, -1000.0, -10.0)
 NO_ANGLE, NO_SHARE = -10.0, -1
 """What stands for values of imported objects that nobody knows."""
 
+DONT_CARE = "dont_care"
+"""What an imported picture's `source` calls the boxes, half-open corners, of regions that evaluations leave out."""
+
+
+def nobody_cares(region: Box) -> str:
+    """The line of a region that evaluations leave out, without its end."""
+    numbers = " ".join(f"{number + 0.0:.9g}" for number in (NO_ANGLE, *inclusive(region), *NO_BOX))
+    return f"DontCare {NO_SHARE} {NO_SHARE} {numbers}"
+
 
 def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
     """A line of labels, without its end: of an object of this type, whose truncation is its share, or its grade."""
     assert o.box2d is not None
-    alpha, box = upright(o) if o.is_placed else (NO_ANGLE, NO_BOX)
-    outside = NO_SHARE if math.isnan(o.truncation) else o.truncation_level if in_grades else o.truncation
-    start = f"{kind} {outside:.6g} {_hidden(o)}"
+    alpha, box = upright(o) if o.is_boxed else (NO_ANGLE, NO_BOX)
+    alpha = (o.source or {}).get("alpha", alpha)
+    start = f"{kind} {_outside(o, in_grades):.6g} {_hidden(o)}"
     return " ".join([start, *(f"{number + 0.0:.9g}" for number in (alpha, *inclusive(o.box2d), *box))])
+
+
+def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
+    """How much of it lies outside of the picture, a share or a grade; of imported objects the one may be known, or neither."""
+    if in_grades and "truncation_level" in o.more:
+        return int(o.more["truncation_level"])
+    if math.isnan(o.truncation):
+        return NO_SHARE
+    return (o.truncation > TRUNCATED) + (o.truncation > LARGELY_TRUNCATED) if in_grades else o.truncation
 
 
 def _hidden(o: ObjectAnnotation) -> int:
     """KITTI's grade of occlusion, of merged objects too, of which no more than the shares is kept."""
-    if math.isnan(o.visibility):
+    if "occlusion_level" in o.more:
+        return int(o.more["occlusion_level"])
+    if math.isnan(o.visibility) or o.truncation >= 1:
         return UNKNOWN
     hidden = 1 - o.visibility / (1 - o.truncation)
-    return int(o.more.get("occlusion_level", (hidden > PARTLY) + (hidden > LARGELY)))
+    return (hidden > PARTLY) + (hidden > LARGELY)
 
 
 def inclusive(box: Box) -> Box:

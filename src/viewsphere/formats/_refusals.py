@@ -2,16 +2,66 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from viewsphere.formats import Scope
+from viewsphere.model.camera import Intrinsics, Scan
+from viewsphere.model.channel import missing
+from viewsphere.model.sample import Sample
+
+
+def lenses(scope: Scope) -> Iterator[tuple[str, Intrinsics]]:
+    """The lens of each camera by its sensor's name: those of the rig, or, where nobody knows that, of pictures."""
+    if scope.rig is not None:
+        yield from ((sensor.name, sensor.intrinsics) for sensor in scope.rig.sensors if sensor.lidar is None)
+    for sample in scope.pictures:
+        if sample.known_camera is not None and not isinstance(sample.known_camera.distortion, Scan):
+            yield sample.sensor, sample.known_camera.intrinsics
 
 
 def one_sensor(scope: Scope) -> Iterator[str]:
     """Of a format whose pictures have no names of sensors."""
     if scope.rig is not None and len(scope.rig.sensors) > 1:
         yield f"expected one sensor; found {', '.join(sensor.name for sensor in scope.rig.sensors)}"
+
+
+def lacking_labels(scope: Scope, names: Sequence[str]) -> Iterator[str]:
+    """Of a format that is made of these labels: pictures of which none can be computed, as their shots are not kept."""
+    lacking = missing(names, {*scope.channels, *scope.annotations}) if scope.pictures else ()
+    if lacking:
+        kept = ", ".join((*scope.channels, *scope.annotations)) or "none"
+        yield f"expected {', '.join(lacking)} of all pictures; found {kept} of imported ones"
+
+
+def known_cameras(scope: Scope) -> Iterator[str]:
+    """Of a format that says by which lens, and from where, pictures were taken."""
+    if any(sample.known_camera is None for sample in scope.pictures):
+        yield "expected pictures of known cameras; found imported ones"
+
+
+def known_views(scope: Scope) -> Iterator[str]:
+    """Of a format that says from which side a model is seen."""
+    seen = (o.view for sample in scope.pictures for o in sample.objects)
+    if any(not _has_view(sample) for sample in scope.pictures) or any(math.isnan(view.distance) for view in seen):
+        yield "expected pictures of known cameras and viewpoints; found imported ones"
+
+
+def any_camera(scope: Scope) -> Iterator[str]:
+    """Of a format that leaves out pictures of unknown cameras: a data set that has no others."""
+    if scope.pictures and all(sample.known_camera is None for sample in scope.pictures):
+        yield from known_cameras(scope)
+
+
+def any_view(scope: Scope) -> Iterator[str]:
+    """Of a format that leaves out pictures of unknown viewpoints: a data set that has no others."""
+    if scope.pictures and not any(map(_has_view, scope.pictures)):
+        yield from known_views(scope)
+
+
+def _has_view(sample: Sample) -> bool:
+    return sample.known_camera is not None and sample.known_pose is not None
 
 
 def sequences(scope: Scope) -> Iterator[str]:
@@ -29,9 +79,9 @@ def stereo(scope: Scope) -> Iterator[str]:
 
 def pinhole(scope: Scope) -> Iterator[str]:
     """Of a format without lens distortion."""
-    for sensor in () if scope.rig is None else scope.rig.sensors:
-        if sensor.lidar is None and sensor.intrinsics.distortion is not None:
-            yield f"expected pinhole cameras; found the lens of {sensor.name}"
+    for name, lens in lenses(scope):
+        if lens.distortion is not None:
+            yield f"expected pinhole cameras; found the lens of {name}"
 
 
 def most_objects(scope: Scope, most: int) -> Iterator[str]:
@@ -55,14 +105,13 @@ def plain_names(scope: Scope, allowed: str = r"[^\s]+") -> Iterator[str]:
 
 def no_skew(scope: Scope) -> Iterator[str]:
     """Of a format whose camera matrices are two focal lengths and a principal point."""
-    for sensor in () if scope.rig is None else scope.rig.sensors:
-        if sensor.lidar is None and sensor.intrinsics.skew != 0:
-            yield f"expected cameras without skew; found {sensor.intrinsics.skew:g} of {sensor.name}"
+    for name, lens in lenses(scope):
+        if lens.skew:
+            yield f"expected cameras without skew; found {lens.skew:g} of {name}"
 
 
 def centred(scope: Scope) -> Iterator[str]:
     """Of a format whose cameras are an angle of view: pixels are square, and the axis meets the middle of the picture."""
-    for sensor in () if scope.rig is None else scope.rig.sensors:
-        k = sensor.intrinsics
-        if sensor.lidar is None and ((k.cx, k.cy) != (k.width / 2, k.height / 2) or k.fx != k.fy or k.skew):
-            yield f"expected square pixels and a principal point in the picture's middle; found others of {sensor.name}"
+    for name, k in lenses(scope):
+        if (k.cx, k.cy) != (k.width / 2, k.height / 2) or k.fx != k.fy or k.skew:
+            yield f"expected square pixels and a principal point in the picture's middle; found others of {name}"

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import Scope
+from viewsphere.formats._timeline import unknown_shots
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Pair, Rig
 from viewsphere.model.sample import Sample
@@ -16,7 +17,8 @@ from viewsphere.store.paths import is_name
 
 
 def two_eyes(scope: Scope) -> Iterator[str]:
-    """Of a format of one camera, or of a rectified pair: all else of a rig."""
+    """Of a format of one camera, or of a rectified pair: all else of a rig, and rigs that nobody knows."""
+    yield from unknown_shots(scope)
     if scope.rig is not None:
         names = [sensor.name for sensor in scope.rig.sensors if sensor.lidar is None]
         if len(names) > 2 or (len(names) == 2 and not scope.rig.rectified):

@@ -18,14 +18,18 @@ from pydantic import Field
 
 from viewsphere.errors import MissingExtraError, UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._refusals import pinhole, plain_names
+from viewsphere.formats._refusals import lenses, pinhole, plain_names
 from viewsphere.geometry.rotation import transform
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset, ModelInfo
 
 NAMES = r"[A-Za-z][A-Za-z0-9_]{0,62}"
 """Of variables and fields in MATLAB."""
+
+KIT = "PASCAL/VOCdevkit/VOC2012"
+"""Where PASCAL3D+ has what it takes of PASCAL VOC."""
 
 OWN = ("vertices", "faces", "pnames")
 """Fields of a CAD model that are no points."""
@@ -39,6 +43,8 @@ STATUS = {0: 1, 1: 2, 2: 4, 3: 4}
 TRUNCATED, OCCLUDED = 0.15, 0.05
 """Shares above which an object is so, as the annotators of PASCAL VOC were told."""
 
+HALF_PIXEL = np.array([[0.0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
+
 SQUARE = 1e-9
 """Share by which the sides of pixels may differ."""
 
@@ -50,15 +56,23 @@ class Options(Frozen):
 
 
 def no_viewpoints(scope: Scope) -> Iterator[str]:
-    """Viewpoints of other cameras than pinholes with square pixels, and names that are none in MATLAB."""
-    if scope.rig is None:
-        yield "expected pictures of known cameras; found imported ones"
+    """Viewpoints that nobody knows, but for those of other trees of the kind, which may have some alone; those of other cameras
+    than pinholes with square pixels, and names that are none in MATLAB.
+    """
+    shown = [sample.known_camera is not None and o.is_placed for sample in scope.pictures for o in sample.objects]
+    if shown and not any(shown) and "keypoints" not in scope.annotations:
+        yield "expected pictures of known cameras and viewpoints; found imported ones"
     yield from pinhole(scope)
-    for sensor in scope.rig.sensors if scope.rig else ():
-        lens = sensor.intrinsics
-        if sensor.lidar is None and (lens.skew or not math.isclose(lens.fx, lens.fy, rel_tol=SQUARE)):
-            yield f"expected square pixels; found fx {lens.fx:g}, fy {lens.fy:g}, skew {lens.skew:g} of {sensor.name}"
+    for name, lens in lenses(scope):
+        if found := _oblong(lens):
+            yield f"expected square pixels; found {found} of {name}"
     yield from plain_names(scope, NAMES)
+
+
+def _oblong(lens: Intrinsics) -> str:
+    """What of a lens has no square pixels, as text; empty for one that has."""
+    is_square = not lens.skew and math.isclose(lens.fx, lens.fy, rel_tol=SQUARE)
+    return "" if is_square else f"fx {lens.fx:g}, fy {lens.fy:g}, skew {lens.skew:g}"
 
 
 def scipy_io(name: str) -> Any:
@@ -116,46 +130,53 @@ class Cads:
         }
 
     def record(self, sample: Sample, objects: Iterable[ObjectAnnotation], filename: str, *, masks: bool) -> bytes:
-        """The file of a picture."""
-        lens = sample.camera.K.copy()
-        lens[:2, 2] += 0.5
+        """The file of a picture. Raises UserError for a lens that is no pinhole with square pixels, as of merged data sets."""
+        lens = sample.known_camera and sample.known_camera.intrinsics
+        if lens and (lens.distortion is not None or _oblong(lens)):
+            found = _oblong(lens) or "a lens that distorts"
+            raise UserError(f"frame {sample.index}: expected a pinhole with square pixels; found {found}")
         return mat(
             record={
                 "filename": filename,
                 "imgsize": np.array([[sample.width, sample.height, 3]], np.float64),
                 "segmented": float(masks),
                 "objects": structs([self._object(o, sample) for o in objects]),
-                "K": lens,
+                **({"K": lens.K + HALF_PIXEL} if lens else {}),
             }
         )
 
     def _object(self, o: ObjectAnnotation, sample: Sample) -> dict[str, Any]:
-        center = o.box3d_object.mean(axis=0)
-        motion = o.camera_from_object[:3].copy()
-        motion[:, 3] = transform(motion, center)
-        anchors = self._anchors(o)
-        inside = 1 - o.truncation
+        anchors, inside = self._anchors(o), 1 - o.truncation
+        seen = sum(anchor["status"] == 1 for anchor in anchors.values())
+        said = dict(o.source or {})
+        motion = None if sample.known_camera is None or not o.is_placed else _motion(o)
+        number = self._places.get(o.key) or said.get("cad_index")
         return {
             "class": o.category,
             "bbox": box(o),
-            "truncated": float(o.truncation > TRUNCATED),
-            "occluded": float(inside > 0 and 1 - o.visibility / inside > OCCLUDED),
-            "difficult": 0.0,
-            "cad_index": np.int32(self._places[o.key]),
+            "truncated": float(said.get("truncated", o.truncation > TRUNCATED)),
+            "occluded": float(said.get("occluded", inside > 0 and 1 - o.visibility / inside > OCCLUDED)),
+            "difficult": float(said.get("difficult", 0)),
+            "cad_index": np.int32(number) if number else nothing(),
             "anchors": anchors or nothing(),
-            "viewpoint": _viewpoint(o, sample, motion[:, 3], sum(anchor["status"] == 1 for anchor in anchors.values())),
+            "viewpoint": _said(said, seen) if motion is None else _viewpoint(o, sample, motion[:, 3], seen),
             "id": float(o.id),
-            "RT": motion,
+            "RT": nothing() if motion is None else motion,
         }
 
     def _anchors(self, o: ObjectAnnotation) -> dict[str, dict[str, Any]]:
-        """Anchors by their names; those that are not visible have no place."""
-        fields = self._fields[o.category]
-        if not self._has_anchors or not fields:
+        """Anchors by their names; those that are not visible have no place, but for imported ones."""
+        fields, said = self._fields[o.category], o.source
+        if not self._has_anchors or (not fields if said is None else "keypoint_names" not in o.more):
             return {}
+        known = (said or {}).get("anchors", {})
+        names: Sequence[str] = o.keypoint_names
         return {
-            fields[name]: {"location": place[None] + 0.5 if state == 0 else nothing(), "status": float(STATUS[int(state)])}
-            for name, place, state in zip(o.keypoint_names, o.keypoints, o.keypoint_states, strict=True)
+            fields.get(name, name): {
+                "location": place[None] + 0.5 if state == 0 or (said and np.isfinite(place).all()) else nothing(),
+                "status": float(known.get(name, STATUS[int(state)])),
+            }
+            for name, place, state in zip(names, o.keypoints, o.keypoint_states, strict=True)
         }
 
     def file(self, category: str) -> bytes:
@@ -201,6 +222,19 @@ class Cads:
         rows += [f"{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
         rows += [f"3 {a} {b} {c}" for a, b, c in triangles.tolist()]
         return ("\n".join(rows) + "\n").encode()
+
+
+def _motion(o: ObjectAnnotation) -> NDArray[np.float64]:
+    """From the axes of an object's CAD model to those of the camera, (3, 4); of an unknown model, whose origin is its own."""
+    motion = o.camera_from_object[:3].copy()
+    motion[:, 3] = transform(motion, np.nan_to_num(o.box3d_object.mean(axis=0)))
+    return motion
+
+
+def _said(source: Mapping[str, Any], anchors: int) -> Any:
+    """The viewpoint of an imported object whose place is not known, as it was; [] without any."""
+    known = source.get("viewpoint")
+    return {**known, "num_anchor": float(anchors)} if known else nothing()
 
 
 def _viewpoint(o: ObjectAnnotation, sample: Sample, place: NDArray[np.float64], anchors: int) -> dict[str, float]:

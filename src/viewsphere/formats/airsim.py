@@ -93,7 +93,9 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Lenses that are more than an angle of view; more objects than colours."""
+    """Labels and cameras that nobody knows; lenses that are more than an angle of view; more objects than colours."""
+    yield from refusals.lacking_labels(scope, needs(options))
+    yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
     yield from refusals.centred(scope)
     if {"segmentation", "infrared"} & set(options.images):

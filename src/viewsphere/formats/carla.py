@@ -83,7 +83,8 @@ STUFF = {
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Lenses that are more than an angle of view; more objects than ids have numbers."""
+    """Cameras that nobody knows; lenses that are more than an angle of view; more objects than ids have numbers."""
+    yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
     yield from refusals.centred(scope)
     yield from refusals.most_objects(scope, MOST)
@@ -111,7 +112,7 @@ class Carla(Tree):
             ("instance_segmentation", partial(_tagged, sample, self._tags, ids=True)),
         ):
             yield File(f"{root}/{kind}/{number}.png", Coded(sample.index, f"carla {kind}.png", make))
-        boxes = [self._box(o) for o in sample.objects if o.is_placed]
+        boxes = [self._box(o) for o in sample.objects if o.is_boxed]
         yield File(f"{root}/bounding_boxes/{number}.json", json_bytes(boxes) + b"\n")
         told = {"frame": sample.instant if sample.sequence else sample.index, "timestamp": sample.time}
         yield item(f"{root}/transforms.json", told | _camera(sample.camera))

@@ -141,7 +141,7 @@ def _detection(sample: Sample, o: ObjectAnnotation) -> dict[str, Any]:
         "index": o.id,
         "supercategory": o.supercategory,
     }
-    if not o.is_placed:
+    if not o.is_boxed:
         return told
     middle, (width, height, length) = o.box3d_object.mean(axis=0), o.size
     told |= {"model": o.key, "visibility": float(o.visibility), "truncation": float(o.truncation)}

@@ -30,9 +30,10 @@ import xxhash
 
 from viewsphere.aside import temporary
 from viewsphere.assets.glb import Looking, Placed, scene_glb_bytes
-from viewsphere.formats import Remark
+from viewsphere.formats import Remark, Scope
 from viewsphere.formats._cameras import opengl_pose
 from viewsphere.formats._contents import check_files
+from viewsphere.formats._refusals import any_camera
 from viewsphere.model.camera import Distortion
 from viewsphere.model.classes import thing_class
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -47,6 +48,11 @@ TABLE = "frames.csv"
 FOLDER_SIZE = 10_000
 MESHES = 64
 """Models that are kept in memory."""
+
+
+def refuses(scope: Scope) -> Iterator[str]:
+    """Pictures of which none has a known camera."""
+    yield from any_camera(scope)
 
 
 @contextmanager

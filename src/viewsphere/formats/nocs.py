@@ -41,7 +41,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import depth_png, picture
-from viewsphere.formats._refusals import most_objects
+from viewsphere.formats._refusals import known_cameras, most_objects
 from viewsphere.formats._tree import File, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.rig import CAMERA
@@ -61,7 +61,8 @@ Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """More objects than the mask has numbers for."""
+    """Cameras that nobody knows, and more objects than the mask has numbers for."""
+    yield from known_cameras(scope)
     yield from most_objects(scope, BACKGROUND - 1)
 
 

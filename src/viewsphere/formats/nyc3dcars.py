@@ -38,7 +38,7 @@ from pydantic import Field
 from viewsphere.formats import Scope
 from viewsphere.formats._globe import compass, earth, globe
 from viewsphere.formats._pictures import picture
-from viewsphere.formats._refusals import pinhole
+from viewsphere.formats._refusals import known_views, lenses, pinhole
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.frozen import Frozen
@@ -74,15 +74,13 @@ class Options(Frozen):
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Cameras that Bundler has not."""
-    if scope.rig is None:
-        yield "expected pictures of known cameras; found imported ones"
+    yield from known_views(scope)
     yield from pinhole(scope)
-    for sensor in scope.rig.sensors if scope.rig else ():
-        lens = sensor.intrinsics
+    for name, lens in lenses(scope):
         found = lens.fy, lens.skew, lens.cx, lens.cy
         wanted = lens.fx, 0.0, lens.width / 2, lens.height / 2
-        if sensor.lidar is None and not np.allclose(found, wanted, rtol=0, atol=OFF * lens.width):
-            yield f"expected square pixels and a centred camera; found K {lens.K.tolist()} of {sensor.name}"
+        if not np.allclose(found, wanted, rtol=0, atol=OFF * lens.width):
+            yield f"expected square pixels and a centred camera; found K {lens.K.tolist()} of {name}"
 
 
 class Nyc3dCars(Tree):

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from viewsphere.formats import Scope
 from viewsphere.formats._paper import json_bytes
 from viewsphere.formats._pictures import picture, suffix_of
-from viewsphere.formats._refusals import pinhole
+from viewsphere.formats._refusals import known_cameras, pinhole
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, item
 from viewsphere.geometry.box import clip_to_image
 from viewsphere.geometry.rotation import product, transform
@@ -55,7 +55,8 @@ CORNERS = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1,
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Distorted lenses."""
+    """Cameras that nobody knows, and distorted lenses."""
+    yield from known_cameras(scope)
     yield from pinhole(scope)
 
 
@@ -95,7 +96,7 @@ _NO_BOX: dict[str, Any] = {
 
 
 def _annotation(sample: Sample, o: ObjectAnnotation) -> dict[str, Any]:
-    is_known = o.is_placed
+    is_known = o.is_boxed
     return {
         "category_id": o.category_id,
         "category_name": o.category,

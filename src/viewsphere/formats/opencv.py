@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._cameras import Rigs, unskewed
+from viewsphere.formats._cameras import Rigs
+from viewsphere.formats._refusals import known_cameras, no_skew
 from viewsphere.formats._tree import File, Tree, functions
 from viewsphere.geometry.rotation import product, rotation_vector, transform
 from viewsphere.model.camera import Distortion, Intrinsics
@@ -44,8 +45,9 @@ Value = int | str | NDArray[np.float64]
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Skew."""
-    yield from unskewed(scope)
+    """Cameras that nobody knows, and skew."""
+    yield from known_cameras(scope)
+    yield from no_skew(scope)
 
 
 class Opencv(Tree):

@@ -19,8 +19,9 @@ from pydantic import Field
 
 from viewsphere.codecs.ply import encode_ply
 from viewsphere.errors import UserError
-from viewsphere.formats import Remark
+from viewsphere.formats import Remark, Scope
 from viewsphere.formats._contents import check_files
+from viewsphere.formats._refusals import any_camera
 from viewsphere.model.channel import missing
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.point_cloud import PointCloud
@@ -54,6 +55,11 @@ class Options(Frozen):
 def needs(options: Options) -> tuple[str, ...]:
     """Channels that these options ask for."""
     return ("surface_samples",) if options.surface == "complete" else ()
+
+
+def refuses(scope: Scope, options: Options) -> Iterator[str]:
+    """Pictures of which none has a known camera."""
+    yield from any_camera(scope)
 
 
 def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], None]:

@@ -36,6 +36,7 @@ from viewsphere.codecs.pictures import encode_picture
 from viewsphere.formats import Scope
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import JPEG_QUALITY, opaque
+from viewsphere.formats._refusals import known_views
 from viewsphere.formats._tree import File, Piece, Tree, functions, line
 from viewsphere.model.sample import ObjectAnnotation, ObjectView, Sample
 from viewsphere.store import Dataset
@@ -55,8 +56,7 @@ SYNSETS = {
 
 def refuses(scope: Scope) -> Iterator[str]:
     """Pictures from nobody knows where, and names that the format cannot tell apart."""
-    if scope.rig is None:
-        yield "expected pictures of known cameras; found imported ones"
+    yield from known_views(scope)
     first = dict[str, str]()
     for category in scope.categories:
         other = first.setdefault(_word(category.name), category.name)

@@ -85,6 +85,7 @@ STUFF = {
 
 def refuses(scope: Scope) -> Iterator[str]:
     """Lenses that bend, and LiDARs, which have no picture."""
+    yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
     yield from refusals.no_skew(scope)
     for sensor in scope.rig.sensors if scope.rig else ():

@@ -6,6 +6,7 @@ https://github.com/cocodataset/cocoapi/blob/master/common/maskApi.c.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,17 @@ def rle_of_runs(height: int, width: int, runs: Runs) -> str:
     whole = np.diff(turns[turns < height * width], prepend=0, append=height * width)
     code: Any = coco.frPyObjects({"size": [height, width], "counts": whole.tolist()}, height, width)
     return code["counts"].decode("ascii")
+
+
+def rle_of_polygons(height: int, width: int, rings: Sequence[Sequence[float]]) -> str:
+    """The one compressed code of all that lies in any of the polygons [x0, y0, x1, y1, ...], as COCO's rasteriser draws them;
+    no pixel is drawn. Corners far from the image are the caller's to refuse: pycocotools does not check its input.
+    """
+    from pycocotools import mask as coco
+
+    outlines: Any = [list(ring) for ring in rings]
+    code: Any = coco.merge(coco.frPyObjects(outlines, height, width))
+    return rle_of_runs(height, width, rle_runs(height, width, code["counts"].decode("ascii")))
 
 
 def rle_area(height: int, width: int, counts: str) -> int:

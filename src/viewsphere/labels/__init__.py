@@ -31,7 +31,7 @@ from viewsphere.labels._label import (
     SampleLabel,
 )
 from viewsphere.labels._passes import DRAWINGS
-from viewsphere.labels._placement import Placement
+from viewsphere.labels._placement import Placement, view_of
 from viewsphere.labels._record import Makers, computed, finite, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.camera import Camera
@@ -83,6 +83,7 @@ __all__ = [
     "sample_values",
     "short_record",
     "sight_of",
+    "view_of",
     "whole_record",
 ]
 

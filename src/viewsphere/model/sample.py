@@ -128,6 +128,11 @@ class ObjectAnnotation:
         return not math.isnan(self.world_from_object[0, 0])
 
     @property
+    def is_boxed(self) -> bool:
+        """Whether its place in space and its size are known; of some imported objects only the pose is."""
+        return self.is_placed and not math.isnan(self.size[0])
+
+    @property
     def mask(self) -> NDArray[np.bool_]:
         """Visible pixels, (H, W) bool. Raises UserError for run lengths, which a stranger may have written, that are none."""
         from viewsphere.codecs.size import check_size

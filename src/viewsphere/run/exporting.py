@@ -15,7 +15,7 @@ from viewsphere.model.mistakes import one_of
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.run.preparing import Entries, leaves_out, prepared, targets
 from viewsphere.run.progress import Listener, Progress, unheard
-from viewsphere.run.scope import refusals, scope_of
+from viewsphere.run.scope import refuse, scope_of
 from viewsphere.store import Choice, Dataset, located, new_folder
 from viewsphere.store.checksums import write_checksums, written_credits, written_frames, written_least, written_options
 from viewsphere.store.credits import credits_digest
@@ -49,13 +49,10 @@ def export(
     entries = tuple(entry.over(_known_options(dataset, entry.name)) for entry in read_formats(formats))
     if not entries:
         return ()
-    scope = scope_of(dataset)
     from viewsphere.run.completed import lacking  # which loads what reads and draws models
 
     modules = {entry.name: writable(entry.name) for entry in entries}
-    refused = [f"format {e.name}: {problem}" for e in entries for problem in refusals(modules[e.name], e, scope)]
-    if refused:  # before the first of them is written
-        raise UserError("\n".join(f"{dataset.root}: {problem}" for problem in refused))
+    refuse(entries, scope_of(dataset), dataset.root)
     for entry in entries:
         lacking(dataset, modules[entry.name], entry)
     with ExitStack() as whole:
@@ -64,10 +61,13 @@ def export(
             whole.enter_context(dataset.store.occupied())
         written = [(entry, whole.enter_context(_folder(dataset, place / entry.name, is_own))) for entry in entries]
         notes = (*write(dataset, written, listener or unheard, workers), *_lacks(dataset))
-    kinds = dataset.link_kinds - {"hard link", "download"}
-    return tuple(dict.fromkeys(notes)) + tuple(
-        f"{dataset.root}: files of the exports are made as a {kind}, hard links do not work here" for kind in sorted(kinds)
-    )
+    return tuple(dict.fromkeys(notes)) + tuple(linked(dataset, dataset.root))
+
+
+def linked(dataset: Dataset, where: Path | str) -> Iterator[str]:
+    """How a data set's files came into the exports, where that took more than hard links."""
+    for kind in sorted(dataset.link_kinds - {"hard link", "download"}):
+        yield f"{where}: files of the exports are made as a {kind}, hard links do not work here"
 
 
 def _lacks(dataset: Dataset) -> Iterator[str]:

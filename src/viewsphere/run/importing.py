@@ -33,18 +33,29 @@ def import_dataset(
     Gives what was read; `left_out` tells what `keep_going` left out. Raises UserError for a format that cannot be read,
     StoreError for a data set that is broken (before anything is written) and for an `out` that holds other data.
     """
+    foreign = read_dataset(kind, source, keep_going=keep_going)
+    put_in_store(foreign, located(out), listener)
+    return foreign
+
+
+def read_dataset(kind: str, source: Path | str, *, keep_going: bool = False, field: str = "import") -> ForeignDataset:
+    """What a data set of another tool says, whole; raises as `import_dataset` does, for an unknown format as a mistake of
+    `field`.
+    """
     known = readable_formats()
     if kind not in known:
-        raise UserError(f"import: expected one of {', '.join(known)}; found {kind!r}")
-    foreign: ForeignDataset = plugins.load("formats", kind).read(Path(source), keep_going=keep_going)
-    store = Store(located(out))
-    record = _plan_record(foreign)
+        raise UserError(f"{field}: expected one of {', '.join(known)}; found {kind!r}")
+    return plugins.load("formats", kind).read(Path(source), keep_going=keep_going)
+
+
+def put_in_store(foreign: ForeignDataset, out: Path, listener: Listener | None = None) -> None:
+    """Write what was read into a store, or find that done; raises StoreError for an `out` that holds other data."""
+    store, record = Store(out), _plan_record(foreign)
     with store.opened_for(record):
         for model in foreign.models:
-            link_model(store, model.info.key, model.info, model.files)
+            link_model(store, model.info.key, model.info, model.files, model.write)
         _link_frames(foreign, store, record, listener)
         write_credits(Dataset(out))
-    return foreign
 
 
 def _link_frames(foreign: ForeignDataset, store: Store, record: PlanRecord, listener: Listener | None) -> None:

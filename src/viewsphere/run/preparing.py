@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import AbstractContextManager, closing
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import chain, repeat
@@ -100,8 +100,28 @@ class Target:
     def preparer(self) -> Callable[[Sample], Any]:
         """Makes of a sample what the format adds: the sample itself, as the format sees it, where it prepares nothing."""
         module: Any = self.module
-        make = module.preparer(self.view, self.folder, *self.entry.arguments()) if self.prepares else None
-        return lambda sample: make(self._seen(sample)) if make else self._seen(sample)
+        with self._named():
+            make = module.preparer(self.view, self.folder, *self.entry.arguments()) if self.prepares else None
+
+        def prepare(sample: Sample) -> Any:
+            with self._named():
+                return make(self._seen(sample)) if make else self._seen(sample)
+
+        return prepare
+
+    @contextmanager
+    def _named(self) -> Generator[None]:
+        """Tell the user's mistakes with the data set and the format, which what they come from may not know; those of a stored
+        file stay as they are.
+        """
+        try:
+            yield
+        except UserError as error:
+            where, name = f"{self.view.root}: ", self.entry.name
+            problem = str(error).removeprefix(where).removeprefix(f"format {name}: ").removeprefix(f"{name}: ")
+            if problem.startswith(str(self.view.root)):
+                raise
+            raise type(error)(f"{where}format {name}: {problem}") from None
 
     def _seen(self, sample: Sample) -> Sample:
         """The sample as the format sees it; raises UserError where a sensor keeps less than all channels, and lacks one that
@@ -112,9 +132,8 @@ class Target:
         is_exempt = getattr(self.module, "LIDAR", False) and isinstance(sample.known_camera and sample.camera.distortion, Scan)
         if sample.sensor != CAMERA and absent and not is_exempt:
             raise UserError(
-                f"{self.view.root}: format {self.entry.name}: expected channel {absent[0]} of every frame, found none of "
-                f"sensor {sample.sensor} (frame {sample.index}): leave {self.entry.name} out, or render that sensor with "
-                f"{absent[0]}"
+                f"expected channel {absent[0]} of every frame, found none of sensor {sample.sensor} (frame {sample.index}): "
+                f"leave {self.entry.name} out, or render that sensor with {absent[0]}"
             )
         return shown
 

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
 
+from viewsphere import plugins
+from viewsphere.errors import UserError
 from viewsphere.formats import Format, Scope
+from viewsphere.formats._refusals import lacking_labels
 from viewsphere.labels import channel_labels, on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
+from viewsphere.store.foreign import ForeignDataset
 
 
 def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
@@ -28,18 +34,38 @@ def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
 
 def scope_of(dataset: Dataset) -> Scope:
     """What is known of a data set that is there; of one whose shots are kept all labels can be computed."""
-    shots, parts = dataset.shots_of_parts, dataset.plan.parts
-    is_known = bool(shots) and all(shots)
-    asked = [set(part.recipe.get("annotations", ())) for part in parts]
-    kept, annotations = dataset.plan.channels, tuple(sorted(set.intersection(*asked))) if asked else ()
-    return Scope(
+    shots = dataset.shots_of_parts
+    known = Scope(
         categories=dataset.categories,
         splits=dataset.splits,
-        rig=shots[0].rig if is_known and shots[0] else None,
-        is_moving=any(part.recipe.get("time") for part in parts),
+        rig=None,
+        is_moving=any(part.recipe.get("time") for part in dataset.plan.parts),
         most_objects=dataset.max_objects,
-        channels=tuple(dict.fromkeys((*kept, *channel_labels()))) if is_known else kept,
-        annotations=tuple(on_request()) if is_known else annotations,
+        channels=dataset.plan.channels,
+        annotations=(),
+    )
+    if any(shots):
+        computed = tuple(dict.fromkeys((*known.channels, *channel_labels())))
+        known = replace(known, channels=computed, annotations=tuple(on_request()))
+    if shots and shots[0] and all(shots):
+        return replace(known, rig=shots[0].rig)
+    pictures = tuple(dataset.samples_of_parts)
+    asked = dict.fromkeys(name for sample in pictures for name in sample.asked)
+    return replace(known, annotations=tuple(dict.fromkeys((*known.annotations, *asked))), pictures=pictures)
+
+
+def scope_of_foreign(foreign: ForeignDataset) -> Scope:
+    """What is known of a data set that is about to be imported."""
+    pictures = tuple(frame.sample for frame in islice(foreign.frames(), 1))
+    return Scope(
+        categories=foreign.categories,
+        splits=foreign.splits,
+        rig=None,
+        is_moving=False,
+        most_objects=foreign.max_objects,
+        channels=foreign.channels,
+        annotations=pictures[0].asked if pictures else (),
+        pictures=pictures,
     )
 
 
@@ -50,9 +76,18 @@ def needs_of(module: Format, entry: FormatEntry) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*always, *(more(*entry.arguments()) if more else ()))))
 
 
+def refuse(entries: Sequence[FormatEntry], scope: Scope, where: object) -> None:
+    """Raise UserError with a line for each of the formats that cannot hold the data set at `where`: all that it cannot."""
+    found = {e.name: list(refusals(plugins.load("formats", e.name), e, scope)) for e in entries}
+    lines = [f"{where}: format {name}: {', and '.join(problems)}" for name, problems in found.items() if problems]
+    if lines:
+        raise UserError("\n".join(lines))
+
+
 def refusals(module: Format, entry: FormatEntry, scope: Scope) -> Iterator[str]:
     """What of a data set a format cannot hold, as these options want it."""
     yield from not_held(module, entry, scope)
+    yield from lacking_labels(scope, getattr(module, "CHANNELS", ()))
     if not getattr(module, "LIDAR", False):
         yield from _pointless(module, entry, scope)
 

@@ -139,12 +139,22 @@ class Dataset(Shown, Sequence[Sample]):
         """A finished shot of each part; None for a part whose shots are not kept, such as an imported one, and for one of which
         nothing is finished, another part's.
         """
+        found = {part: self.labelled(row.key) for part, row in self._first_rows.items()}
+        some = next(iter(found.values()), None)
+        return tuple(found.get(number, some) for number in range(len(self.plan.parts)))
+
+    @property
+    def samples_of_parts(self) -> Iterator[Sample]:
+        """A finished picture, chosen or not, of each part that has any."""
+        return (self.sample_at(row.key, 0) for row in self._first_rows.values())
+
+    @cached_property
+    def _first_rows(self) -> dict[int, Row]:
+        """The first finished shot of each part."""
         first: dict[int, Row] = {}
         for row in self.rows:
             first.setdefault(row.part, row)
-        found = {part: self.labelled(row.key) for part, row in first.items()}
-        some = next(iter(found.values()), None)
-        return tuple(found.get(number, some) for number in range(len(self.plan.parts)))
+        return first
 
     def __len__(self) -> int:
         return self._shots[1][-1]

@@ -38,10 +38,13 @@ class ForeignFrame:
 
 @dataclass(frozen=True)
 class ForeignModel:
-    """A model whose files, of the names that `info` gives its OBJ and GLB, are among these of another data set."""
+    """A model whose files, of the names that `info` gives its OBJ and GLB, are among these of another data set, or are what
+    `write` puts into a folder.
+    """
 
     info: ModelInfo
     files: Sequence[Path]
+    write: Callable[[Path], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,7 @@ def foreign_object(
     source: Mapping[str, Any],
     counts: str | None,
     box: Box | None,
+    /,
     **known: Any,
 ) -> ObjectAnnotation:
     """An object of which only its mask, the run-length code `counts`, or only its `box`, is known, and the fields in `known`;

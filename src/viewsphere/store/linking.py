@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,16 @@ from viewsphere.store.shot_files import ShotFiles
 from viewsphere.urls import link_file
 
 
-def link_model(store: Store, key: str, info: ModelInfo, files: Iterable[Path], **changed: Any) -> None:
-    """Write a model of these files, those that `info` names among them, unless there is one of this key. `changed` are fields
-    of it that become others.
+def link_model(
+    store: Store,
+    key: str,
+    info: ModelInfo,
+    files: Iterable[Path],
+    write: Callable[[Path], None] | None = None,
+    **changed: Any,
+) -> None:
+    """Write a model of these files, and of those that `write` puts into a folder, those that `info` names among them, unless
+    there is one of this key. `changed` are fields of it that become others.
     """
     if store.model_info(key) is not None:
         return
@@ -29,6 +36,8 @@ def link_model(store: Store, key: str, info: ModelInfo, files: Iterable[Path], *
         for file in files:
             if file.name not in {"model.json", MANIFEST}:
                 link_file(file.resolve(), folder / file.name)
+        if write:
+            write(folder)
         store.write_model_info(folder, info.moved(key, prefix, **changed))
 
 

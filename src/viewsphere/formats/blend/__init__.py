@@ -29,6 +29,8 @@ from viewsphere.assets.load import load_model
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.normalise import normalise
 from viewsphere.errors import StoreError, UserError
+from viewsphere.formats import Scope
+from viewsphere.formats._refusals import any_view
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.camera import Scan
 from viewsphere.model.files import Files
@@ -56,6 +58,11 @@ CHANNELS = ()
 def check() -> None:
     """Raise UserError where there is no Blender."""
     plugins.load("engines", ENGINE).check({})
+
+
+def refuses(scope: Scope) -> Iterator[str]:
+    """Pictures of which none has a known camera and viewpoint."""
+    yield from any_view(scope)
 
 
 @contextmanager
@@ -94,7 +101,7 @@ def _left_out(dataset: Dataset, groups: Collection[_Group]) -> Iterator[str]:
     written = sum(len(places) for group in groups for places in group.places.values())
     needs = "cameras, models and where they stand"
     if total and not written:
-        raise UserError(f"{dataset.root}: expected frames for format blend, with known {needs}; found none")
+        raise UserError(f"{dataset.root}: format blend: expected frames with known {needs}; found none")
     if written < total:
         yield f"{total - written:,} of {total:,} frames are left out: their {needs} are not known, or they are a LiDAR's"
     unlit = sum(len(group.places[key]) for group in groups for key in group.places if dataset.store.shot(key) is None)

@@ -51,7 +51,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats._contents import Coded, Content
 from viewsphere.formats._paper import json_bytes
 from viewsphere.formats._pictures import picture, suffix_of
-from viewsphere.formats._refusals import pinhole
+from viewsphere.formats._refusals import known_cameras, lacking_labels, pinhole
 from viewsphere.formats._tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item, member
 from viewsphere.formats.bop.entries import (
     Entry,
@@ -85,7 +85,9 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Lenses that K does not describe."""
+    """Cameras that nobody knows, lenses that K does not describe, and objects without their whole masks."""
+    yield from lacking_labels(scope, needs(options))
+    yield from known_cameras(scope)
     yield from pinhole(scope)
 
 

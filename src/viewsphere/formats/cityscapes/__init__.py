@@ -83,6 +83,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Rigs of several cameras that are no pair, lenses that camera.json has no numbers for, and more instances than ids."""
     yield from two_eyes(scope)
     yield from refusals.stereo(scope) if options.stereo else ()
+    yield from refusals.known_cameras(scope)
     yield from refusals.pinhole(scope)
     yield from refusals.no_skew(scope)
     yield from refusals.most_objects(scope, EACH)

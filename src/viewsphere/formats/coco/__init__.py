@@ -14,6 +14,12 @@ others, of which x and y are 0. As COCO's annotators gave whole pixels, (0, 0) i
 than in boxes and polygons; Detectron2 reads them so. They are in the instances file, where trainers look; datumaro looks for
 them in files `person_keypoints_<split>.json` only. COCOeval has to be given sigmas for each category (`params.kpt_oks_sigmas`),
 as its default ones are of 17 points.
+
+Data sets that were made elsewhere are imported by their folder or by one file: `viewsphere import coco`. A split's annotations
+are those of instances files, else of person_keypoints files, else of whatever JSON there is; what image_info files name of
+other splits has none, where its pictures are there. Folders of splits, each with labels.json and `data` (FiftyOne) or
+_annotations.coco.json (Roboflow), are read, too; a file called so, annotations.json (supervision) or coco_annotations.json
+(BlenderProc) alone is `train`. Names of points, which categories have, are not kept.
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,13 +15,12 @@ import numpy as np
 
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
-from viewsphere.geometry.mask import rle_of_runs, rle_runs
+from viewsphere.formats.coco.places import annotation_files, picture_file
+from viewsphere.geometry.mask import rle_of_polygons, rle_of_runs, rle_runs
 from viewsphere.model.sample import Box, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
-from viewsphere.store.paths import file_inside
 from viewsphere.store.texts import parsed
-from viewsphere.urls.inside import is_inside
 
 LARGEST_ID = 2**63
 LARGEST_CATEGORY = 2**31
@@ -36,16 +34,16 @@ MOST_IMAGES_BESIDE = 10
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """All images and annotations of a folder with instances files, or of one such file.
 
-    Every file becomes a split, named like the file without `instances_`. Images are looked for where COCO and its relatives
-    keep them: in `<split>/`, `images/<split>/`, `images/` and beside. Ids of categories are kept. Raises StoreError with every
-    mistake: dangling and repeated ids, missing images, invalid boxes and segmentations; with `keep_going` broken entries are
-    left out and reported.
+    Every file becomes a split, named like the file without `instances_`, or like its folder, and its images are looked for
+    where COCO and its relatives keep them (`viewsphere.formats.coco.places`). Ids of categories are kept. Raises StoreError
+    with every mistake: dangling and repeated ids, missing images, invalid boxes and segmentations; with `keep_going` broken
+    entries are left out and reported.
     """
-    files = _instances_files(path)
+    files = annotation_files(path)
     root = path if path.is_dir() else path.parent
     if path.is_file() and root.resolve().name == "annotations":
         root = root.resolve().parent
-    parts = [_read_split(file, root) for file in files]
+    parts = [_read_split(split, file, root) for split, file in files]
     problems = [problem for part in parts for problem in part.problems]
     problems += _clashes(parts)
     if not keep_going:
@@ -68,11 +66,11 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     )
 
 
-def _digest(files: Sequence[Path], left_out: Sequence[str]) -> str:
+def _digest(files: Sequence[tuple[str, Path]], left_out: Sequence[str]) -> str:
     """SHA-256 of the files' contents, and of the messages about entries that were left out."""
     digest = hashlib.sha256()
-    for file in files:
-        digest.update(f"{file.name}\0{hashlib.sha256(file.read_bytes()).hexdigest()}".encode())
+    for split, file in files:
+        digest.update(f"{split}\0{file.name}\0{hashlib.sha256(file.read_bytes()).hexdigest()}".encode())
     for problem in left_out:
         digest.update(problem.encode(errors="backslashreplace"))
     return digest.hexdigest()
@@ -90,17 +88,7 @@ class _Split:
     problems: tuple[str, ...]
 
 
-def _instances_files(path: Path) -> list[Path]:
-    if path.is_file():
-        return [path]
-    for folder in (path / "annotations", path):
-        found = sorted(folder.glob("instances_*.json")) or sorted(folder.glob("*.json"))
-        if found:
-            return found
-    raise StoreError(f"{path}: expected a COCO data set (annotations/instances_<split>.json); found no such file")
-
-
-def _read_split(file: Path, root: Path) -> _Split:
+def _read_split(split: str, file: Path, root: Path) -> _Split:
     try:
         data = parsed(file.read_bytes())
     except (OSError, ValueError) as error:
@@ -108,7 +96,6 @@ def _read_split(file: Path, root: Path) -> _Split:
     if not isinstance(data, dict) or not all(isinstance(data.get(k), list) for k in ("images", "annotations", "categories")):
         raise StoreError(f"{file}: expected lists of images, annotations and categories; found something else")
     lists = cast(dict[str, list[Any]], data)
-    split = file.stem.removeprefix("instances_")
     problems: list[str] = []
     categories = {
         c["id"]: Category(c["id"], str(c["name"]), str(c.get("supercategory") or ""))
@@ -118,7 +105,7 @@ def _read_split(file: Path, root: Path) -> _Split:
     images: list[tuple[dict[str, Any], Path]] = []
     for image in _with_ids(lists["images"], "image", file, problems):
         try:
-            place = _image_file(image, root, split, file.parent)
+            place = picture_file(image, root, split, file.parent)
             problem = _image_problem(image, place)
         except StoreError as error:
             place, problem = None, str(error)
@@ -156,18 +143,6 @@ def _with_ids(
         else:
             seen.add(cast(int, number))
             yield cast(dict[str, Any], value)
-
-
-def _image_file(image: dict[str, Any], root: Path, split: str, beside: Path) -> Path | None:
-    name = image.get("file_name")
-    if not isinstance(name, str) or not name or not is_inside(name):
-        return None
-    below = (f"{split}/{name}", f"images/{split}/{name}", f"images/{name}", name)
-    for folder, path in (*((root, path) for path in below), (beside, name)):
-        with suppress(OSError):  # the name may be too long for the file system
-            if (folder / path).is_file():
-                return file_inside(folder, path)
-    return None
 
 
 def _image_problem(image: dict[str, Any], place: Path | None) -> str | None:
@@ -226,8 +201,6 @@ def _rle(outline: Any, size: tuple[int, int]) -> str | None:
 
     Raises ValueError for outlines on which pycocotools, which does not check its input, could crash.
     """
-    from pycocotools import mask as coco
-
     width, height = size
     if not outline:
         return None
@@ -236,8 +209,7 @@ def _rle(outline: Any, size: tuple[int, int]) -> str | None:
         reach = MOST_IMAGES_BESIDE * max(size)
         if not all(_are_numbers(p, None) and len(p) >= 6 and max(map(abs, p)) <= reach for p in polygons):
             raise ValueError("expected polygons of three corners or more, near the image")
-        code: Any = coco.merge(coco.frPyObjects([p[: len(p) // 2 * 2] for p in polygons], height, width))
-        return rle_of_runs(height, width, rle_runs(height, width, code["counts"].decode("ascii")))
+        return rle_of_polygons(height, width, [p[: len(p) // 2 * 2] for p in polygons])
     if outline["size"] != [height, width]:
         raise ValueError(f"expected run lengths of size {[height, width]}")
     counts = outline["counts"]

@@ -33,8 +33,9 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats._cameras import Moment, Rigs, unskewed, world_of
+from viewsphere.formats._cameras import Moment, Rigs, world_of
 from viewsphere.formats._pictures import picture, suffix_of
+from viewsphere.formats._refusals import known_cameras, no_skew
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
 from viewsphere.formats.colmap.points import Sights
 from viewsphere.formats.colmap.reading import read as read
@@ -59,8 +60,9 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Skew, and splits that are called like a model's files."""
-    yield from unskewed(scope)
+    """Cameras that nobody knows, skew, and splits that are called like a model's files."""
+    yield from known_cameras(scope)
+    yield from no_skew(scope)
     for name in (name for name in scope.splits if name in KINDS):
         yield f"expected splits of other names than {', '.join(KINDS)}; found {name}"
 

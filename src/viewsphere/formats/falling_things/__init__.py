@@ -49,7 +49,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats._paper import json_bytes
 from viewsphere.formats._pictures import depth_png, picture, png
-from viewsphere.formats._refusals import pinhole
+from viewsphere.formats._refusals import known_cameras, pinhole
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
 from viewsphere.formats.falling_things.entries import annotation, box_of, camera_data, class_of, lens_settings, model_settings
 from viewsphere.model.channel import missing
@@ -78,7 +78,8 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Lenses that are no pinholes, and rigs that are neither a camera nor a pair."""
+    """Cameras that nobody knows, lenses that are no pinholes, and rigs that are neither a camera nor a pair."""
+    yield from known_cameras(scope)
     yield from pinhole(scope)
     if scope.rig is not None and _sides(scope.rig) is None:
         yield f"expected one camera or a rectified pair; found {', '.join(sensor.name for sensor in scope.rig.sensors)}"

@@ -13,11 +13,13 @@ frame's and the object's numbers follow it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from viewsphere.formats import Scope
 from viewsphere.formats._contents import put
+from viewsphere.formats._refusals import any_view
 from viewsphere.formats.native.entries import Entry, entries_of, files
 from viewsphere.formats.native.poses import poses
 from viewsphere.formats.native.proving import verify as verify
@@ -27,6 +29,11 @@ from viewsphere.store import Dataset
 
 HOLDS = ("poses", "3D boxes", "masks", "depth")
 READ_BY = ("any JSON reader",)
+
+
+def refuses(scope: Scope) -> Iterator[str]:
+    """Pictures of which none has a known camera and viewpoint."""
+    yield from any_view(scope)
 
 
 def preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[Entry]]:

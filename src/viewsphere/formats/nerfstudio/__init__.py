@@ -41,6 +41,7 @@ from viewsphere.codecs.ply import ply_head
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
+from viewsphere.formats import _refusals as refusals
 from viewsphere.formats._cameras import Rigs, measured_png, opengl_pose, points_of, world_of
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import picture, suffix_of
@@ -76,13 +77,15 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Lenses that are not in the files' words."""
+    """Cameras that nobody knows, and lenses that are not in the files' words."""
     if options.masks and options.kind != "nerfstudio":
         yield f"expected masks with kind nerfstudio; found {options.kind}"
-    cameras = [sensor for sensor in scope.rig.sensors if sensor.lidar is None] if scope.rig else []
-    problems = ((sensor.name, lens_problem(sensor.intrinsics, options.kind)) for sensor in cameras)
+    yield from refusals.lacking_labels(scope, needs(options))
+    yield from refusals.known_cameras(scope)
+    cameras = dict(refusals.lenses(scope))
+    problems = ((name, lens_problem(lens, options.kind)) for name, lens in cameras.items())
     yield from (f"{problem} of {name}" for name, problem in problems if problem)
-    if len(models := {model_of(sensor.intrinsics) for sensor in cameras}) > 1:
+    if len(models := {model_of(lens) for lens in cameras.values()}) > 1:
         yield f"expected lenses of one model; found {' and '.join(sorted(models))}"
 
 

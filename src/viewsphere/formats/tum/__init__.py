@@ -32,9 +32,9 @@ from pydantic import Field
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._cameras import Rigs, measured_png, unskewed, world_from_camera, world_of
+from viewsphere.formats._cameras import Rigs, measured_png, world_from_camera, world_of
 from viewsphere.formats._pictures import picture
-from viewsphere.formats._refusals import pinhole
+from viewsphere.formats._refusals import known_cameras, lenses, no_skew, pinhole
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, line
 from viewsphere.formats.tum.reading import read as read
 from viewsphere.geometry.rotation import quaternion_from_matrix
@@ -70,12 +70,13 @@ class Options(Frozen):
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Lenses that a line of numbers does not hold."""
-    yield from unskewed(scope)
+    yield from known_cameras(scope)
+    yield from no_skew(scope)
     if options.kind == "icl-nuim":
         yield from pinhole(scope)
-    for sensor in () if scope.rig is None else scope.rig.sensors:
-        if sensor.lidar is None and not _is_held(sensor.intrinsics):
-            yield f"expected lenses of k1 k2 p1 p2 k3; found another of {sensor.name}"
+    for name, lens in lenses(scope):
+        if not _is_held(lens):
+            yield f"expected lenses of k1 k2 p1 p2 k3; found another of {name}"
 
 
 class Tum(Tree):

@@ -26,7 +26,10 @@ their name. Not verified: what `Left` means, of which the guidelines say nothing
 Data sets that were made elsewhere are imported by their folder: `viewsphere import voc`. Their pictures are those of the lists
 in ImageSets/Main (trainval is passed over where there are train and val), or else of all annotations, which then are in
 `train`. Objects keep their flags and poses; masks are SegmentationObject's, without the void line. Parts (head, hand, foot) are
-not read. Source: M. Everingham et al., The PASCAL Visual Object Classes Challenge,
+not read. Others' trees are read, too: supervision's (annotations, images), with polygons, and FiftyOne's (labels, data);
+datumaro's, whose pictures have no XML where they show nothing, or masks alone, if there is a labelmap.txt. datumaro and
+FiftyOne count pixels from 0, which only a box that begins at 0 tells: then all of the tree are taken so, else they come out a
+pixel too large. Such numbers go out as they came. Source: M. Everingham et al., The PASCAL Visual Object Classes Challenge,
 http://host.robots.ox.ac.uk/pascal/VOC/voc2012/, and its annotation guidelines of 2009.
 """
 

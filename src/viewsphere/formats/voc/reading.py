@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -15,91 +15,101 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.codecs.size import opened
-from viewsphere.errors import StoreError, UserError
-from viewsphere.geometry.mask import encode_rle, mask_polygons
-from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.errors import StoreError
+from viewsphere.formats._listed import MISTAKES, SUFFIXES, TRAIN, Listed, check_bytes, listed_dataset, lists, one_line, unposed
+from viewsphere.formats.voc.maps import boxes_of, check_map, numbered, numbers_of, unannotated
+from viewsphere.formats.voc.writing import BOX
+from viewsphere.geometry.mask import encode_rle, mask_polygons, rle_of_polygons
+from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 from viewsphere.store import Category
-from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
-from viewsphere.store.paths import file_inside, is_name
+from viewsphere.store.foreign import ForeignDataset, foreign_object, refuse_broken
+from viewsphere.store.paths import file_inside
 from viewsphere.urls.inside import is_inside
 
-SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".bmp")
-BOX = ("xmin", "ymin", "xmax", "ymax")
 FLAGS = ("truncated", "occluded", "difficult")
-LARGEST = 10_000_000
-"""Bytes of an XML."""
+MAPS = ("Object", "Class")
+FOLDERS = (("Annotations", "JPEGImages"), ("", "JPEGImages"), ("annotations", "images"), ("labels", "data"))
+"""Of XML files and of pictures: VOC's, which lack the first where nothing has a box, supervision's, and FiftyOne's."""
 
-MISTAKES = (OSError, ValueError, SyntaxError, UserError)
+MOST_POLYGONS = 100
+"""Of an object."""
+
+BESIDE = 10
+"""Largest distance of a polygon's corner, in image sizes."""
 
 
 @dataclass(frozen=True)
-class _Picture:
-    """A picture, its annotation, and its map of objects, None if it has none."""
+class _Kit:
+    """A data set's folder, and those of its annotations, empty if it has none, and of its pictures; what its labelmap.txt
+    names, and whether a picture needs an annotation: datumaro, which writes that file, writes none where nothing has a box.
+    """
 
-    split: str
-    name: str
-    file: Path
-    size: tuple[int, int]
-    xml: Path
-    masks: Path | None
+    root: Path
+    xml: str
+    pictures: str
+    names: tuple[str, ...]
+
+    @property
+    def is_strict(self) -> bool:
+        return not self.names
 
 
 @dataclass(frozen=True)
 class _Object:
-    """An object of an annotation: its place in the XML from 1 on, name, half-open box, and what else is said of it."""
+    """An object of an annotation: its place in the XML from 1 on, name, box as it is said, its polygons, whose pixels count
+    from 1, and what else is said of it.
+    """
 
     place: int
     name: str
-    box: tuple[float, float, float, float]
+    box: Box
     said: Mapping[str, Any]
+    polygons: tuple[tuple[float, ...], ...] = ()
+
+    def corners(self, first: int) -> Box:
+        """The half-open box, where the first pixel has this number."""
+        return self.box[0] - first, self.box[1] - first, *self.box[2:]
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All pictures and annotations of a folder with `Annotations` and `JPEGImages`, or of one that has VOCdevkit/VOC<year>.
+    """All pictures and annotations of a folder with `Annotations` and `JPEGImages`, or of one that has VOCdevkit/VOC<year>; and
+    of what supervision (`annotations`, `images`) and FiftyOne (`labels`, `data`) write.
+
+    Boxes count from 1 and end with their last pixel, as VOC's; where any begins before 1, all count from 0, as datumaro's and
+    FiftyOne's do, and end behind it.
 
     Raises StoreError with every mistake: pictures and annotations that are missing or outside, and broken objects; with
     `keep_going` these are left out and reported.
     """
-    root = _kit(path)
+    kit = _kit(path)
     problems: list[str] = []
-    pictures = tuple(_pictures(root, problems))
-    listed, digest, most = _listed_names(root), hashlib.sha256(), 1
+    pictures = tuple(_pictures(kit, problems))
+    listed, most, first = kit.names, 1, 1
     names = dict.fromkeys(listed)
     for picture in pictures:
         found = list(_objects(picture, listed, problems))
         names |= dict.fromkeys(o.name for o in found)
         most = max(most, len(found))
-        for file in (picture.xml, picture.masks):
-            digest.update(hashlib.sha256(file.read_bytes() if file else b"").digest())
-        digest.update(f"{picture.split}/{picture.name}\0".encode(errors="backslashreplace"))
+        if picture.said[0] and any(min(o.box[:2]) < 1 for o in found):
+            first = 0
     if not keep_going:
         refuse_broken(problems)
-    if not pictures or not names:
-        raise StoreError(f"{root}: expected pictures and objects that can be used; found none")
-    digest.update("\n".join([*listed, *problems]).encode(errors="backslashreplace"))
+    if not names:
+        raise StoreError(f"{kit.root}: expected pictures and objects that can be used; found none")
     ordered = listed or sorted(names)
     categories = {name: Category(number, name, "") for number, name in enumerate(ordered, 1)}
-    return ForeignDataset(
-        name=path.resolve().name,
-        digest=digest.hexdigest(),
-        categories=tuple(categories.values()),
-        splits=tuple(dict.fromkeys(picture.split for picture in pictures)),
-        channels=("rgb",),
-        count=len(pictures),
-        poses=0,
-        max_objects=most,
-        frames=partial(_frames, pictures, categories, listed),
-        left_out=tuple(problems),
-    )
+    shown = partial(_shown, categories, listed, first)
+    return listed_dataset(path, pictures, categories.values(), most, shown, problems, keep_going, also="\n".join(listed))
 
 
-def _kit(path: Path) -> Path:
-    """The folder that has the annotations."""
+def _kit(path: Path) -> _Kit:
+    """The folders that have the annotations and the pictures."""
     found = [path, *sorted(path.glob("VOC*")), *sorted(path.glob("VOCdevkit/VOC*"))]
-    root = next((folder for folder in found if (folder / "Annotations").is_dir()), None)
-    if root is None:
-        raise StoreError(f"{path}: expected a PASCAL VOC data set (Annotations, JPEGImages, ImageSets); found no such folders")
-    return root
+    for root in found:
+        for xml, pictures in FOLDERS:
+            if (xml or (root / "SegmentationObject").is_dir()) and (root / xml).is_dir() and (root / pictures).is_dir():
+                return _Kit(root, xml, pictures, tuple(_listed_names(root)))
+    raise StoreError(f"{path}: expected a PASCAL VOC data set (Annotations, JPEGImages, ImageSets); found no such folders")
 
 
 def _listed_names(root: Path) -> list[str]:
@@ -114,82 +124,79 @@ def _listed_names(root: Path) -> list[str]:
     return list(dict.fromkeys(name for name in rows if name and name != "background"))
 
 
-def _pictures(root: Path, problems: list[str]) -> Iterator[_Picture]:
+def _pictures(kit: _Kit, problems: list[str]) -> Iterator[Listed]:
     """The pictures of all lists, each in the first that has it."""
     seen = set[str]()
-    for split, source, names in _lists(root, problems):
+    for split, source, names in _lists(kit, problems):
         for name in names:
             if name not in seen:
                 seen.add(name)
                 try:
-                    yield _picture(root, split, name)
+                    yield _picture(kit, split, name)
                 except MISTAKES as error:
-                    problems.append(f"{source}: {name}: {' '.join(str(error).split())}")
+                    problems.append(f"{source}: {name}: {one_line(error)}")
 
 
-def _lists(root: Path, problems: list[str]) -> Iterator[tuple[str, Path, Sequence[str]]]:
+def _lists(kit: _Kit, problems: list[str]) -> Iterator[tuple[str, Path, Sequence[str]]]:
     """Each split with its list and the names of its pictures; lists of categories, whose lines have a number too, are none."""
-    files = {file.stem: file for file in sorted((root / "ImageSets/Main").glob("*.txt"))}
-    if {"train", "val"} <= files.keys():
-        files.pop("trainval", None)
-    order = [name for name in ("train", "val", "test") if name in files]
-    any_list = False
-    for split in (*order, *(name for name in files if name not in order)):
-        try:
-            rows = file_inside(root, files[split].relative_to(root).as_posix()).read_text("utf-8").splitlines()
-        except MISTAKES as error:
-            problems.append(f"{files[split]}: expected names of pictures; found: {' '.join(str(error).split())}")
-            continue
-        names = [row.strip() for row in rows if row.strip()]
-        if is_name(split) and not all(name.rpartition(" ")[2] in ("1", "-1", "0") and " " in name for name in names):
+    any_list, folder = False, "ImageSets/Main"
+    if not (kit.root / folder).is_dir():
+        folder = "ImageSets/Segmentation"
+    for split, file, names in lists(kit.root, folder, problems):
+        if not all(name.rpartition(" ")[2] in ("1", "-1", "0") and " " in name for name in names):
             any_list = True
-            yield split, files[split], names
+            yield split, file, names
     if not any_list and not problems:
-        folder = root / "Annotations"
-        found = sorted(folder.rglob("*.xml"))
-        yield "train", folder, [file.relative_to(folder).with_suffix("").as_posix() for file in found]
+        place = kit.root / kit.xml
+        found = sorted(place.rglob("*.xml"))
+        yield TRAIN, place, [file.relative_to(place).as_posix().removesuffix(".xml") for file in found]
 
 
-def _picture(root: Path, split: str, name: str) -> _Picture:
+def _picture(kit: _Kit, split: str, name: str) -> Listed:
     if not is_inside(name):
         raise StoreError("expected a picture below the folder; found a path that leads outside")
-    xml = file_inside(root, f"Annotations/{name}.xml")
-    if not xml.is_file():
+    root, xml = kit.root, file_inside(kit.root, f"{kit.xml or 'Annotations'}/{name}.xml")
+    if kit.is_strict and not xml.is_file():
         raise StoreError(f"expected {xml}; found no such file")
-    paths = [f"JPEGImages/{name}{suffix}" for suffix in SUFFIXES]
+    paths = [f"{kit.pictures}/{name}{suffix}" for suffix in SUFFIXES]
     path = next((one for one in paths if (root / one).is_file()), None)
     if path is None:
-        raise StoreError(f"expected a picture JPEGImages/{name}{SUFFIXES[0]}; found no such file")
-    file, masks = file_inside(root, path), file_inside(root, f"SegmentationObject/{name}.png")
+        raise StoreError(f"expected a picture {paths[0]}; found no such file")
+    file, maps = file_inside(root, path), [file_inside(root, f"Segmentation{kind}/{name}.png") for kind in MAPS]
     with opened(file) as found:
         size = found.size
-    said = tuple(int(float(_parsed(xml).findtext(f"size/{key}") or 0)) for key in ("width", "height"))
-    if all(said) and said != size:
-        raise StoreError(f"expected {said[0]} x {said[1]} pixels, as {xml.name} says; found {size[0]} x {size[1]}")
-    if masks.is_file():
-        with opened(masks) as found:
-            if found.size != size or found.mode not in ("P", "L"):
-                raise StoreError(f"expected objects' numbers in {masks.name}, of the picture's size; found other pixels")
-    return _Picture(split, name, file, size, xml, masks if masks.is_file() else None)
+    if xml.is_file():
+        said = tuple(int(float(_parsed(xml).findtext(f"size/{key}") or 0)) for key in ("width", "height"))
+        if all(said) and said != size:
+            raise StoreError(f"expected {said[0]} x {said[1]} pixels, as {xml.name} says; found {size[0]} x {size[1]}")
+    there = tuple(one if one.is_file() else None for one in (xml, *maps))
+    for one in filter(None, there[1:]):
+        check_map(one, size)
+    return Listed(split, name, file, size, there)
 
 
 def _parsed(xml: Path) -> ElementTree.Element:
+    check_bytes(xml, xml.stat().st_size)
     data = xml.read_bytes()
-    if len(data) > LARGEST or b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise StoreError(f"expected a plain annotation in {xml.name}; found one with entities, or of {len(data):,} bytes")
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise StoreError(f"expected a plain annotation in {xml.name}; found one with entities")
     return ElementTree.fromstring(data)
 
 
-def _objects(picture: _Picture, listed: Sequence[str], problems: list[str]) -> Iterator[_Object]:
-    """The valid objects of an annotation."""
-    for place, element in enumerate(_parsed(picture.xml).findall("object"), 1):
+def _objects(picture: Listed, listed: Sequence[str], problems: list[str]) -> Iterator[_Object]:
+    """The valid objects of an annotation, or, of a picture that has none, of its maps."""
+    xml = picture.said[0]
+    if xml is None:
+        yield from _unannotated(picture, listed, problems)
+        return
+    for place, element in enumerate(_parsed(xml).findall("object"), 1):
         try:
-            yield _object(place, element, listed)
+            yield _object(place, element, listed, BESIDE * max(picture.size))
         except ValueError as error:
-            problems.append(f"{picture.xml}: object {place}: {error}")
+            problems.append(f"{xml}: object {place}: {error}")
 
 
-def _object(place: int, element: ElementTree.Element, listed: Sequence[str]) -> _Object:
+def _object(place: int, element: ElementTree.Element, listed: Sequence[str], reach: int) -> _Object:
     name = (element.findtext("name") or "").strip()
     if not name or (listed and name not in listed):
         raise ValueError(f"expected a name{' of labelmap.txt' if listed else ''}; found {name!r:.60}")
@@ -206,29 +213,61 @@ def _object(place: int, element: ElementTree.Element, listed: Sequence[str]) -> 
     said: dict[str, Any] = {key: int(text) for key, text in flags.items() if text is not None}
     if pose := element.findtext("pose"):
         said["pose"] = pose
-    return _Object(place, name, (x0 - 1, y0 - 1, x1, y1), said)
+    polygons = tuple(_polygon(one, reach) for one in islice(element.findall("polygon"), MOST_POLYGONS))
+    return _Object(place, name, (x0, y0, x1, y1), said, polygons)
 
 
-def _frames(pictures: Sequence[_Picture], categories: Mapping[str, Category], listed: Sequence[str]) -> Iterator[ForeignFrame]:
-    for index, picture in enumerate(pictures):
-        masks = None
-        if picture.masks:
-            with opened(picture.masks) as found:
-                masks = np.array(found)
-        found = _objects(picture, listed, [])
-        objects = tuple(_annotation(number, o, categories, picture, masks) for number, o in enumerate(found, 1))
-        said = {"file_name": picture.name + picture.file.suffix}
-        yield ForeignFrame(Sample(index, picture.split, None, None, objects, {}, {}, picture.size, said), {"rgb": picture.file})
+def _polygon(element: ElementTree.Element, reach: int) -> tuple[float, ...]:
+    """The corners x1, y1, x2, y2, ... of a polygon, none of them farther than `reach` from the first pixel."""
+    texts = [corner.text or "" for corner in element]
+    try:
+        found = tuple(map(float, texts))
+    except ValueError:
+        raise ValueError(f"expected numbers as polygon; found {texts!r:.60}") from None
+    if len(found) < 6 or len(found) % 2 or not all(abs(number) <= reach for number in found):
+        raise ValueError(f"expected a polygon of three corners or more; found {texts!r:.60}")
+    return found
+
+
+def _unannotated(picture: Listed, listed: Sequence[str], problems: list[str]) -> Iterator[_Object]:
+    _, objects, classes = picture.said
+    if objects and classes:
+        try:
+            for number, name, box in unannotated(numbers_of(objects), numbers_of(classes), listed):
+                yield _Object(number, name, box, {})
+        except ValueError as error:
+            problems.append(f"{classes}: {error}")
+
+
+def _shown(categories: Mapping[str, Category], listed: Sequence[str], first: int, picture: Listed, index: int) -> Sample:
+    xml, file, _ = picture.said
+    found, ids = list(_objects(picture, listed, [])), numbers_of(file) if file else None
+    places = {o.place: o.corners(first if xml else 0) for o in found}
+    numbers = {} if ids is None else numbered(places, boxes_of(ids)) if xml else {place: place for place in places}
+    objects: list[ObjectAnnotation] = []
+    for o in found:
+        mask = None if ids is None or o.place not in numbers else ids == numbers[o.place]
+        category, box = categories[o.name], places[o.place]
+        objects.append(_annotation(len(objects) + 1, o, category, picture.size, box, first, mask))
+    return unposed(picture, index, objects, {"file_name": picture.name + picture.file.suffix})
 
 
 def _annotation(
-    number: int, o: _Object, categories: Mapping[str, Category], picture: _Picture, masks: NDArray[Any] | None
+    number: int, o: _Object, category: Category, size: tuple[int, int], box: Box, first: int, mask: NDArray[np.bool_] | None
 ) -> ObjectAnnotation:
-    """An object with its mask, and as COCO would have it in `source`."""
-    x0, y0, x1, y1 = o.box
+    """An object with its mask, and as COCO would have it in `source`; there also the box as it is said in its data set, whose
+    first pixel has this number, where VOC would say another.
+    """
+    x0, y0, x1, y1 = box
     source: dict[str, Any] = {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": (x1 - x0) * (y1 - y0), **o.said}
+    if first != 1 or any(value != round(value) for value in box):
+        source["bndbox"] = [x0 + first, y0 + first, x1, y1]
     counts = None
-    if masks is not None and (mask := masks == o.place).any():
+    if mask is not None:
         counts = encode_rle(mask)
         source |= {"area": int(mask.sum()), "segmentation": [list(map(int, ring)) for ring in mask_polygons(mask)]}
-    return foreign_object(number, categories[o.name], picture.size, source, counts, o.box, box2d=o.box)
+    elif o.polygons:
+        outline = [[value - 1 for value in polygon] for polygon in o.polygons]
+        counts = rle_of_polygons(size[1], size[0], outline)
+        source |= {"segmentation": outline, "polygon": True}
+    return foreign_object(number, category, size, source, counts, box, box2d=box)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, cast
 from xml.etree import ElementTree
 
 import numpy as np
@@ -18,9 +18,10 @@ from viewsphere.formats._pictures import picture
 from viewsphere.formats._tree import File, Piece, Tree, line
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Portion
-from viewsphere.model.sample import ObjectAnnotation, ObjectView, Sample
+from viewsphere.model.sample import Box, ObjectAnnotation, ObjectView, Sample
 from viewsphere.store import Dataset
 
+BOX = ("xmin", "ymin", "xmax", "ymax")
 ROOT = "VOCdevkit/VOC2012"
 VIEWS = {0: "Frontal", 90: "Left", 180: "Rear", 270: "Right"}
 """By the azimuth from which an object is seen."""
@@ -54,7 +55,9 @@ class Voc(Tree):
         self._numbers = {category.id: number for number, category in enumerate(dataset.categories, 1)}
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A picture, its XML and, if all its objects have masks, its two maps."""
+        """A picture, its XML and its two maps. A picture of which some objects have no masks, as imported ones may, is not
+        listed as segmented.
+        """
         split, _, name = self.stem(sample).partition("/")
         suffix, seen = f".{self._options.pictures}", [o for o in sample.objects if o.box2d is not None]
         yield File(f"{ROOT}/JPEGImages/{name}{suffix}", picture(sample, suffix))
@@ -62,13 +65,14 @@ class Voc(Tree):
         has_masks = all(mask.any() for mask in masks)
         yield File(f"{ROOT}/Annotations/{name}.xml", self._xml(sample, name + suffix, seen, has_masks))
         yield line(f"{ROOT}/ImageSets/Main/{split}.txt", name)
-        if has_masks:
+        if has_masks or any(mask.any() for mask in masks):
             objects = np.zeros((sample.height, sample.width), np.uint8)
             for number, mask in enumerate(masks, 1):
                 objects[mask] = number
             classes = np.array([0, *(self._numbers[o.category_id] for o in seen)], np.uint8)
             yield File(f"{ROOT}/SegmentationClass/{name}.png", _indexed(sample, "classes", classes[objects]))
             yield File(f"{ROOT}/SegmentationObject/{name}.png", _indexed(sample, "objects", objects))
+        if has_masks:
             yield line(f"{ROOT}/ImageSets/Segmentation/{split}.txt", name)
 
     def rest(self) -> Iterator[File]:
@@ -91,7 +95,6 @@ class Voc(Tree):
 def _object(o: ObjectAnnotation, difficult_below: float) -> dict[str, Any]:
     """The fields of an object; of imported ones what they came with, or else flags of 0, as less is known."""
     assert o.box2d is not None
-    x0, y0, x1, y1 = o.box2d
     inside = 1 - o.truncation
     told = {key: value for key, value in (o.source or {}).items() if key in ("pose", "truncated", "occluded", "difficult")}
     return {
@@ -101,13 +104,33 @@ def _object(o: ObjectAnnotation, difficult_below: float) -> dict[str, Any]:
         "occluded": int(inside > 0 and 1 - o.visibility / inside > OCCLUDED),
         "difficult": int(o.visibility < difficult_below),
         **told,
-        "bndbox": {
-            "xmin": math.floor(x0) + 1,
-            "ymin": math.floor(y0) + 1,
-            "xmax": math.ceil(x1),
-            "ymax": math.ceil(y1),
-        },
+        "bndbox": dict(zip(BOX, _bounds(o.box2d, (o.source or {}).get("bndbox")), strict=True)),
+        **_polygons(o),
     }
+
+
+def _bounds(box: Box, said: Any) -> list[int | float]:
+    """Its first and last pixels, counted from 1; of imported boxes that are no such the numbers that they came with."""
+    x0, y0, x1, y1 = box
+    if isinstance(said, list) and len(numbers := _numbers(cast(list[Any], said))) == len(BOX):
+        return numbers
+    return [math.floor(x0) + 1, math.floor(y0) + 1, math.ceil(x1), math.ceil(y1)]
+
+
+def _polygons(o: ObjectAnnotation) -> dict[str, Any]:
+    """The corners, counted from 1, of imported polygons."""
+    source = o.source or {}
+    rings = source.get("segmentation") if source.get("polygon") is True else None
+    if not isinstance(rings, list) or len(rings := cast(list[Any], rings)) != 1 or not isinstance(rings[0], list):
+        return {}
+    numbers = _numbers([value + 1 for value in _numbers(cast(list[Any], rings[0]))])
+    return {"polygon": {f"{'xy'[i % 2]}{i // 2 + 1}": value for i, value in enumerate(numbers)}}
+
+
+def _numbers(values: list[Any]) -> list[int | float]:
+    """Finite numbers, whole ones without a point; of what else there is, nothing."""
+    found = [value for value in values if isinstance(value, int | float) and math.isfinite(value)]
+    return [int(value) if value == int(value) else value for value in found] if len(found) == len(values) else []
 
 
 def _pose(view: ObjectView) -> str:

@@ -14,7 +14,9 @@ line. Imported objects keep their own polygons, corners and points.
 Data sets that were made elsewhere are imported by their data.yaml: `viewsphere import yolo`. What a line is, its numbers tell:
 4 are a box, as many as kpt_shape says a box with points, others a polygon; one of four corners is an oriented box, too. Splits
 are data.yaml's: folders, or lists of pictures. A picture's labels lie where the last `images` of its path is `labels`; it may
-have none. Source: Ultralytics' documentation, https://docs.ultralytics.com/datasets/.
+have none. A data.yaml without splits, as supervision writes it, is of `images`, or of its folders train, val and test. Trees of
+Darknet, as datumaro and FiftyOne write them, have obj.names and lists, `<split>.txt`; labels lie beside their pictures. Source:
+Ultralytics' documentation, https://docs.ultralytics.com/datasets/.
 """
 
 from __future__ import annotations

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, cast
@@ -14,12 +13,14 @@ import numpy as np
 import yaml
 
 from viewsphere.codecs.size import opened
-from viewsphere.errors import StoreError, UserError
+from viewsphere.errors import StoreError
+from viewsphere.formats._listed import MISTAKES, Listed, listed_dataset, one_line, text_of, unposed
+from viewsphere.formats.yolo.describing import DARKNET, NAMES, darknet, unsaid
 from viewsphere.formats.yolo.lines import Kind, Row, coco_of, kind_of, parsed_line
-from viewsphere.geometry.mask import rle_of_runs, rle_runs
+from viewsphere.geometry.mask import rle_of_polygons
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Category
-from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
+from viewsphere.store.foreign import ForeignDataset, foreign_object
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.urls.inside import is_inside
 
@@ -30,19 +31,9 @@ LARGEST_FILE = 10_000_000
 """Bytes of a data.yaml."""
 
 
-@dataclass(frozen=True)
-class _Picture:
-    """A picture, and its file of labels, None if it has none."""
-
-    split: str
-    name: str
-    file: Path
-    size: tuple[int, int]
-    labels: Path | None
-
-
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All pictures and labels of a folder with data.yaml, or of one such file: what viewsphere.formats.yolo says.
+    """All pictures and labels of a folder with data.yaml, or of one such file: what viewsphere.formats.yolo says. A folder with
+    obj.names and lists, as Darknet has them, and a data.yaml that names no splits, beside `images`, are read, too.
 
     Raises StoreError with every mistake: splits and pictures that are missing or outside, broken lines, classes that have no
     name; with `keep_going` these are left out and reported.
@@ -52,35 +43,17 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     root, problems = file.parent, list[str]()
     categories = tuple(Category(number + 1, name, "") for number, name in enumerate(_names(told, file)))
     kind = kind_of(told, file)
-    pictures = tuple(_pictures(root, told, file, problems))
-    digest, most = hashlib.sha256(file.read_bytes()), 1
+    pictures, most = tuple(_pictures(root, told, file, problems)), 1
     for picture in pictures:
-        rows = list(_rows(picture, kind, len(categories), problems))
-        most = max(most, len(rows))
-        text = picture.labels.read_bytes() if picture.labels else b""
-        digest.update(f"{picture.split}/{picture.name}\0{hashlib.sha256(text).hexdigest()}".encode(errors="backslashreplace"))
-    if not keep_going:
-        refuse_broken(problems)
-    if not pictures:
-        raise StoreError(f"{file}: expected pictures that can be used; found none")
-    digest.update("\n".join(problems).encode(errors="backslashreplace"))
-    return ForeignDataset(
-        name=root.resolve().name,
-        digest=digest.hexdigest(),
-        categories=categories,
-        splits=tuple(dict.fromkeys(picture.split for picture in pictures)),
-        channels=("rgb",),
-        count=len(pictures),
-        poses=0,
-        max_objects=most,
-        frames=partial(_frames, pictures, categories, kind),
-        left_out=tuple(problems),
-    )
+        most = max(most, sum(1 for _ in _rows(picture, kind, len(categories), problems)))
+    also = hashlib.sha256(file.read_bytes()).hexdigest()
+    return listed_dataset(file, pictures, categories, most, partial(_shown, categories, kind), problems, keep_going, also=also)
 
 
 def _described(path: Path) -> Path:
     """The file that describes the data set."""
-    found = [path] if path.is_file() else [path / "data.yaml", *sorted(path.glob("*.yaml")), *sorted(path.glob("*.yml"))]
+    named = [path / "data.yaml", *sorted(path.glob("*.yaml")), *sorted(path.glob("*.yml")), path / NAMES]
+    found = [path] if path.is_file() else named
     file = next((one for one in found if one.is_file()), None)
     if file is None:
         raise StoreError(f"{path}: expected a YOLO data set (data.yaml); found no such file")
@@ -88,14 +61,17 @@ def _described(path: Path) -> Path:
 
 
 def _load(file: Path) -> dict[str, Any]:
+    if file.name == NAMES:
+        return darknet(file)
     try:
         data = file.read_bytes()
         told = yaml.safe_load(data) if len(data) <= LARGEST_FILE else None
     except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-        raise StoreError(f"{file}: expected YOLO's YAML; found: {' '.join(str(error).split())}") from None
+        raise StoreError(f"{file}: expected YOLO's YAML; found: {one_line(error)}") from None
     if not isinstance(told, dict):
         raise StoreError(f"{file}: expected names and folders of pictures; found something else")
-    return cast(dict[str, Any], told)
+    said = cast(dict[str, Any], told)
+    return said if any(name not in NO_SPLITS and place for name, place in said.items()) else {**said, **unsaid(file.parent)}
 
 
 def _names(told: Mapping[str, Any], file: Path) -> list[str]:
@@ -112,7 +88,7 @@ def _names(told: Mapping[str, Any], file: Path) -> list[str]:
     return found
 
 
-def _pictures(root: Path, told: Mapping[str, Any], file: Path, problems: list[str]) -> Iterator[_Picture]:
+def _pictures(root: Path, told: Mapping[str, Any], file: Path, problems: list[str]) -> Iterator[Listed]:
     """The pictures of all splits, each in the first of those that have it."""
     seen = set[str]()
     base = str(told.get("path") or "")
@@ -159,11 +135,12 @@ def _listed(root: Path, relative: str, split: str, file: Path, problems: list[st
             return
         lines = place.read_text("utf-8").splitlines()
     except (StoreError, OSError, ValueError) as error:
-        problems.append(f"{file}: {split}: {' '.join(str(error).split())}")
+        problems.append(f"{file}: {split}: {one_line(error)}")
         return
     for said in filter(None, map(str.strip, lines)):
-        name = (PurePosixPath(relative).parent / said).as_posix()
-        if is_inside(said) and (root / name).is_file():
+        names = [(PurePosixPath(relative).parent / path).as_posix() for path in (said, said.removeprefix(DARKNET))]
+        name = next((name for name in names if is_inside(said) and (root / name).is_file()), None)
+        if name is not None:
             yield name
         else:
             problems.append(f"{place}: expected a picture below the folder; found no {said!r:.100}")
@@ -185,45 +162,43 @@ def _labels_of(picture: str) -> str:
     return str(PurePosixPath(f"{head}/labels/{tail}" if images else f"/{picture}").with_suffix(".txt"))[1:]
 
 
-def _picture(root: Path, split: str, name: str, file: Path, problems: list[str]) -> _Picture | None:
+def _picture(root: Path, split: str, name: str, file: Path, problems: list[str]) -> Listed | None:
     try:
         place, labels = file_inside(root, name), file_inside(root, _labels_of(name))
         with opened(place) as found:
             size = found.size
-        return _Picture(split, name, place, size, labels if labels.is_file() else None)
-    except (OSError, ValueError, SyntaxError, UserError) as error:
-        problems.append(f"{file}: {split}: expected a picture that can be read; found {name}: {' '.join(str(error).split())}")
+        return Listed(split, name, place, size, (labels if labels.is_file() else None,))
+    except MISTAKES as error:
+        problems.append(f"{file}: {split}: expected a picture that can be read; found {name}: {one_line(error)}")
         return None
 
 
-def _rows(picture: _Picture, kind: Kind, classes: int, problems: list[str]) -> Iterator[Row]:
+def _rows(picture: Listed, kind: Kind, classes: int, problems: list[str]) -> Iterator[Row]:
     """The valid lines of a picture's labels."""
-    if picture.labels is None:
+    (labels,) = picture.said
+    if labels is None:
         return
     try:
-        lines = picture.labels.read_text("utf-8").splitlines()
-    except (OSError, ValueError) as error:
-        problems.append(f"{picture.labels}: expected lines of numbers; found: {error}")
+        lines = text_of(labels)
+    except MISTAKES as error:
+        problems.append(f"{labels}: expected lines of numbers; found: {error}")
         return
     for number, text in enumerate(lines, 1):
         if text.strip():
             try:
                 yield parsed_line(text, kind, classes)
             except ValueError as error:
-                problems.append(f"{picture.labels}: line {number}: {error}")
+                problems.append(f"{labels}: line {number}: {error}")
 
 
-def _frames(pictures: Sequence[_Picture], categories: Sequence[Category], kind: Kind) -> Iterator[ForeignFrame]:
-    for index, picture in enumerate(pictures):
-        rows = _rows(picture, kind, len(categories), [])
-        objects = tuple(_object(number, row, categories, picture, kind) for number, row in enumerate(rows, 1))
-        said: dict[str, Any] = {"file_name": picture.name}
-        if kind.flips:
-            said["flip_idx"] = list(kind.flips)
-        yield ForeignFrame(Sample(index, picture.split, None, None, objects, {}, {}, picture.size, said), {"rgb": picture.file})
+def _shown(categories: Sequence[Category], kind: Kind, picture: Listed, index: int) -> Sample:
+    rows = _rows(picture, kind, len(categories), [])
+    objects = [_object(number, row, categories, picture, kind) for number, row in enumerate(rows, 1)]
+    flips = {"flip_idx": list(kind.flips)} if kind.flips else {}
+    return unposed(picture, index, objects, {"file_name": picture.name, **flips})
 
 
-def _object(number: int, row: Row, categories: Sequence[Category], picture: _Picture, kind: Kind) -> ObjectAnnotation:
+def _object(number: int, row: Row, categories: Sequence[Category], picture: Listed, kind: Kind) -> ObjectAnnotation:
     """An object with what its line says, and as COCO would have it in `source`."""
     source = coco_of(row, picture.size)
     more: dict[str, Any] = {}
@@ -235,16 +210,6 @@ def _object(number: int, row: Row, categories: Sequence[Category], picture: _Pic
     if row.corners is not None and len(row.corners) == 4:
         more["obb"] = row.corners * picture.size
     x, y, width, height = source["bbox"]
-    box, mask = (x, y, x + width, y + height), _mask(source.get("segmentation"), picture.size)
+    outline, box = source.get("segmentation"), (x, y, x + width, y + height)
+    mask = rle_of_polygons(picture.size[1], picture.size[0], outline) if outline else None
     return foreign_object(number, categories[row.number], picture.size, source, mask, box, **({"more": more} if more else {}))
-
-
-def _mask(outline: Any, size: tuple[int, int]) -> str | None:
-    """The run-length code of a polygon, as pycocotools draws it."""
-    if not outline:
-        return None
-    from pycocotools import mask as coco
-
-    width, height = size
-    code: Any = coco.merge(coco.frPyObjects(outline, height, width))
-    return rle_of_runs(height, width, rle_runs(height, width, code["counts"].decode("ascii")))

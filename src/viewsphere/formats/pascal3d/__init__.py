@@ -27,6 +27,19 @@ Anchors are the model's named points; characters that names in MATLAB cannot hav
 of visible ones. truncated: more than 15 % of the object lies outside of the picture; occluded: others hide more than 5 % of
 what lies inside. Categories that PASCAL VOC has keep its numbers (car: 7); others count from 21.
 
+Data sets that were made elsewhere are imported by their folder: `viewsphere import pascal3d`, without MATLAB or scipy. Read are
+all records in Annotations/<category>_<source>; what a picture shows is each category's own folder's, the rest its first one's.
+Splits are those of the lists in ImageSets/Main, `<category>_<split>.txt` or `<split>.txt`, and in Image_sets,
+`<category>_imagenet_<split>.txt`; a picture of no list is in `train`. CAD/<category>.mat are the data set's models, without
+colours, their anchors its keypoints; OFF files are not read. An object's `view` and pose_category are its viewpoint's, around
+the middle of its model's box, of a coarse one without a distance; truncated, occluded, difficult and the viewpoint are in its
+`source`, and the flags go out as they came. A picture's world is its camera's axes. K and RT, where they are, are its lens and
+poses. Elsewhere the lens has the length focal x viewport: where one object has a viewpoint, px, py is where its axis meets the
+picture, and the pose is exactly the format's projection; where several have, that is the picture's middle, each is turned the
+shortest way to its px, py, and its pose is as near to the format's projection as said above. Where lengths differ, the lens and
+poses are not known. Masks are SegmentationObject's, of `pascal` pictures alone, where they lie in their objects' boxes. Not
+verified: that their numbers are places in `record.objects` in PASCAL3D+'s own files, too.
+
 Lost: sequences and sensors. `interval_azimuth`, `interval_elevation` and `error`, which tell of human annotators, are left out;
 azimuth_coarse and elevation_coarse are the exact ones. Not verified: that pixels count from 1, and status 2 (occluded) and 4
 (outside) of anchors. Writing needs the extra `mat`. Source: Y. Xiang, R. Mottaghi, S. Savarese, Beyond PASCAL: A Benchmark for
@@ -37,33 +50,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-from numpy.typing import NDArray
-
-from viewsphere.codecs.palette import palette
-from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._contents import Coded
-from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import most_categories, most_objects
-from viewsphere.formats._tree import File, Piece, Tree, functions, line
-from viewsphere.formats._viewpoint_mat import Cads, Options, no_viewpoints, scipy_io
-from viewsphere.model.sample import Sample
-from viewsphere.store import Dataset
+from viewsphere.formats._tree import functions
+from viewsphere.formats._viewpoint_mat import Options as Options
+from viewsphere.formats._viewpoint_mat import no_viewpoints, scipy_io
+from viewsphere.formats.pascal3d.reading import read as read
+from viewsphere.formats.pascal3d.writing import CLASSES, MOST, Pascal3d
 
 CHANNELS = ("rgb",)
 CREDITS = False
 HOLDS = ("viewpoints", "CAD models", "boxes", "masks", "anchors")
 READ_BY = ("scipy", "MATLAB")
-
-KIT = "PASCAL/VOCdevkit/VOC2012"
-MOST = 254  # 255 is void
-CLASSES = (
-    "aeroplane", "bicycle", "bird", "boat", "bottle", "bus", "car", "cat", "chair", "cow", "diningtable", "dog", "horse",
-    "motorbike", "person", "pottedplant", "sheep", "sofa", "train", "tvmonitor",
-)  # fmt: skip
-"""PASCAL VOC's categories, from number 1 on."""
 
 
 def check() -> None:
@@ -81,55 +79,6 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
     yield from no_viewpoints(scope)
     yield from most_categories(scope, MOST - len(CLASSES))
     yield from most_objects(scope, MOST)
-
-
-class Pascal3d(Tree):
-    """The tree of a release."""
-
-    def __init__(self, dataset: Dataset, options: Options) -> None:
-        super().__init__(dataset)
-        self._cads = Cads(dataset, options, "pascal3d")
-        names = [category.name for category in dataset.categories]
-        others = iter(range(len(CLASSES) + 1, MOST + 1))
-        self._numbers = {name: CLASSES.index(name) + 1 if name in CLASSES else next(others) for name in names}
-        lists = [f"{name}_{split}" for name in names for split in dataset.splits]
-        if twice := next((name for name in lists if lists.count(name) > 1), None):
-            raise UserError(f"pascal3d: expected categories and splits that make different names; found {twice} twice")
-
-    def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A picture and its record for each category that it shows, and its maps."""
-        split, _, stem = self.stem(sample).partition("/")
-        name, seen = stem.rpartition("/")[2], [o for o in sample.objects if o.box2d is not None]
-        shown = {o.category for o in seen}
-        for category in self._numbers if shown else ():
-            yield line(f"{KIT}/ImageSets/Main/{category}_{split}.txt", name, f"{1 if category in shown else -1:2}")
-        if not shown:
-            return
-        record = self._cads.record(sample, seen, f"{name}.jpg", masks=True)
-        for category in sorted(shown):
-            yield File(f"Images/{category}_pascal/{name}.jpg", picture(sample, ".jpg"))
-            yield File(f"Annotations/{category}_pascal/{name}.mat", record)
-        objects = np.zeros((sample.height, sample.width), np.uint8)
-        for number, o in enumerate(seen, 1):
-            objects[o.mask] = number
-        classes = np.array([0, *(self._numbers[o.category] for o in seen)], np.uint8)[objects]
-        yield File(f"{KIT}/SegmentationClass/{name}.png", _indexed(sample, "classes", classes))
-        yield File(f"{KIT}/SegmentationObject/{name}.png", _indexed(sample, "objects", objects))
-
-    def rest(self) -> Iterator[File]:
-        """The models, and the names of the numbers."""
-        for category, infos in self._cads.by_category.items():
-            if infos:
-                yield File(f"CAD/{category}.mat", self._cads.file(category))
-            for number, info in enumerate(infos, 1):
-                yield File(f"CAD/{category}/{number:02}.off", self._cads.off(info))
-        rows = "".join(f"{number} {name}\n" for name, number in sorted(self._numbers.items(), key=lambda one: one[1]))
-        yield File(f"{KIT}/classes.txt", rows.encode())
-
-
-def _indexed(sample: Sample, name: str, numbers: NDArray[np.uint8]) -> Coded:
-    """A map (H, W) in VOC's palette."""
-    return Coded(sample.index, f"pascal3d {name}.png", lambda: encode_png(numbers, palette=palette()))
 
 
 preparer, writer, verify = functions(Pascal3d)

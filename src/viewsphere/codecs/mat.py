@@ -1,0 +1,159 @@
+"""MATLAB's files of version 5 (R2006b and -v7), read without more memory than their limit; scipy has none.
+
+Source: MathWorks, MAT-File Format, https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+HEAD, TAG = 128, 8
+DTYPES = {
+    1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8", 16: "u1", 17: "u2", 18: "u4",
+}  # fmt: skip
+MATRIX, COMPRESSED, UTF8 = 14, 15, 16
+CELL, STRUCT, CHAR, FIRST_NUMBER, LAST_NUMBER = 1, 2, 4, 6, 15
+COMPLEX = 0x0800
+DEEPEST = 16
+"""Arrays within one another."""
+
+MOST = 1_000_000
+"""Arrays of a file."""
+
+Struct = list[dict[str, Any]]
+"""A struct array, column by column."""
+
+
+@dataclass
+class _Reader:
+    """The elements of some bytes, and how many arrays may still come."""
+
+    order: str
+    left: int = MOST
+
+    def elements(self, data: memoryview) -> Iterator[tuple[int, memoryview]]:
+        """The types and the bytes of all elements, one after another."""
+        at = 0
+        while at < len(data):
+            if len(data) - at < TAG:
+                raise ValueError("found a file that is cut off")
+            kind, size = struct.unpack_from(self.order + "II", data, at)
+            begin, step = at + TAG, size + (-size % 8 if kind != COMPRESSED else 0)
+            if kind >> 16:  # up to four bytes stand in the tag itself
+                kind, size, begin, step = kind & 0xFFFF, kind >> 16, at + 4, 0
+            if size > len(data) - begin or (step == 0 and begin == at + 4 and size > 4):
+                raise ValueError("found a file that is cut off")
+            yield kind, data[begin : begin + size]
+            at += TAG + step
+
+    def array(self, data: memoryview, depth: int) -> tuple[str, Any]:
+        """An array's name and value."""
+        self.left -= 1
+        if self.left < 0 or depth > DEEPEST:
+            raise ValueError(f"found more than {MOST:,} arrays, or more than {DEEPEST} within one another")
+        if not len(data):
+            return "", np.zeros((0, 0))
+        parts = self.elements(data)
+        flags, shape = self._next(parts), tuple(self._next(parts).tolist())
+        name = bytes(self._next(parts)).decode("latin-1")
+        kind = int(flags[0]) & 0xFF
+        if len(shape) < 2 or min(shape) < 0:
+            raise ValueError(f"found an array of size {shape!r:.60}")
+        count = math.prod(shape)
+        if kind == CELL:
+            return name, self._arrays(parts, count, depth)
+        if kind == STRUCT:
+            return name, self._struct(parts, count, depth)
+        if int(flags[0]) & COMPLEX or not (kind == CHAR or FIRST_NUMBER <= kind <= LAST_NUMBER):
+            raise ValueError(f"found an array of class {kind}, which is not read")
+        return name, self._text(parts, shape) if kind == CHAR else _shaped(self._next(parts), shape)
+
+    def _next(self, parts: Iterator[tuple[int, memoryview]]) -> Any:
+        """The numbers of the next element."""
+        kind, data = next(parts, (0, memoryview(b"")))
+        if kind not in DTYPES:
+            raise ValueError("found a file that is cut off")
+        dtype = np.dtype(self.order + DTYPES[kind])
+        if len(data) % dtype.itemsize:
+            raise ValueError("found numbers that are cut off")
+        return np.frombuffer(data, dtype)
+
+    def _arrays(self, parts: Iterator[tuple[int, memoryview]], count: int, depth: int) -> list[Any]:
+        """The values of the next arrays."""
+        if count > self.left:
+            raise ValueError(f"found more than {MOST:,} arrays")
+        found: list[Any] = []
+        for _ in range(count):
+            kind, data = next(parts, (0, memoryview(b"")))
+            if kind != MATRIX:
+                raise ValueError("found a file that is cut off")
+            found.append(self.array(data, depth + 1)[1])
+        return found
+
+    def _struct(self, parts: Iterator[tuple[int, memoryview]], count: int, depth: int) -> Struct:
+        length, names = self._next(parts), bytes(self._next(parts))
+        if length.size != 1 or not 0 < length[0] <= len(names) + 1 or len(names) % int(length[0]):
+            raise ValueError("found a struct without names of fields")
+        step = int(length[0])
+        fields = [names[i : i + step].split(b"\0")[0].decode("latin-1") for i in range(0, len(names), step)]
+        if not fields:
+            return []
+        values = self._arrays(parts, count * len(fields), depth)
+        return [dict(zip(fields, values[i : i + len(fields)], strict=True)) for i in range(0, len(values), len(fields))]
+
+    def _text(self, parts: Iterator[tuple[int, memoryview]], shape: tuple[int, ...]) -> str:
+        """A text; of several rows, one after another."""
+        kind, data = next(parts, (0, memoryview(b"")))
+        if kind == UTF8:
+            return bytes(data).decode("utf-8")
+        codes = self._next(iter([(kind, data)]))
+        if kind == 17 and math.prod(shape) != codes.size:
+            return bytes(data).decode("utf-16-le" if self.order == "<" else "utf-16-be")
+        return "".join(map(chr, _shaped(codes, shape).ravel().tolist()))
+
+
+def _shaped(numbers: Any, shape: tuple[int, ...]) -> Any:
+    if numbers.size != math.prod(shape):
+        raise ValueError(f"found {numbers.size:,} numbers in an array of size {shape!r:.60}")
+    return numbers.reshape(shape, order="F")
+
+
+def read_mat(data: bytes, most: int) -> dict[str, Any]:
+    """The variables of a file by their names: arrays of numbers, texts, lists (cells) and `Struct`s.
+
+    Raises ValueError for what is no such file, for one that unpacks to more than `most` bytes, and for classes and functions,
+    sparse and complex numbers, which are not read.
+    """
+    mark = data[HEAD - 2 : HEAD]
+    if mark not in (b"IM", b"MI") or data[:10] == b"MATLAB 7.3":
+        raise ValueError("expected a MATLAB file of version 5 to 7; found another: save it again with -v7")
+    reader, found, left = _Reader("<" if mark == b"IM" else ">"), dict[str, Any](), most
+    for kind, body in reader.elements(memoryview(data)[HEAD:]):
+        inner, parts = body, [(kind, body)]
+        if kind == COMPRESSED:
+            inner = _inflated(body, left)
+            parts = reader.elements(inner)
+        left -= len(inner)
+        for own, content in parts:
+            if own == MATRIX:
+                name, value = reader.array(content, 1)
+                found[name] = value
+    return found
+
+
+def _inflated(data: memoryview, most: int) -> memoryview:
+    machine = zlib.decompressobj()
+    try:
+        found = machine.decompress(data, max(1, most))
+    except zlib.error as error:
+        raise ValueError(f"found bytes that cannot be unpacked: {error}") from None
+    if not machine.eof:
+        raise ValueError(f"found a file that unpacks to more than {most:,} bytes, or is cut off")
+    return memoryview(found)

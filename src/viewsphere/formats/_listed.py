@@ -1,0 +1,137 @@
+"""Pictures in splits, each with files that say what it shows, from data sets of other tools, on their way into a store."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+from viewsphere.errors import StoreError, UserError
+from viewsphere.limits import limits
+from viewsphere.model.sample import Sample
+from viewsphere.store import Category
+from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, refuse_broken
+from viewsphere.store.paths import file_inside, is_name
+
+SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".bmp")
+MISTAKES = (OSError, ValueError, SyntaxError, UserError)
+"""Errors of pictures and of texts that are broken, missing or outside."""
+
+SPLITS = TRAIN, VAL, TEST = ("train", "val", "test")
+"""In the order in which they are told, before others."""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A picture of a split, its name in the data set, and the files that say what it shows, None for one that is not there."""
+
+    split: str
+    name: str
+    file: Path
+    size: tuple[int, int]
+    said: tuple[Path | None, ...]
+
+
+Picture = TypeVar("Picture", bound=Listed)
+
+
+def one_line(error: object) -> str:
+    """An error's message without line breaks."""
+    return " ".join(str(error).split())
+
+
+def check_bytes(file: Path, count: int) -> None:
+    """Raise StoreError for a file of annotations that has, or unpacks to, more bytes than the limit."""
+    if count > limits.MAX_ANNOTATION_BYTES:
+        most = f"{limits.MAX_ANNOTATION_BYTES:,} bytes (limit MAX_ANNOTATION_BYTES)"
+        raise StoreError(f"expected at most {most} of {file.name}; found {count:,}")
+
+
+def text_of(file: Path) -> list[str]:
+    """The lines of a text of a size that the limit allows; raises ValueError for what is no UTF-8."""
+    check_bytes(file, file.stat().st_size)
+    return file.read_text("utf-8").splitlines()
+
+
+def lists(root: Path, folder: str, problems: list[str]) -> Iterator[tuple[str, Path, Sequence[str]]]:
+    """The splits of a folder of lists, `<split>.txt`, below the root: train, val and test first, each with its file and the
+    lines that are not empty. `trainval` is passed over where there are train and val; the problems of the others are appended.
+    """
+    files = {file.stem: file for file in sorted((root / folder).glob("*.txt"))}
+    if {TRAIN, VAL} <= files.keys():
+        files.pop("trainval", None)
+    for split in _ordered(files):
+        try:
+            rows = text_of(file_inside(root, files[split].relative_to(root).as_posix()))
+        except MISTAKES as error:
+            problems.append(f"{files[split]}: expected names of pictures; found: {one_line(error)}")
+            continue
+        if is_name(split):
+            yield split, files[split], [row.strip() for row in rows if row.strip()]
+
+
+def listed_dataset(
+    path: Path,
+    pictures: Sequence[Picture],
+    categories: Iterable[Category],
+    most: int,
+    shown: Callable[[Picture, int], Sample],
+    problems: Sequence[str],
+    keep_going: bool,
+    models: Sequence[ForeignModel] = (),
+    also: str = "",
+) -> ForeignDataset:
+    """A data set of these pictures. `most`: the largest number of objects that one shows, or the largest of their ids;
+    `shown` gives the sample of a picture, of this number; `also`: what else the data set's digest tells apart.
+
+    Raises StoreError for the problems, unless it is to keep going, and where there are no pictures.
+    """
+    if not keep_going:
+        refuse_broken(problems)
+    if not pictures:
+        raise StoreError(f"{path}: expected pictures that can be used; found none")
+    return ForeignDataset(
+        name=(path.parent if path.is_file() else path).resolve().name,
+        digest=_digest(pictures, (also, *problems)),
+        categories=tuple(categories),
+        splits=_ordered(picture.split for picture in pictures),
+        channels=("rgb",),
+        count=len(pictures),
+        poses=0,
+        max_objects=max(1, most),
+        frames=partial(_frames, pictures, shown),
+        models=tuple(models),
+        left_out=tuple(problems),
+    )
+
+
+def _ordered(splits: Iterable[str]) -> tuple[str, ...]:
+    """Each split once."""
+    found = dict.fromkeys(splits)
+    return (*(name for name in SPLITS if name in found), *(name for name in found if name not in SPLITS))
+
+
+def unposed(picture: Listed, index: int, objects: Sequence[Any], source: Mapping[str, Any]) -> Sample:
+    """A sample of a picture that nobody knows where it was taken."""
+    return Sample(index, picture.split, None, None, tuple(objects), {}, {}, picture.size, source)
+
+
+def _digest(pictures: Sequence[Listed], texts: Sequence[str]) -> str:
+    """SHA-256 of all that is said of the pictures, each file once, of their names, and of these texts."""
+    digest, seen = hashlib.sha256(), set[Path]()
+    for picture in pictures:
+        digest.update(f"{picture.split}/{picture.name}\0".encode(errors="backslashreplace"))
+        for file in picture.said:
+            if file is None or file not in seen:
+                digest.update(hashlib.sha256(file.read_bytes() if file else b"").digest())
+                seen |= {file} if file else set()
+    digest.update("\n".join(texts).encode(errors="backslashreplace"))
+    return digest.hexdigest()
+
+
+def _frames(pictures: Sequence[Picture], shown: Callable[[Picture, int], Sample]) -> Iterator[ForeignFrame]:
+    for index, picture in enumerate(pictures):
+        yield ForeignFrame(shown(picture, index), {"rgb": picture.file})

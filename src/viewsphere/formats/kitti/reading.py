@@ -1,0 +1,226 @@
+"""KITTI's data sets of objects and of tracks made elsewhere: pictures, their labels and calibrations."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere.errors import StoreError
+from viewsphere.formats._kitti import DONT_CARE
+from viewsphere.formats._listed import MISTAKES, TEST, TRAIN, Listed, listed_dataset, lists, one_line, unposed
+from viewsphere.formats._placed import placed
+from viewsphere.formats._posed import picture_inside
+from viewsphere.formats.kitti.labels import LEVEL, MOST_TRACKS, Labels, Row, read_camera, read_labels
+from viewsphere.formats.kitti.writing import NAMES
+from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.rotation import rigid
+from viewsphere.model.camera import Camera
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Category
+from viewsphere.store.foreign import ForeignDataset, foreign_object
+from viewsphere.store.paths import file_inside, is_name
+from viewsphere.urls.inside import is_inside
+
+SUFFIXES = (".png", ".jpg", ".jpeg")
+FILES_KEPT = 4
+"""Files of labels that are kept for the next picture of their sequence."""
+
+Of = Callable[[Path, bool], Labels]
+
+
+@dataclass(frozen=True)
+class _Frame(Listed):
+    """A picture; of a sequence, with its number there."""
+
+    sequence: str = ""
+    instant: int = 0
+
+    @property
+    def is_tracked(self) -> bool:
+        """Whether it is of a sequence."""
+        return bool(self.sequence)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A folder, from the root, with labelled pictures of a task."""
+
+    folder: str
+    is_tracked: bool
+
+    @property
+    def split(self) -> str:
+        """What its pictures are for, where no list says so."""
+        return TRAIN if self.folder in ("", "training") else self.folder
+
+    def at(self, name: str) -> str:
+        """The path of something in the folder, from the root."""
+        return f"{self.folder}/{name}" if self.folder else name
+
+    @property
+    def images(self) -> str:
+        """The path of its pictures."""
+        return self.at("image_02" if self.is_tracked else "image_2")
+
+    @property
+    def labels(self) -> str:
+        """The path of its labels."""
+        return self.at("label_02" if self.is_tracked else "label_2")
+
+    def names(self, root: Path) -> list[str]:
+        """The names of its pictures."""
+        files = (root / self.images).glob("*/*" if self.is_tracked else "*")
+        found = (file.relative_to(root / self.images) for file in files if file.suffix.lower() in SUFFIXES)
+        return sorted(file.with_suffix("").as_posix() for file in found)
+
+
+def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+    """All labelled pictures of a folder with `training`, or of that itself: what viewsphere.formats.kitti says.
+
+    Raises StoreError with every mistake: pictures, labels and calibrations that are missing, broken or outside, and broken
+    lines; with `keep_going` these are left out and reported.
+    """
+    places = tuple(_places(path))
+    if not places:
+        expected = "training/image_2 and label_2, or image_02 and label_02"
+        raise StoreError(f"{path}: expected a KITTI data set ({expected}); found no such folders")
+    problems, labels_of = list[str](), lru_cache(FILES_KEPT)(read_labels)
+    pictures = sorted(_pictures(path, places, labels_of, problems), key=lambda one: (one.file.parent, one.name))
+    found = {picture.said[0]: picture.is_tracked for picture in pictures}
+    kinds, ids, most = set[str](), set[int](), 1
+    for file, is_tracked in found.items():
+        assert file is not None
+        labels = labels_of(file, is_tracked)
+        problems += labels.problems
+        objects = [[row for row in rows if not row.is_region] for rows in labels.rows.values()]
+        kinds |= {row.kind for rows in objects for row in rows}
+        ids |= {row.track for rows in objects for row in rows if row.track is not None}
+        most = max([most, *map(len, objects)])
+    problems += _unpictured(path, places, labels_of)
+    ordered = sorted(kinds, key=lambda kind: (NAMES.index(kind) if kind in NAMES else len(NAMES), kind))
+    categories = {name: Category(number, name, "") for number, name in enumerate(ordered, 1)}
+    first = int(0 in ids)
+    shown = partial(_shown, categories, labels_of, first)
+    return listed_dataset(path, pictures, categories.values(), max(most, *ids, 0) + first, shown, problems, keep_going)
+
+
+def _places(root: Path) -> Iterator[_Place]:
+    """The folders that have pictures and labels."""
+    for folder in ("", *sorted(one.name for one in root.glob("*") if one.is_dir())):
+        for place in (_Place(folder, False), _Place(folder, True)):
+            if (root / place.images).is_dir() and (root / place.labels).is_dir():
+                yield place
+
+
+def _pictures(root: Path, places: tuple[_Place, ...], labels_of: Of, problems: list[str]) -> Iterator[_Frame]:
+    """The pictures of all lists, each in the first that has it; without lists, those of all folders."""
+    camera_of, seen = lru_cache(FILES_KEPT)(read_camera), set[tuple[_Place, str]]()
+    for split, source, place, name in _named(root, places, problems):
+        if (place, name) not in seen:
+            seen.add((place, name))
+            try:
+                yield _picture(root, place, split, name, labels_of, camera_of)
+            except MISTAKES as error:
+                problems.append(f"{source}: {name}: {one_line(error)}")
+
+
+def _named(root: Path, places: tuple[_Place, ...], problems: list[str]) -> Iterator[tuple[str, Path, _Place, str]]:
+    """Split, where it is said, place and name of each picture."""
+    own = {place: dict.fromkeys(place.names(root)) for place in places}
+    has_lists, is_tested = False, (root / "testing").is_dir() and "testing" not in {place.folder for place in places}
+    for split, file, names in lists(root, "ImageSets", problems):
+        has_lists = True
+        for name in () if is_tested and split == TEST else names:
+            place = next((place for place in places if name in own[place]), places[0])
+            yield split, file, place, name
+    if not has_lists and not problems:
+        for place, names in own.items():
+            yield from ((place.split, root / place.images, place, name) for name in names)
+
+
+def _picture(
+    root: Path, place: _Place, split: str, name: str, labels_of: Of, camera_of: Callable[[Path, tuple[int, int]], Camera]
+) -> _Frame:
+    """A picture of which all that is said can be read."""
+    if not is_inside(name):
+        raise StoreError("expected a picture below the folder; found a path that leads outside")
+    file, size = picture_inside(root, f"{place.images}/{name}", *SUFFIXES)
+    sequence, _, number = name.rpartition("/")
+    if place.is_tracked and not (is_name(sequence) and number.isdecimal() and int(number) < MOST_TRACKS):
+        raise ValueError("expected a picture's name of a sequence and a number")
+    own = sequence if place.is_tracked else name
+    labels, calibrated = (file_inside(root, f"{at}/{own}.txt") for at in (place.labels, place.at("calib")))
+    if not labels.is_file():
+        raise ValueError(f"expected {place.labels}/{own}.txt, empty where there are no objects; found no such file")
+    if unusable := labels_of(labels, place.is_tracked).unusable:
+        raise ValueError(unusable)
+    if calibrated.is_file():
+        camera_of(calibrated, size)
+    said = labels, calibrated if calibrated.is_file() else None
+    instant = int(number) if place.is_tracked else 0
+    return _Frame(split, name, file, size, said, sequence if place.is_tracked else "", instant)
+
+
+def _unpictured(root: Path, places: tuple[_Place, ...], labels_of: Of) -> Iterator[str]:
+    """Problems: labels, and frames of them, without pictures."""
+    for place in places:
+        known: defaultdict[str, set[int]] = defaultdict(set)
+        for name in place.names(root):
+            sequence, _, number = name.rpartition("/")
+            known[sequence if place.is_tracked else name].add(int(number) if place.is_tracked and number.isdecimal() else 0)
+        for file in sorted((root / place.labels).glob("*.txt")):
+            if file.stem not in known:
+                yield f"{file}: expected pictures of these labels; found none in {root / place.images}"
+                continue
+            if place.is_tracked:
+                frames = labels_of(file, True).rows
+                yield from (f"{file}: expected a picture of frame {n}; found none" for n in frames if n not in known[file.stem])
+
+
+def _shown(categories: Mapping[str, Category], labels_of: Of, first: int, picture: _Frame, index: int) -> Sample:
+    """A picture with its objects; tracks are numbered from `first` on more than they say."""
+    labels, calibrated = picture.said
+    assert labels is not None
+    rows = labels_of(labels, picture.is_tracked).rows.get(picture.instant, ())
+    camera = read_camera(calibrated, picture.size) if calibrated else None
+    objects = [
+        _object(number if row.track is None else row.track + first, row, categories[row.kind], picture, camera)
+        for number, row in enumerate((row for row in rows if not row.is_region), 1)
+    ]
+    source: dict[str, Any] = {"file_name": picture.name + picture.file.suffix}
+    if regions := [list(row.box) for row in rows if row.is_region]:
+        source[DONT_CARE] = regions
+    sample = unposed(picture, index, sorted(objects, key=lambda o: o.id), source)
+    instant = picture.instant if picture.is_tracked else index
+    sample = replace(sample, sequence=picture.sequence, instant=instant)
+    return sample if camera is None else replace(sample, known_camera=camera, image_size=None)
+
+
+def _object(number: int, row: Row, category: Category, picture: _Frame, camera: Camera | None) -> ObjectAnnotation:
+    """An object with its box and its pose, and as COCO would have it in `source`."""
+    x0, y0, x1, y1 = row.box
+    source = {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": (x1 - x0) * (y1 - y0), **row.said}
+    known: dict[str, Any] = {} if row.solid is None else _standing(row.solid, camera)
+    outside, hidden = row.said["truncated"], row.said["occluded"]
+    more = {"occlusion_level": hidden} if hidden >= 0 else {}
+    if picture.is_tracked and outside >= 0:
+        more["truncation_level"] = int(outside)
+    elif outside >= 0:
+        known["truncation"] = float(outside)
+    return foreign_object(number, category, picture.size, source, None, row.box, **known, more=more)
+
+
+def _standing(solid: tuple[float, ...], camera: Camera | None) -> dict[str, Any]:
+    """What follows of where a 3D box stands: upright, its front (-Y) turned about the reference camera's y axis."""
+    height, width, length, x, y, z, turn = solid
+    half = np.array([width, length, height]) / 2
+    c, s = np.cos(turn), np.sin(turn)
+    world_from_object = rigid([[s, -c, 0], [c, s, 0], [0, 0, 1]], [x, z, height / 2 - y])
+    camera_from_world = rigid(LEVEL, np.zeros(3)) if camera is None else rigid(camera.R, camera.t)
+    return placed(box_vertices(-half, half), world_from_object, camera_from_world, camera and camera.intrinsics)

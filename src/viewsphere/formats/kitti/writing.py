@@ -1,0 +1,133 @@
+"""Writes KITTI's trees of objects and of tracks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.errors import UserError
+from viewsphere.formats._kitti import DONT_CARE, Car, calibration, calibration_text, car_in, nobody_cares, row, velodyne
+from viewsphere.formats._mounting import Float
+from viewsphere.formats._pictures import picture
+from viewsphere.formats._timeline import Timeline
+from viewsphere.formats._tree import File, Piece, Tree, line
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.rig import CAMERA, Rig
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+NAMES = ("Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram", "Misc")
+TYPES = {"person": "Pedestrian"} | {name.casefold(): name for name in NAMES}
+
+CALIBRATED = {
+    "object": ("R0_rect:", "Tr_velo_to_cam:", "Tr_imu_to_velo:"),
+    "tracking": ("R_rect", "Tr_velo_cam", "Tr_imu_velo"),
+}
+"""How the tasks begin the lines behind the projections: only one has colons."""
+
+
+class Options(Frozen):
+    """Which benchmark."""
+
+    task: Literal["object", "tracking"] = Field(
+        default="object", description="`object`: a file of labels for each picture; `tracking`: one for each sequence"
+    )
+
+
+def type_of(category: str) -> str:
+    """KITTI's name of a category, or its own."""
+    return TYPES.get(category.casefold(), category)
+
+
+class _Course(NamedTuple):
+    """A sequence: its number, how many instants it has, and, where it was imported, its first sample's number."""
+
+    number: int
+    instants: int
+    first: int | None
+
+
+class Kitti(Tree):
+    """The tree of a task."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._task = options.task
+        self._timeline = Timeline(dataset)
+        self._unplanned = lru_cache(maxsize=4)(self._found)
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """What a sensor adds: its picture or points, and, of the left camera, all that is of the frame as a whole."""
+        rig, car, place = self._sensor(sample)
+        name, image = f"{sample.index - place:06d}", "image_"
+        if self._task == "tracking":
+            name, image = f"{self._course(sample).number:04d}/{sample.instant:06d}", "image_0"
+        if place == car.lidar:
+            yield File(f"training/velodyne/{name}.bin", velodyne(sample))
+        else:
+            yield File(f"training/{image}{2 if place == car.left else 3}/{name}.png", picture(sample, ".png"))
+        if place == car.left:
+            yield line(f"ImageSets/{sample.split or 'all'}.txt", name)
+            yield from self._labels(sample, rig, car, name)
+
+    def _sensor(self, sample: Sample) -> tuple[Rig | None, Car, int]:
+        """The rig, what it is to KITTI, and the sample's sensor by its place in it; of one camera, as imported and merged data
+        sets may have it, where the shot is not known. Raises UserError for another sensor there.
+        """
+        if sample.taken is not None or sample.sensor != CAMERA:
+            shot, _, place = self._timeline.taken(sample)
+            return shot.rig, car_in(shot, "kitti"), place
+        return None if sample.known_camera is None else Rig.of(sample.known_camera.intrinsics), Car(0), 0
+
+    def _course(self, sample: Sample) -> _Course:
+        """The sequence that a sample is of; raises UserError for a still picture."""
+        if sample.taken is None and sample.sequence:
+            return self._unplanned(sample.sequence)
+        course = self._timeline.course(sample)
+        return _Course(course.number, course.instants, None)
+
+    def _found(self, name: str) -> _Course:
+        """An imported sequence, of which nothing is planned: as long as its last picture says; KITTI's keep their numbers."""
+        samples, known = self.dataset.sequence(name), self.dataset.sequences
+        are_numbers = all(re.fullmatch("[0-9]{4}", one) for one in known)
+        return _Course(int(name) if are_numbers else known.index(name), samples[-1].instant + 1, samples[0].index)
+
+    def _labels(self, sample: Sample, rig: Rig | None, car: Car, name: str) -> Iterator[File | Piece]:
+        """The lines of a frame's objects, and how its cameras are calibrated, where that is known."""
+        seen = [o for o in sample.objects if o.box2d is not None]
+        rows = [row(o, type_of(o.category), self._task == "tracking") for o in seen]
+        regions = [nobody_cares(box) for box in (sample.source or {}).get(DONT_CARE, ())]
+        calibrated = None if rig is None else _text(calibration(rig, car, sample.camera.intrinsics), self._task)
+        if self._task == "object":
+            yield File(f"training/label_2/{name}.txt", "".join(f"{row}\n" for row in (*rows, *regions)).encode())
+            if calibrated:
+                yield File(f"training/calib/{name}.txt", calibrated)
+            return
+        course = self._course(sample)
+        number = f"{course.number:04d}"
+        if course.first is None:
+            self._check_lens(sample, car)
+        ids = (*(o.id for o in seen), *(-1 for _ in regions))
+        lines = "".join(f"{sample.instant} {own} {row}\n" for own, row in zip(ids, (*rows, *regions), strict=True))
+        yield Piece(f"training/label_02/{number}.txt", lines.encode())
+        if self._timeline.is_first(sample) if course.first is None else course.first == sample.index:
+            if calibrated:
+                yield File(f"training/calib/{number}.txt", calibrated)
+            yield line("evaluate_tracking.seqmap.training", number, "empty", "000000", f"{course.instants:06d}")
+
+    def _check_lens(self, sample: Sample, car: Car) -> None:
+        """Raise UserError where a sequence zooms, of which there is one calibration."""
+        start = next(self._timeline.shots(self._timeline.course(sample)))
+        if start.camera(next(start.samples)[1], car.left).intrinsics != sample.camera.intrinsics:
+            raise UserError(f"kitti: expected one lens all through a sequence; found another in frame {sample.index}")
+
+
+def _text(calibrated: Mapping[str, Float], task: str) -> bytes:
+    """The text of a calibration, in a task's words."""
+    others = (np.eye(3), calibrated["velo"], np.eye(3, 4))
+    return calibration_text(calibrated, *zip(CALIBRATED[task], others, strict=True))

@@ -1,0 +1,115 @@
+"""PASCAL3D+'s CAD models, as others may have made them, on their way into a store."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.export import export_glb, export_obj
+from viewsphere.assets.mesh import Mesh
+from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._viewpoint_mat import OWN
+from viewsphere.formats.pascal3d.records import FARTHEST, structs_of, variables
+from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.model.keypoints import Keypoints, Place
+from viewsphere.store import Category, ModelInfo
+from viewsphere.store.foreign import ForeignModel
+from viewsphere.store.paths import file_inside
+
+Float = NDArray[np.float64]
+
+
+def read_cads(root: Path, categories: Mapping[str, Category], problems: list[str]) -> dict[str, list[ForeignModel]]:
+    """The models of each category that has a file of them, in their order; the problems of other files are appended."""
+    found: dict[str, list[ForeignModel]] = {}
+    for name, category in categories.items():
+        file = root / f"CAD/{name}.mat"
+        if file.is_file():
+            try:
+                found[name] = list(_models(file_inside(root, f"CAD/{name}.mat"), category))
+            except MISTAKES as error:
+                problems.append(f"{file}: {one_line(error)}")
+    return found
+
+
+def _models(file: Path, category: Category) -> Iterator[ForeignModel]:
+    for number, said in enumerate(structs_of(variables(file).get(category.name), f"a struct array {category.name}"), 1):
+        try:
+            yield _model(said, category, f"{category.name}_{number:02}")
+        except ValueError as error:
+            raise ValueError(f"model {number}: {error}") from None
+
+
+def _model(said: Mapping[str, Any], category: Category, key: str) -> ForeignModel:
+    mesh, points = _mesh(said.get("vertices"), said.get("faces")), dict(_points(said))
+    vertices = mesh.vertices.astype(np.float64)
+    box, digest = box_vertices(vertices.min(axis=0), vertices.max(axis=0)), hashlib.sha256(repr(points).encode())
+    for array in (mesh.vertices, mesh.triangles):
+        digest.update(array.tobytes())
+    info = ModelInfo(
+        key=key,
+        category=category.name,
+        supercategory=category.supercategory,
+        category_id=category.id,
+        obj=f"{key}.obj",
+        glb=f"{key}.glb",
+        box3d_object=box,
+        size=box_size(box),
+        real_size=None,
+        parts=mesh.parts,
+        triangles=len(mesh.triangles),
+        digest=digest.hexdigest(),
+        keypoints=Keypoints(points=points) if points else None,
+    )
+    return ForeignModel(info, (), partial(_write, mesh, key))
+
+
+def _write(mesh: Mesh, key: str, folder: Path) -> None:
+    """The files of a model."""
+    export_obj(mesh, folder, key)
+    export_glb(mesh, folder / f"{key}.glb")
+
+
+def _mesh(vertices: Any, faces: Any) -> Mesh:
+    """Vertices (V, 3) and faces (T, 3), which count from 1."""
+    if not (_is_table(vertices) and _is_table(faces) and len(vertices) and len(faces)):
+        raise ValueError("expected vertices and faces of three columns; found others")
+    if not (np.abs(vertices) < FARTHEST).all():
+        raise ValueError(f"expected finite vertices below {FARTHEST:,.0f}; found others")
+    if not ((faces == np.floor(faces)) & (faces >= 1) & (faces <= len(vertices))).all():
+        raise ValueError(f"expected faces of vertices 1 to {len(vertices)}; found others")
+    places, triangles = vertices.astype(np.float32), faces.astype(np.int32) - np.int32(1)
+    if not np.ptp(places, axis=0).any():
+        raise ValueError("expected vertices that are apart; found all at one place")
+    nothing = np.zeros(len(triangles), np.int32)
+    return Mesh(places, triangles, _normals(places, triangles), nothing, nothing.copy())
+
+
+def _is_table(array: Any) -> bool:
+    return isinstance(array, np.ndarray) and array.ndim == 2 and array.shape[1] == 3
+
+
+def _normals(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Of each vertex (V, 3): the mean of its triangles', by their areas; up where they have none."""
+    a, b, c = (vertices[triangles[:, i]].astype(np.float64) for i in range(3))
+    found, across = np.zeros((len(vertices), 3)), np.cross(b - a, c - a)
+    for corner in range(3):
+        np.add.at(found, triangles[:, corner], across)
+    length = np.linalg.norm(found, axis=1, keepdims=True)
+    return np.where(length > 0, found / np.where(length > 0, length, 1), (0.0, 0.0, 1.0)).astype(np.float32)
+
+
+def _points(said: Mapping[str, Any]) -> Iterator[tuple[str, Place]]:
+    """The named points that a model has."""
+    for name, value in said.items():
+        if name not in OWN and isinstance(value, np.ndarray) and value.size == 3:
+            if not (np.abs(value) < FARTHEST).all():
+                raise ValueError(f"expected finite places of points; found others of {name:.60}")
+            x, y, z = value.ravel().astype(np.float64).tolist()
+            yield name, (x, y, z)

@@ -1,0 +1,269 @@
+"""A PASCAL3D+ data set made elsewhere: pictures by category, a record for each, masks, lists and CAD models."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.codecs.size import opened
+from viewsphere.errors import StoreError
+from viewsphere.formats._listed import MISTAKES, TRAIN, VAL, Listed, listed_dataset, lists, one_line, unposed
+from viewsphere.formats._placed import placed
+from viewsphere.formats._posed import picture_inside
+from viewsphere.formats._viewpoint_mat import KIT
+from viewsphere.formats.pascal3d.cads import read_cads
+from viewsphere.formats.pascal3d.records import Record, Seen, read_record
+from viewsphere.geometry.camera import orbit_rotation
+from viewsphere.geometry.mask import encode_rle, mask_box
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.geometry.rotation import product, rigid
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sample import ObjectAnnotation, ObjectView, Sample
+from viewsphere.store import Category
+from viewsphere.store.foreign import ForeignDataset, ForeignModel, foreign_object
+from viewsphere.store.paths import file_inside, is_name
+
+Float = NDArray[np.float64]
+
+SUFFIXES = (".jpg", ".JPEG", ".jpeg", ".JPG", ".png")
+PASCAL = "pascal"
+"""The source of pictures that have masks; that of others is imagenet."""
+
+STATES = {1: 0, 2: 1, 3: 1, 4: 2}
+"""Of keypoints by the status of anchors: visible, occluded, outside; of others nobody knows (3)."""
+
+NEAR = 3.0
+"""Pixels by which a mask may reach out of its object's box."""
+
+SAME = 1e-9
+FILES_KEPT = 64
+
+Of = Callable[[Path], Record]
+
+
+@dataclass(frozen=True)
+class _Shown(Listed):
+    """A picture, the categories in whose folders it lies, and its map of objects, None where it has none."""
+
+    kinds: tuple[str, ...] = ()
+    masks: Path | None = None
+
+
+def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+    """All pictures of a folder with `Annotations` and `Images`: what viewsphere.formats.pascal3d says.
+
+    Raises StoreError with every mistake: records, pictures and CAD models that are missing, broken or outside, and broken
+    objects; with `keep_going` these are left out and reported.
+    """
+    if not (path / "Annotations").is_dir() or not (path / "Images").is_dir():
+        raise StoreError(f"{path}: expected a PASCAL3D+ data set (Annotations, Images, CAD); found no such folders")
+    problems, record_of = list[str](), lru_cache(FILES_KEPT)(read_record)
+    pictures = tuple(_pictures(path, record_of, problems))
+    kinds, shown, most = dict.fromkeys(_named(path)), set[str](), 1
+    for picture in pictures:
+        for file in filter(None, picture.said[: len(picture.kinds)]):
+            problems += record_of(file).problems
+        found = _objects(picture, record_of)
+        shown |= {o.kind for o in found}
+        most = max([most, len(found), *(o.id or 0 for o in found)])
+    names = (*kinds, *sorted(shown - kinds.keys()))
+    categories = {name: Category(number, name, "") for number, name in enumerate(names, 1)}
+    cads = read_cads(path, {name: one for name, one in categories.items() if is_name(name)}, problems)
+    problems += (
+        f"{picture.name}: object {o.place}: expected cad_index 1 to {len(cads[o.kind])}; found {o.cad}"
+        for picture in pictures
+        for o in _objects(picture, record_of)
+        if o.kind in cads and o.cad > len(cads[o.kind])
+    )
+    models = [model for found in cads.values() for model in found]
+    sample_of = partial(_sample, categories, cads, record_of)
+    also = "\n".join(model.info.digest for model in models)
+    return listed_dataset(path, pictures, categories.values(), most, sample_of, problems, keep_going, models, also)
+
+
+def _named(root: Path) -> Iterator[str]:
+    """The categories of a classes.txt, in the order of their numbers; none without one."""
+    file = root / KIT / "classes.txt"
+    if file.is_file():
+        try:
+            rows = [row.split() for row in file_inside(root, f"{KIT}/classes.txt").read_text("utf-8").splitlines()]
+            yield from (name for _, name in sorted((int(number), name) for number, name in rows))
+        except MISTAKES as error:
+            raise StoreError(f"{file}: expected a number and a name a line; found: {one_line(error)}") from None
+
+
+def _pictures(root: Path, record_of: Of, problems: list[str]) -> Iterator[_Shown]:
+    """The pictures of all folders, each once."""
+    folders: defaultdict[tuple[str, str], list[Path]] = defaultdict(list)
+    for file in sorted((root / "Annotations").glob("*/*.mat")):
+        kind, _, source = file.parent.name.rpartition("_")
+        if kind and source:
+            folders[source, file.stem].append(file)
+    splits = _splits(root, {file.parent.name.rpartition("_")[0] for files in folders.values() for file in files}, problems)
+    for (source, name), files in sorted(folders.items()):
+        try:
+            yield _picture(root, splits, source, name, files, record_of)
+        except MISTAKES as error:
+            problems.append(f"{files[0]}: {one_line(error)}")
+
+
+def _picture(
+    root: Path, splits: Mapping[tuple[str, str], str], source: str, name: str, files: Sequence[Path], record_of: Of
+) -> _Shown:
+    """A picture of which all that is said can be read."""
+    kinds = tuple(file.parent.name.rpartition("_")[0] for file in files)
+    inside = tuple(file_inside(root, file.relative_to(root).as_posix()) for file in files)
+    places = [f"Images/{kind}_{source}/{name}" for kind in kinds]
+    there = next((place for place in places if any((root / f"{place}{end}").is_file() for end in SUFFIXES)), places[0])
+    file, size = picture_inside(root, there, *SUFFIXES)
+    for one in inside:
+        record_of(one)
+    masks = file_inside(root, f"{KIT}/SegmentationObject/{name}.png")
+    has_masks = source == PASCAL and masks.is_file()
+    if has_masks:
+        with opened(masks) as found:
+            if found.size != size or found.mode not in ("P", "L"):
+                raise StoreError(f"expected objects' numbers in {masks.name}, of the picture's size; found other pixels")
+    split = next((splits[kind, name] for kind in (*kinds, "") if (kind, name) in splits), TRAIN)
+    own = masks if has_masks else None
+    return _Shown(split, file.relative_to(root / "Images").as_posix(), file, size, (*inside, own), kinds, own)
+
+
+def _splits(root: Path, kinds: set[str], problems: list[str]) -> dict[tuple[str, str], str]:
+    """The split of a picture by its name and a category, or "" for lists of all categories."""
+    found: dict[tuple[str, str], str] = {}
+    for folder in (f"{KIT}/ImageSets/Main", "Image_sets"):
+        named = list(lists(root, folder, problems))
+        stems = {stem for stem, _, _ in named}
+        for stem, _, rows in named:
+            kind = max((kind for kind in kinds if stem.startswith(f"{kind}_")), key=len, default="")
+            split = stem.removeprefix(f"{kind}_").removeprefix("imagenet_") if kind else stem
+            if split == "trainval" and {stem.removesuffix(split) + own for own in (TRAIN, VAL)} <= stems:
+                continue
+            if is_name(split) and (kind or split in (TRAIN, VAL, "test", "trainval")):
+                found |= {key: split for row in rows if (key := (kind, row.split()[0])) not in found}
+    return found
+
+
+def _objects(picture: _Shown, record_of: Of) -> list[Seen]:
+    """The objects of a picture, each of the record in the folder of its category, else of the first one; their ids are those
+    that all have, else they count from 1.
+    """
+    found: list[Seen] = []
+    for number, (kind, file) in enumerate(zip(picture.kinds, picture.said, strict=False)):
+        assert file is not None
+        others = set(picture.kinds) - {kind}
+        found += [o for o in record_of(file).objects if o.kind == kind or (number == 0 and o.kind not in others)]
+    ids = [o.id for o in found]
+    is_numbered = None not in ids and len(set(ids)) == len(ids)
+    found.sort(key=lambda o: (o.id or 0) if is_numbered else o.place)
+    return found if is_numbered else [replace(o, id=number) for number, o in enumerate(found, 1)]
+
+
+def _sample(
+    categories: Mapping[str, Category], cads: Mapping[str, Sequence[ForeignModel]], record_of: Of, picture: _Shown, index: int
+) -> Sample:
+    assert picture.said[0] is not None
+    seen, masks = _objects(picture, record_of), None
+    if picture.masks:
+        with opened(picture.masks) as found:
+            masks = np.array(found)
+    lens = _lens(record_of(picture.said[0]).lens, seen, picture.size)
+    objects = [_annotation(o, categories[o.kind], cads.get(o.kind, ()), picture, lens, masks) for o in seen]
+    sample = replace(unposed(picture, index, objects, {"file_name": picture.name}), asked=("keypoints",), instant=index)
+    camera = lens and Camera(lens, np.eye(3), np.zeros(3))
+    return sample if camera is None else replace(sample, known_camera=camera, image_size=None)
+
+
+def _lens(known: Float | None, seen: Sequence[Seen], size: tuple[int, int]) -> Intrinsics | None:
+    """The lens of a picture: its own, else that of its viewpoints' focal length, whose axis meets the only object's origin, or
+    the middle of the picture where there are several; None where there is no viewpoint, or focal lengths differ.
+    """
+    width, height = size
+    if known is not None:
+        k = known.tolist()
+        return Intrinsics(width=width, height=height, fx=k[0][0], fy=k[1][1], cx=k[0][2], cy=k[1][2], skew=k[0][1])
+    fine = [o.view for o in seen if o.is_fine]
+    lengths = [view["focal"] * view["viewport"] for view in fine]
+    if not fine or max(lengths) - min(lengths) > SAME * max(lengths):
+        return None
+    x, y = (fine[0]["px"] - 0.5, fine[0]["py"] - 0.5) if len(fine) == 1 else (width / 2, height / 2)
+    return Intrinsics(width=width, height=height, fx=lengths[0], fy=lengths[0], cx=x, cy=y)
+
+
+def _annotation(
+    o: Seen,
+    category: Category,
+    cads: Sequence[ForeignModel],
+    picture: Listed,
+    lens: Intrinsics | None,
+    masks: NDArray[Any] | None,
+) -> ObjectAnnotation:
+    """An object with its mask, model and pose, and as COCO would have it in `source`."""
+    x0, y0, x1, y1 = o.box
+    source: dict[str, Any] = {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": (x1 - x0) * (y1 - y0), **o.flags}
+    source |= {"cad_index": o.cad, "viewpoint": dict(o.view)} if o.cad or o.view else {}
+    source |= {"anchors": {name: status for name, (_, status) in o.anchors.items()}} if o.anchors else {}
+    counts = None if masks is None else _mask(masks == o.place, o)
+    info = cads[o.cad - 1].info if 0 < o.cad <= len(cads) else None
+    known: dict[str, Any] = {"key": info.key if info else "", **_standing(o, info and info.box3d_object, lens)}
+    assert o.id is not None
+    return foreign_object(o.id, category, picture.size, source, counts, o.box, box2d=o.box, more=_keypoints(o), **known)
+
+
+def _mask(mask: NDArray[np.bool_], o: Seen) -> str | None:
+    """The run-length code of a mask; None for one of nothing, or that is another object's by its box."""
+    found = mask_box(mask)
+    if found is None or any(found[i] < o.box[i] - NEAR or found[i + 2] > o.box[i + 2] + NEAR for i in (0, 1)):
+        return None
+    return encode_rle(mask)
+
+
+def _keypoints(o: Seen) -> dict[str, Any]:
+    places = [(math.nan, math.nan) if place is None else (place[0] - 0.5, place[1] - 0.5) for place, _ in o.anchors.values()]
+    return {
+        "keypoint_names": tuple(o.anchors),
+        "keypoints": np.array(places, np.float64).reshape(-1, 2),
+        "keypoint_states": np.array([STATES.get(status, 3) for _, status in o.anchors.values()], np.int64),
+    }
+
+
+def _standing(o: Seen, box: Float | None, lens: Intrinsics | None) -> dict[str, Any]:
+    """What is known of where an object is: its pose, or only a coarse view, or nothing."""
+    motion = o.motion if o.motion is not None else _motion(o.view, lens) if o.is_fine and lens is not None else None
+    if motion is not None:
+        pose = rigid(motion[:, :3], motion[:, 3])
+        return placed(np.full((8, 3), np.nan) if box is None else box, pose, np.eye(4), lens)
+    names = ("azimuth", "elevation") if o.is_fine else ("azimuth_coarse", "elevation_coarse")
+    azimuth, elevation = (o.view.get(name, math.nan) for name in names)
+    if math.isnan(azimuth + elevation):
+        return {}
+    distance, tilt = (o.view["distance"], o.view["theta"]) if o.is_fine else (math.nan, math.nan)
+    view = ObjectView(azimuth % 360, elevation, distance, tilt)
+    return {"view": view, "pose_category": pose_category(view.azimuth_deg, elevation)}
+
+
+def _motion(view: Mapping[str, float], lens: Intrinsics) -> Float:
+    """RT (3, 4) of a viewpoint: the camera that looks at the model from there, turned the shortest way so that px, py is where
+    the model's origin is seen.
+    """
+    angles = (math.radians(view[name]) for name in ("azimuth", "elevation", "theta"))
+    y = (view["py"] - 0.5 - lens.cy) / lens.fy
+    ray = np.array([(view["px"] - 0.5 - lens.cx - lens.skew * y) / lens.fx, y, 1.0])
+    ray /= math.sqrt(float((ray * ray).sum()))
+    return np.column_stack([product(_shortest(ray), orbit_rotation(*angles)), ray * view["distance"]])
+
+
+def _shortest(ray: Float) -> Float:
+    """The rotation (3, 3) that takes +z to a unit vector ahead by the shortest way."""
+    x, y, z = ray.tolist()
+    k = 1 / (1 + z)
+    return np.array([[1 - k * x * x, -k * x * y, x], [-k * x * y, 1 - k * y * y, y], [-x, -y, z]])

@@ -1,0 +1,177 @@
+"""Records of PASCAL3D+'s annotations, as others may have written them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.codecs.mat import Struct, read_mat
+from viewsphere.formats._listed import check_bytes
+from viewsphere.geometry.rotation import quaternion_from_matrix
+from viewsphere.limits import limits
+from viewsphere.model.sample import Box
+
+Float = NDArray[np.float64]
+
+FARTHEST = 1e6
+"""Pixels, degrees or lengths beyond which no number of an annotation is."""
+
+MOST_ID = 10**6
+FLAGS = ("truncated", "occluded", "difficult")
+VIEW = ("azimuth", "elevation", "theta", "distance", "focal", "viewport", "px", "py")
+COARSE = ("azimuth_coarse", "elevation_coarse")
+
+
+@dataclass(frozen=True)
+class Seen:
+    """An object of a record: its place there from 1 on; its half-open box; the number from 1 on of its CAD model, 0 if it has
+    none; what is said of its viewpoint, as far as it has one; flags; anchors, each with its place, None where it has none, and
+    its status; and, of viewsphere's own, its id and RT (3, 4), None elsewhere.
+    """
+
+    place: int
+    kind: str
+    box: Box
+    cad: int
+    view: Mapping[str, float]
+    flags: Mapping[str, int]
+    anchors: Mapping[str, tuple[tuple[float, float] | None, int]]
+    id: int | None
+    motion: Float | None
+
+    @property
+    def is_fine(self) -> bool:
+        """Whether its viewpoint is more than a coarse one."""
+        return self.view.get("distance", 0.0) > 0
+
+
+@dataclass(frozen=True)
+class Record:
+    """A picture's objects, the problems of others, and, of viewsphere's own, K (3, 3) of pixels from the picture's corner."""
+
+    objects: Sequence[Seen]
+    problems: Sequence[str]
+    lens: Float | None
+
+
+def variables(file: Path) -> dict[str, Any]:
+    """The variables of a file; raises ValueError for what is no MATLAB file, StoreError for one that is too large."""
+    check_bytes(file, file.stat().st_size)
+    return read_mat(file.read_bytes(), limits.MAX_ANNOTATION_BYTES)
+
+
+def structs_of(value: Any, what: str) -> Struct:
+    """A struct array; raises ValueError for anything else."""
+    if isinstance(value, np.ndarray) and not value.size:
+        return []
+    rows = cast(list[Any], value) if isinstance(value, list) else [None]
+    if not all(isinstance(row, dict) for row in rows):
+        raise ValueError(f"expected {what}; found another")
+    return cast(Struct, rows)
+
+
+def read_record(file: Path) -> Record:
+    """A picture's record; raises ValueError where there is none, or where it has too many objects."""
+    rows = structs_of(variables(file).get("record"), "a struct `record`")
+    if len(rows) != 1:
+        raise ValueError(f"expected one struct `record`; found {len(rows)}")
+    said = structs_of(rows[0].get("objects", np.zeros(0)), "a struct array `record.objects`")
+    if len(said) > limits.MAX_IMPORTED_OBJECTS:
+        told = f"{limits.MAX_IMPORTED_OBJECTS:,} objects (limit MAX_IMPORTED_OBJECTS)"
+        raise ValueError(f"expected at most {told}; found {len(said):,}")
+    objects, problems = list[Seen](), list[str]()
+    for place, one in enumerate(said, 1):
+        try:
+            objects.append(_seen(place, one))
+        except ValueError as error:
+            problems.append(f"{file}: object {place}: {error}")
+    return Record(objects, problems, _lens(rows[0]["K"]) if "K" in rows[0] else None)
+
+
+def _seen(place: int, said: Mapping[str, Any]) -> Seen:
+    kind = said.get("class")
+    if not isinstance(kind, str) or not kind or not kind.isprintable():
+        raise ValueError(f"expected a class; found {kind!r:.60}")
+    x0, y0, x1, y1 = _numbers(said.get("bbox"), "bbox", 4).tolist()
+    if not (x0 <= x1 and y0 <= y1):
+        raise ValueError(f"expected bbox x1 y1 x2 y2; found {x0:g} {y0:g} {x1:g} {y1:g}")
+    cad, own = _whole(said, "cad_index", MOST_ID), _whole(said, "id", MOST_ID)
+    flags = {name: value for name in FLAGS if (value := _whole(said, name, 1)) is not None}
+    motion = said.get("RT")
+    return Seen(
+        place=place,
+        kind=kind,
+        box=(x0 - 1, y0 - 1, x1, y1),
+        cad=cad or 0,
+        view=_view(said.get("viewpoint")),
+        flags=flags,
+        anchors=_anchors(said.get("anchors")),
+        id=own or None,
+        motion=None if _is_nothing(motion) else _motion(motion),
+    )
+
+
+def _is_nothing(value: Any) -> bool:
+    """Whether a field is missing or []."""
+    return value is None or (isinstance(value, np.ndarray) and not value.size)
+
+
+def _numbers(value: Any, name: str, count: int) -> Float:
+    if not isinstance(value, np.ndarray) or value.size != count or not (np.abs(value.astype(np.float64)) < FARTHEST).all():
+        raise ValueError(f"expected {name}, {'a number' if count == 1 else f'{count} numbers'} below {FARTHEST:,.0f}")
+    return value.astype(np.float64).ravel(order="F")
+
+
+def _whole(said: Mapping[str, Any], name: str, most: int) -> int | None:
+    """A whole number from 0 on, None where it is missing."""
+    if _is_nothing(said.get(name)):
+        return None
+    number = float(_numbers(said[name], name, 1)[0])
+    if not (0 <= number <= most and number == int(number)):
+        raise ValueError(f"expected {name} 0 to {most:,}; found {number:g}")
+    return int(number)
+
+
+def _view(value: Any) -> dict[str, float]:
+    """What is said of a viewpoint: nothing where there is none."""
+    rows = structs_of(np.zeros(0) if value is None else value, "a struct `viewpoint`")
+    if not rows:
+        return {}
+    said = {name: float(_numbers(rows[0][name], name, 1)[0]) for name in (*VIEW, *COARSE) if not _is_nothing(rows[0].get(name))}
+    if said.get("distance", 0.0) > 0:
+        lacking = next((name for name in VIEW if name not in said), None)
+        if lacking or said["focal"] * said["viewport"] <= 0:
+            raise ValueError(f"expected a viewpoint with {', '.join(VIEW)}; found no {lacking or 'focal length'}")
+    return said
+
+
+def _anchors(value: Any) -> dict[str, tuple[tuple[float, float] | None, int]]:
+    rows = structs_of(np.zeros(0) if value is None else value, "a struct `anchors`")
+    found: dict[str, tuple[tuple[float, float] | None, int]] = {}
+    for name, one in rows[0].items() if rows else ():
+        said = structs_of(one, f"a struct `anchors.{name:.60}`")
+        for anchor in said[:1]:
+            place = anchor.get("location")
+            x_y = None if _is_nothing(place) else tuple(_numbers(place, f"location of {name:.60}", 2).tolist())
+            found[name] = cast("tuple[float, float] | None", x_y), _whole(anchor, "status", 9) or 0
+    return found
+
+
+def _lens(value: Any) -> Float:
+    """K whose origin is the picture's corner, of one whose first pixel's centre is (1, 1)."""
+    k = _numbers(value, "record.K", 9).reshape(3, 3, order="F").copy()
+    if not (k[0, 0] > 0 and k[1, 1] > 0 and k[1, 0] == 0 and (k[2] == (0, 0, 1)).all()):
+        raise ValueError("expected record.K of a pinhole; found another")
+    k[:2, 2] -= 0.5
+    return k
+
+
+def _motion(value: Any) -> Float:
+    found = _numbers(value, "RT", 12).reshape(3, 4, order="F")
+    quaternion_from_matrix(found[:, :3])
+    return found

@@ -1,0 +1,69 @@
+"""Data sets of other tools in other formats, with no data set of ours left behind."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from viewsphere.aside import aside
+from viewsphere.errors import UserError
+from viewsphere.recipe.formats import Formats, read_formats
+from viewsphere.run.exporting import linked, writable, write
+from viewsphere.run.importing import put_in_store, read_dataset
+from viewsphere.run.progress import Listener, unheard
+from viewsphere.run.scope import refuse, scope_of_foreign
+from viewsphere.store import Dataset, located, new_folder
+
+
+@dataclass(frozen=True)
+class Converted:
+    """How many frames were written; what `keep_going` left out of them; and notes of the formats."""
+
+    frames: int
+    left_out: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def convert(
+    kind: str,
+    source: Path | str,
+    formats: Formats,
+    out: Path | str,
+    *,
+    keep_going: bool = False,
+    workers: int = 0,
+    listener: Listener | None = None,
+) -> Converted:
+    """Write a data set of another tool, of the format `kind`, in these formats, each to OUT/<format>, as `export` does. The
+    files there are hard links to the source's or copies of them: it may go.
+
+    Nothing is written unless all of it is. Raises UserError for formats that are not known or do not hold what was read,
+    StoreError for a data set that is broken, unless `keep_going` leaves that out, and for folders that hold other files.
+    """
+    entries = read_formats(formats)
+    for entry in entries:
+        writable(entry.name, "to")
+        entry.arguments()
+    if not entries:
+        raise UserError("to: expected a format; found none")
+    foreign = read_dataset(kind, source, keep_going=keep_going, field="from")
+    refuse(entries, scope_of_foreign(foreign), source)
+    with ExitStack() as whole:
+        folders = [(entry, whole.enter_context(new_folder(located(out) / entry.name))) for entry in entries]
+        store = whole.enter_context(aside(folders[0][1].parent)) / "store"  # on the same disk, for links
+        with _told_of(store, source):
+            put_in_store(foreign, store, listener)
+            dataset = Dataset(store)
+            notes = write(dataset, folders, listener or unheard, workers)
+        return Converted(len(dataset), foreign.left_out, tuple(dict.fromkeys(notes)) + tuple(linked(dataset, out)))
+
+
+@contextmanager
+def _told_of(store: Path, source: Path | str) -> Generator[None]:
+    """Tell the user's mistakes of the source, and not of a store that nobody sees."""
+    try:
+        yield
+    except UserError as error:
+        raise type(error)(str(error).replace(str(store), str(source))) from None
