@@ -71,6 +71,7 @@ class Limits:
     MAX_RECIPE_BYTES = Limit(10_000_000, "bytes of a recipe, and of each that it extends")
     MAX_POSES_BYTES = Limit(1 << 30, "bytes of a file of poses")
     MAX_LISTED_OBJECTS = Limit(10_000, "objects of a shot in a file of shots")
+    MAX_MAT_BYTES = Limit(100_000_000, "bytes of a MATLAB file that is read")
     MAX_RIG_BYTES = Limit(1_000_000, "bytes of a rig's calibration")
     MAX_STORED_PIXELS = Limit(1 << 28, "pixels of a picture or map of a data set, also of an imported one")
     MAX_VOXELS = Limit(100_000_000, "cells of the grid of a label voxels; 1 GB while it is computed")

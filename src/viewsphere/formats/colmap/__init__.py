@@ -36,6 +36,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats._cameras import Moment, Rigs, unskewed, world_of
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.colmap.again import again as again
 from viewsphere.formats.colmap.points import Sights
 from viewsphere.formats.colmap.reading import read as read
 from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of

@@ -49,6 +49,7 @@ from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import most_categories, most_objects
 from viewsphere.formats._tree import File, Piece, Tree, functions, line
 from viewsphere.formats._viewpoint_mat import Cads, Options, no_viewpoints, scipy_io
+from viewsphere.formats.pascal3d.again import again as again
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
