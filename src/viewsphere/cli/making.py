@@ -74,6 +74,7 @@ def new(
 def _new_again(format_: str, source: Path, folder: Path | None) -> None:
     from viewsphere.run.again import make_again
 
+    _announce_compilation()
     made = make_again(format_, source, folder or Path(f"{source.resolve().stem}-again"))
     for note in made.notes:
         typer.echo(f"note: {note}", err=True)

@@ -13,7 +13,8 @@ from pydantic import ValidationError
 from viewsphere.errors import StoreError
 from viewsphere.formats._again import pose_of
 from viewsphere.formats.bop.entries import MM
-from viewsphere.formats.bop.reading import Frame, categories, load, object_pose, scene_frames
+from viewsphere.formats.bop.pixels import fit, from_corner
+from viewsphere.formats.bop.reading import MISTAKES, Frame, categories, load, object_pose, scene_frames
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.model.mistakes import first_of
@@ -24,11 +25,18 @@ from viewsphere.store.paths import file_inside
 FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
 """Where data sets have their models; the first that is there counts."""
 
+CORNER = (
+    "this data set's masks count pixels from the first one's corner, as the renderers of bop_toolkit and BlenderProc do ({:.2%} of "
+    "them differ; from its centre {:.2%}), and so do the lenses here; pictures and depth of such data sets may count from the "
+    "centre: to fit these, add 0.5 to all cx and cy"
+)
+
 
 def again(path: Path) -> Again:
     """All pictures of a data set of scenes, or of one of its splits, and all of its models with their symmetries.
 
-    The world is that of cam_R_w2c; without it that of each camera, where up is up in the picture. Raises StoreError for
+    Pixels count from the first one's centre, as BOP says, unless masks fit the models clearly better from its corner. The world
+    is that of cam_R_w2c; without it that of each camera, where up is up in the picture. Raises StoreError for
     pictures that lack their file, their lens or the pose of an object, and for objects without a model.
     """
     root, files = path, sorted(path.glob("*/*/scene_camera.json"))
@@ -42,10 +50,16 @@ def again(path: Path) -> Again:
     if not frames:
         raise StoreError(f"{path}: expected images; found none")
     models, notes = _models(root, frames)
+    try:
+        masks = fit(frames, models)
+    except MISTAKES as error:
+        raise StoreError(f"{path}: expected masks, and models that can be read; found: {' '.join(str(error).split())}") from None
+    if masks.is_corner:
+        notes.append(CORNER.format(masks.of_corner / masks.pixels, masks.of_centre / masks.pixels))
     has_world = any(not np.array_equal(rigid(one.camera.R, one.camera.t), np.eye(4)) for one in frames)
     return Again(
         name=root.resolve().name,
-        shots=tuple(_shot(root, frame) for frame in frames),
+        shots=tuple(_shot(root, frame, masks.is_corner) for frame in frames),
         models=models,
         formats=("bop",),
         annotations=("amodal",),
@@ -54,7 +68,8 @@ def again(path: Path) -> Again:
     )
 
 
-def _shot(root: Path, frame: Frame) -> ListedShot:
+def _shot(root: Path, frame: Frame, is_corner: bool) -> ListedShot:
+    lens = frame.camera.intrinsics
     world_from_camera = rigid(frame.camera.R.T, frame.camera.center)
     poses = ((str(one["obj_id"]), compose(world_from_camera, object_pose(one))) for one in frame.gt)
     return ListedShot(
@@ -62,7 +77,7 @@ def _shot(root: Path, frame: Frame) -> ListedShot:
         split=frame.split,
         image=frame.rgb.relative_to(root).as_posix(),
         world_from_camera=pose_of(world_from_camera),
-        camera=frame.camera.intrinsics,
+        camera=from_corner(lens) if is_corner else lens,
         objects=tuple(ListedObject(model=number, world_from_object=pose_of(pose)) for number, pose in poses),
     )
 
