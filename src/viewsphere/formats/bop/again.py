@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from viewsphere.errors import StoreError
 from viewsphere.formats._again import pose_of
 from viewsphere.formats.bop.entries import MM
-from viewsphere.formats.bop.pixels import fit, from_corner
+from viewsphere.formats.bop.pixels import Shift, fit, shifted
 from viewsphere.formats.bop.reading import MISTAKES, Frame, categories, load, object_pose, scene_frames
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.listed import ListedObject, ListedShot
@@ -25,17 +25,17 @@ from viewsphere.store.paths import file_inside
 FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
 """Where data sets have their models; the first that is there counts."""
 
-CORNER = (
-    "this data set's masks count pixels from the first one's corner, as the renderers of bop_toolkit and BlenderProc do ({:.2%} of "
-    "them differ; from its centre {:.2%}), and so do the lenses here; pictures and depth of such data sets may count from the "
-    "centre: to fit these, add 0.5 to all cx and cy"
+SHIFTED = (
+    "{differs:.2%} of the pixels of this data set's masks differ from its models' with cx {x:+g} and cy {y:+g}, as the lenses here have "
+    "it, {differed:.2%} without: renderers that make masks count pixels from elsewhere than pictures and depth, which the lens "
+    "without this fits"
 )
 
 
 def again(path: Path) -> Again:
     """All pictures of a data set of scenes, or of one of its splits, and all of its models with their symmetries.
 
-    Pixels count from the first one's centre, as BOP says, unless masks fit the models clearly better from its corner. The world
+    Pixels count from the first one's centre, as BOP says, unless masks fit the models clearly better from elsewhere. The world
     is that of cam_R_w2c; without it that of each camera, where up is up in the picture. Raises StoreError for
     pictures that lack their file, their lens or the pose of an object, and for objects without a model.
     """
@@ -54,12 +54,13 @@ def again(path: Path) -> Again:
         masks = fit(frames, models)
     except MISTAKES as error:
         raise StoreError(f"{path}: expected masks, and models that can be read; found: {' '.join(str(error).split())}") from None
-    if masks.is_corner:
-        notes.append(CORNER.format(masks.of_corner / masks.pixels, masks.of_centre / masks.pixels))
+    x, y = masks.shift
+    if x or y:
+        notes.append(SHIFTED.format(differs=masks.differs, differed=masks.differed, x=x, y=y))
     has_world = any(not np.array_equal(rigid(one.camera.R, one.camera.t), np.eye(4)) for one in frames)
     return Again(
         name=root.resolve().name,
-        shots=tuple(_shot(root, frame, masks.is_corner) for frame in frames),
+        shots=tuple(_shot(root, frame, masks.shift) for frame in frames),
         models=models,
         formats=("bop",),
         annotations=("amodal",),
@@ -68,8 +69,7 @@ def again(path: Path) -> Again:
     )
 
 
-def _shot(root: Path, frame: Frame, is_corner: bool) -> ListedShot:
-    lens = frame.camera.intrinsics
+def _shot(root: Path, frame: Frame, shift: Shift) -> ListedShot:
     world_from_camera = rigid(frame.camera.R.T, frame.camera.center)
     poses = ((str(one["obj_id"]), compose(world_from_camera, object_pose(one))) for one in frame.gt)
     return ListedShot(
@@ -77,7 +77,7 @@ def _shot(root: Path, frame: Frame, is_corner: bool) -> ListedShot:
         split=frame.split,
         image=frame.rgb.relative_to(root).as_posix(),
         world_from_camera=pose_of(world_from_camera),
-        camera=from_corner(lens) if is_corner else lens,
+        camera=shifted(frame.camera.intrinsics, shift),
         objects=tuple(ListedObject(model=number, world_from_object=pose_of(pose)) for number, pose in poses),
     )
 

@@ -1,14 +1,16 @@
 """Where a data set of BOP's counts pixels from, as its masks tell.
 
-BOP's documentation and back-projection have the centre of the first pixel at (0, 0), as pictures and depth have it. The renderers of
-bop_toolkit (vispy) and of BlenderProc's writer (pyrender), which make masks and scene_gt_info, have its corner there: masks that they
-make lie half a pixel beside the pictures.
+BOP's documentation and back-projection have the centre of the first pixel at (0, 0), as pictures and depth have it. What makes masks and
+scene_gt_info need not: bop_toolkit's renderer has the corner of the first pixel there; and pyrender, by which BlenderProc's writer
+makes them, takes the first sample of several in a pixel, wherever the graphics card has that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -30,43 +32,57 @@ MOST = 12
 """Masks that are compared, evenly over all."""
 
 CLEARLY = 0.5
-"""A count from the corner is believed where it leaves less than this share of the pixels that differ."""
+"""A shift is believed where it leaves less than this share of the pixels that differ."""
 
 LEAST = 100
 """Pixels of a mask that is compared."""
 
+STARTS = ((0.0, 0.0), (-0.5, -0.5))
+STEP = 0.125
+MOST_STEPS = 8
+"""Of a search from the better start on, in parts of a pixel, to whichever neighbour fits best."""
+
+Shift = tuple[float, float]
+
 
 @dataclass(frozen=True)
 class Fit:
-    """Pixels of masks, and how many of them differ from the models' as pixels count from the centre or the corner of the first."""
+    """How far masks lie beside what BOP says, right and down in pixels, and which share of their pixels differs from the models'
+    without this shift and with it.
+    """
 
-    pixels: int = 0
-    of_centre: int = 0
-    of_corner: int = 0
-
-    @property
-    def is_corner(self) -> bool:
-        """Whether the masks count from the corner."""
-        return self.of_corner < CLEARLY * self.of_centre
+    shift: Shift = (0.0, 0.0)
+    differed: float = 0.0
+    differs: float = 0.0
 
 
 def fit(frames: Sequence[Frame], models: Mapping[str, AgainModel]) -> Fit:
-    """How well whole masks fit the models in their poses; all 0 where there are none. Raises ModelError for models that cannot be
-    read, StoreError for masks that are none.
+    """The shift that whole masks have against the models in their poses; none where that is not clear, or where there are no
+    masks. Raises ModelError for models that cannot be read, StoreError for masks that are none.
     """
-    pixels = np.zeros(3, np.int64)
-    for frame, n in _chosen(frames):
-        mask = _mask(frame, n)
-        if np.count_nonzero(mask) >= LEAST:
-            lens, shown = frame.camera.intrinsics, models[str(frame.gt[n]["obj_id"])]
-            differ = [np.count_nonzero(mask ^ _silhouette(frame, n, shown, one)) for one in (lens, from_corner(lens))]
-            pixels += [np.count_nonzero(mask), *differ]
-    return Fit(*pixels.tolist())
+    masks = [(frame, n, mask) for frame, n in _chosen(frames) if np.count_nonzero(mask := _mask(frame, n)) >= LEAST]
+    if not masks:
+        return Fit()
+
+    @cache
+    def differ(shift: Shift) -> int:
+        return sum(np.count_nonzero(mask ^ _silhouette(frame, n, models, shift)) for frame, n, mask in masks)
+
+    best = min(STARTS, key=differ)
+    for _ in range(MOST_STEPS):
+        x, y = best
+        around = product((x - STEP, x, x + STEP), (y - STEP, y, y + STEP))
+        best, before = min((best, *around), key=differ), best
+        if best == before:
+            break
+    pixels = sum(np.count_nonzero(mask) for _, _, mask in masks)
+    found = best if differ(best) < CLEARLY * differ(STARTS[0]) else STARTS[0]
+    return Fit(found, differ(STARTS[0]) / pixels, differ(found) / pixels)
 
 
-def from_corner(lens: Intrinsics) -> Intrinsics:
-    """The lens of a K that was read as one of pixels' centres, if it counts from the first one's corner."""
-    return lens.model_copy(update={"cx": lens.cx - 0.5, "cy": lens.cy - 0.5})
+def shifted(lens: Intrinsics, shift: Shift) -> Intrinsics:
+    """The lens with its principal point moved."""
+    return lens.model_copy(update={"cx": lens.cx + shift[0], "cy": lens.cy + shift[1]})
 
 
 def _chosen(frames: Sequence[Frame]) -> Iterator[tuple[Frame, int]]:
@@ -87,7 +103,8 @@ def _mask(frame: Frame, n: int) -> NDArray[np.bool_]:
     return mask
 
 
-def _silhouette(frame: Frame, n: int, model: AgainModel, lens: Intrinsics) -> NDArray[np.bool_]:
+def _silhouette(frame: Frame, n: int, models: Mapping[str, AgainModel], shift: Shift) -> NDArray[np.bool_]:
+    model = models[str(frame.gt[n]["obj_id"])]
     spec = ModelSpec(
         key="model",
         source=str(model.source),
@@ -100,4 +117,4 @@ def _silhouette(frame: Frame, n: int, model: AgainModel, lens: Intrinsics) -> ND
     )
     thing = Thing(id=1, model=spec, motion=Motion.still(pose_of(object_pose(frame.gt[n]))))
     geometry = build_geometry((thing,), (load_normalised(spec),), False, 0.01)
-    return rasterize(geometry, Camera(lens, np.eye(3), np.zeros(3))).triangle >= 0
+    return rasterize(geometry, Camera(shifted(frame.camera.intrinsics, shift), np.eye(3), np.zeros(3))).triangle >= 0
