@@ -52,7 +52,7 @@ def cameras_again(
     name, notes = path.resolve().stem, list[str]()
     if not meshes:
         return Again(name, shots, {}, (format_,), up=up)
-    mesh = AgainModel(meshes[0], "mesh", up=up, forward="-z" if up[1] == "y" else "-y")
+    mesh = AgainModel(meshes[0], "mesh")
     if len(meshes) > 1:
         notes.append(f"of {len(meshes)} meshes in the folder this is the first; the others: {', '.join(m.name for m in meshes[1:5])}")
     there = (ListedObject(model=MESH, world_from_object=IDENTITY, scenery=True),)

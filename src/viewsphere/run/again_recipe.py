@@ -77,7 +77,7 @@ def _entry(model: AgainModel, source: str, sidecar: str | None) -> dict[str, Any
     entry: dict[str, Any] = {"source": [source], "category": model.category or "object"}
     entry |= {"supercategory": model.supercategory} if model.supercategory else {}
     entry |= {"name": model.name} if model.name else {}
-    entry |= {"unit": {1.0: "m", 0.001: "mm"}.get(model.unit, model.unit), "up": model.up, "forward": model.forward}
+    entry |= {"unit": {1.0: "m", 0.001: "mm"}.get(model.unit, model.unit), "up": "+z", "forward": "-y"}
     return entry | {"centring": "as_is"} | ({"sidecar": sidecar} if sidecar else {})
 
 
@@ -94,11 +94,11 @@ def _joined(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _shots(found: Again, substitute: StandIn | None) -> list[ListedShot]:
-    """The shots with names that are free, and with splits as recipes have them; with what stands in, where sizes differ."""
+    """The shots with names that are free, and splits as recipes have them; with what stands in, where they have to be listed."""
     splits, names = dict[str, str](), set[str]()
     shots: list[ListedShot] = []
     there: tuple[ListedObject, ...] = ()
-    if substitute is not None and len({(s.camera.width, s.camera.height) for s in found.shots if s.camera}) > 1:
+    if substitute is not None and _are_listed(found):
         turn = world_turn(PoseList(kind="file", path=SHOTS, up=found.up), PoseFile(()))
         a, b, c = ((x, y, z, w) for x, y, z, w in rigid(turn.T, np.array(substitute.origin))[:3].tolist())
         there = (ListedObject(model=STAND_IN, world_from_object=(a, b, c, IDENTITY[3])),)
@@ -107,6 +107,12 @@ def _shots(found: Again, substitute: StandIn | None) -> list[ListedShot]:
         name = shot.name and _free(shot.name, names)
         shots.append(shot.model_copy(update={"name": name, "split": split, "objects": shot.objects or there}))
     return shots
+
+
+def _are_listed(found: Again) -> bool:
+    """Whether shots differ in what only listed ones may: their pictures' sizes, and the splits that they say."""
+    sizes = {(shot.camera.width, shot.camera.height) for shot in found.shots if shot.camera}
+    return len(sizes) > 1 or len({shot.split for shot in found.shots}) > 1
 
 
 def _split(name: str) -> str:

@@ -43,7 +43,7 @@ def stand_in(shots: Sequence[ListedShot]) -> StandIn:
         spread = float(np.linalg.norm(centers - centers.mean(axis=0), axis=1).max())
         origin = centers[0] + (2 * spread or 1.0) * axes[0]
     distances = np.linalg.norm(centers - origin, axis=1)
-    widths = [shot.camera.width / shot.camera.fx for shot in shots if shot.camera]
+    widths = [shot.camera.width / shot.camera.fx for shot in shots if shot.camera] or [1.0]
     length = min(FILLED * float(np.median(distances)) * float(np.median(widths)), float(distances.min()))
     x, y, z = (round(value, 6) for value in origin.tolist())
     return StandIn((x, y, z), max(SHORTEST, float(f"{length:.3g}")) if math.isfinite(length) else 1.0)

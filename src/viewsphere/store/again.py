@@ -23,7 +23,7 @@ class Drafted:
 
 @dataclass(frozen=True)
 class AgainModel:
-    """A model of the data set, whose axes, origin and unit are those of its file: `unit` metres are one unit.
+    """A model of the data set, whose axes and origin are those of its file, of which `unit` metres are one unit.
 
     `name` begins its key; `symmetries` are in the file's axes and unit.
     """
@@ -33,8 +33,6 @@ class AgainModel:
     supercategory: str = ""
     name: str | None = None
     unit: float = 1.0
-    up: Axis = "+z"
-    forward: Axis = "-y"
     symmetries: Symmetries | None = None
 
 

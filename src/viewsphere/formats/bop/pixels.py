@@ -110,8 +110,8 @@ def _silhouette(frame: Frame, n: int, models: Mapping[str, AgainModel], shift: S
         source=str(model.source),
         category="object",
         category_id=1,
-        up=model.up,
-        forward=model.forward,
+        up="+z",
+        forward="-y",
         unit=model.unit,
         centring="as_is",
     )
