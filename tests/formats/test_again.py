@@ -1,4 +1,4 @@
-"""Data sets of BOP and PASCAL3D+ are rendered again: the same poses, masks, depth and boxes; and trees that other code writes."""
+"""Data sets of BOP and PASCAL3D+ are rendered again: the same poses, masks, depth and boxes; others' trees, too."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from PIL import Image
 from scipy.io import loadmat, savemat
 from scipy.spatial.transform import Rotation
 from trimesh.ray.ray_pyembree import RayMeshIntersector
-
-from proven import close, equal, told
 from viewpoint_readers import project_3d
 from viewpoint_readers import read as read_mat
+
+from proven import close, equal, told
 from viewsphere import Dataset, generate
 from viewsphere.assets.traits import said_of
 from viewsphere.check import check
@@ -30,7 +30,11 @@ from viewsphere.sampling.plan import plan
 
 K = np.array([[110.0, 0, 46.3], [0, 108.0, 33.7], [0, 0, 1]])
 SIZE = (96, 72)
-SHAPES = (trimesh.creation.box((60, 90, 120)), trimesh.creation.cylinder(40, 120, sections=40), trimesh.creation.icosphere(radius=55))
+SHAPES = (
+    trimesh.creation.box((60, 90, 120)),
+    trimesh.creation.cylinder(40, 120, sections=40),
+    trimesh.creation.icosphere(radius=55),
+)
 
 
 def rendered_again(kind, source, place):
@@ -74,7 +78,14 @@ def test_bop_is_the_same_again(of_bop):
     for sample, line in zip(again, lines, strict=True):
         scene, name = (tree / line["image"]).parent.parent, Path(line["image"]).stem
         said = {of: json.loads((scene / f"scene_{of}.json").read_text())[str(int(name))] for of in ("gt", "gt_info", "camera")}
-        close("bop", "again: K", sample.camera.K - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]], np.reshape(said["camera"]["cam_K"], (3, 3)), "px", atol=1e-12)
+        close(
+            "bop",
+            "again: K",
+            sample.camera.K - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]],
+            np.reshape(said["camera"]["cam_K"], (3, 3)),
+            "px",
+            atol=1e-12,
+        )
         close("bop", "again: cameras", sample.camera.t, np.array(said["camera"]["cam_t_w2c"]) / 1000, "m", atol=1e-9)
         for o, gt in zip(sample.objects, said["gt"], strict=True):
             close("bop", "again: rotations", o.camera_from_object[:3, :3], np.reshape(gt["cam_R_m2c"], (3, 3)), atol=1e-9)
@@ -97,7 +108,13 @@ def test_bop_exports_alike_again(of_bop):
             for a, b in zip(one[str(sample.index)], other[name], strict=True):
                 assert a.keys() == b.keys()
                 for field in a.keys() - {"px_count_valid"}:  # the first tree's ground has depth, too
-                    close("bop", "again: BOP of BOP", a[field], b[field], atol=1e-2 if "px" in field else 1.1e-3 * 1000 * 1e-6 + 1e-9)
+                    close(
+                        "bop",
+                        "again: BOP of BOP",
+                        a[field],
+                        b[field],
+                        atol=1e-2 if "px" in field else 1.1e-3 * 1000 * 1e-6 + 1e-9,
+                    )
 
 
 def test_symmetries_of_models_info_are_the_models(tmp_path, tree):
@@ -126,7 +143,11 @@ def tree(tmp_path):
         for number, mesh in numbers.items():
             mesh.export(models / f"obj_{number:06d}.ply", encoding="ascii")
         halves = [np.diag([*signs, 1.0]).ravel().tolist() for signs in ((1, -1, -1), (-1, 1, -1), (-1, -1, 1))]
-        facts = {1: {"symmetries_discrete": halves}, 5: {"symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]}, 7: {}}
+        facts = {
+            1: {"symmetries_discrete": halves},
+            5: {"symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]},
+            7: {},
+        }
         (models / "models_info.json").write_text(json.dumps({str(n): {"diameter": 100, **more} for n, more in facts.items()}))
         rng, gt, info, cameras = np.random.default_rng(3), {}, {}, {}
         for number in (0, 3):
@@ -160,14 +181,21 @@ def seen(scene, number, gt, numbers, shift):
         points, which, _ = RayMeshIntersector(mesh).intersects_location(np.zeros_like(rays), rays, multiple_hits=False)
         depths[n, which] = points[:, 2]
     nearest = depths.min(axis=0)
-    cv2.imwrite(str(scene / f"depth/{number:06d}.png"), np.where(np.isfinite(nearest), nearest / 0.1, 0).reshape(u.shape).astype(np.uint16))
+    cv2.imwrite(
+        str(scene / f"depth/{number:06d}.png"),
+        np.where(np.isfinite(nearest), nearest / 0.1, 0).reshape(u.shape).astype(np.uint16),
+    )
     found = []
     for n, own in enumerate(depths):
         whole, visible = np.isfinite(own).reshape(u.shape), (np.isfinite(own) & (own <= nearest)).reshape(u.shape)
         cv2.imwrite(str(scene / f"mask/{number:06d}_{n:06d}.png"), 255 * whole.astype(np.uint8))
         cv2.imwrite(str(scene / f"mask_visib/{number:06d}_{n:06d}.png"), 255 * visible.astype(np.uint8))
         boxes = {name: box(mask) for name, mask in (("bbox_obj", whole), ("bbox_visib", visible))}
-        counts = {"px_count_all": int(whole.sum()), "px_count_visib": int(visible.sum()), "visib_fract": visible.sum() / whole.sum()}
+        counts = {
+            "px_count_all": int(whole.sum()),
+            "px_count_visib": int(visible.sum()),
+            "visib_fract": visible.sum() / whole.sum(),
+        }
         found.append({**counts, **boxes})
     return found
 
@@ -181,7 +209,10 @@ def save_plainly(scene, cameras, gt):
     plain = {n: {"cam_K": one["cam_K"].ravel().tolist(), "depth_scale": one["depth_scale"]} for n, one in cameras.items()}
     (scene / "scene_camera.json").write_text(json.dumps(plain))
     poses = {
-        n: [{**one, "cam_R_m2c": one["cam_R_m2c"].ravel().tolist(), "cam_t_m2c": one["cam_t_m2c"].ravel().tolist()} for one in found]
+        n: [
+            {**one, "cam_R_m2c": one["cam_R_m2c"].ravel().tolist(), "cam_t_m2c": one["cam_t_m2c"].ravel().tolist()}
+            for one in found
+        ]
         for n, found in gt.items()
     }
     (scene / "scene_gt.json").write_text(json.dumps(poses))
@@ -208,14 +239,22 @@ def test_trees_that_others_write_are_the_same_again(tree, tmp_path, shift, save)
     for sample, line in zip(again, lines, strict=True):
         name = Path(line["image"]).stem
         scene = folder / "train_pbr/000004"
-        lens = K + [[0, 0, 0.5 - shift], [0, 0, 0.5 - shift], [0, 0, 0]]
+        lens = [*K, [0, 0, 0.5 - shift], [0, 0, 0.5 - shift], [0, 0, 0]]
         close("bop", "again, other code: K", sample.camera.K, lens, "px", atol=0.13 if shift else 1e-12)
         for kind, (found, expected) in masks.items():
             found += [image(whole / f"{kind}/{sample.index:06d}_{n:06d}.png") > 0 for n in range(3)]
             expected += [image(scene / f"{kind}/{name}_{n:06d}.png") > 0 for n in range(3)]
         infos = (json.loads((place / "scene_gt_info.json").read_text()) for place in (whole, scene))
-        for own, other in zip(*(info[key] for info, key in zip(infos, (str(sample.index), str(int(name))), strict=True)), strict=True):
-            for field, atol in {"px_count_all": 8, "px_count_visib": 8, "visib_fract": 0.01, "bbox_obj": 1, "bbox_visib": 1}.items():
+        for own, other in zip(
+            *(info[key] for info, key in zip(infos, (str(sample.index), str(int(name))), strict=True)), strict=True
+        ):
+            for field, atol in {
+                "px_count_all": 8,
+                "px_count_visib": 8,
+                "visib_fract": 0.01,
+                "bbox_obj": 1,
+                "bbox_visib": 1,
+            }.items():
                 np.testing.assert_allclose(own[field], other[field], atol=atol)
         if not shift:
             depth, surface = image(scene / f"depth/{name}.png") / 1e4, np.isfinite(sample.depth)
@@ -250,7 +289,9 @@ def broken(tree, what):
         case "mesh":
             (tree / "models/obj_000005.ply").write_text("ply\nno mesh")
         case "number":
-            (scene / "scene_gt.json").write_text(json.dumps({"0": [{"obj_id": "../5", "cam_R_m2c": [1, 0, 0, 0, 1, 0, 0, 0, 1], "cam_t_m2c": [0, 0, 1]}]}))
+            (scene / "scene_gt.json").write_text(
+                json.dumps({"0": [{"obj_id": "../5", "cam_R_m2c": [1, 0, 0, 0, 1, 0, 0, 0, 1], "cam_t_m2c": [0, 0, 1]}]})
+            )
 
 
 BROKEN = {
@@ -315,17 +356,19 @@ def test_pascal3d_is_the_same_again(of_pascal):
     assert made.notes == ()
     pairs = dict(zip((line["name"] for line in lines), zip(again, lines, strict=True), strict=True))
     splits = {f"{sample.index:08d}": sample.split for sample in own}
-    for name, (sample, line) in pairs.items():
+    for name, (sample, _line) in pairs.items():
         assert sample.split == splits[name]
         place = next((tree / "Annotations").glob(f"*/{name}.mat"))
         record, objects = read_mat(place)
-        close("pascal3d", "again: K", sample.camera.K + [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]], record.K, "px", atol=1e-9)
+        close("pascal3d", "again: K", [*sample.camera.K, [0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]], record.K, "px", atol=1e-9)
         with Image.open(tree / f"PASCAL/VOCdevkit/VOC2012/SegmentationObject/{name}.png") as palette:
             numbers = np.asarray(palette)
-        for n, (o, expected) in enumerate(zip(sample.objects, objects, strict=True), 1):
+        for _n, (o, expected) in enumerate(zip(sample.objects, objects, strict=True), 1):
             close("pascal3d", "again: poses", o.camera_from_object[:3], expected.RT, "m", atol=1e-9)
             close("pascal3d", "again: boxes", [o.box2d[0] + 1, o.box2d[1] + 1, *o.box2d[2:]], expected.bbox, "px", atol=1)
-        same_masks("pascal3d", "again: masks", [o.mask for o in sample.objects], [numbers == n for n in range(1, len(objects) + 1)])
+        same_masks(
+            "pascal3d", "again: masks", [o.mask for o in sample.objects], [numbers == n for n in range(1, len(objects) + 1)]
+        )
 
 
 @pytest.fixture

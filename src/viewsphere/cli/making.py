@@ -55,7 +55,7 @@ def new(
         typer.Option(
             "--from",
             metavar="FORMAT PATH",
-            help="A data set to render again, with its models, poses and cameras: bop, pascal3d, colmap or nerfstudio, and where it is.",
+            help="A data set to render again, with its models, poses and cameras: bop, pascal3d, colmap or nerfstudio.",
             show_default=False,
         ),
     ] = None,

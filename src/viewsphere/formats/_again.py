@@ -54,7 +54,9 @@ def cameras_again(
         return Again(name, shots, {}, (format_,), up=up)
     mesh = AgainModel(meshes[0], "mesh")
     if len(meshes) > 1:
-        notes.append(f"of {len(meshes)} meshes in the folder this is the first; the others: {', '.join(m.name for m in meshes[1:5])}")
+        notes.append(
+            f"of {len(meshes)} meshes in the folder this is the first; the others: {', '.join(m.name for m in meshes[1:5])}"
+        )
     there = (ListedObject(model=MESH, world_from_object=IDENTITY, scenery=True),)
     shown = tuple(shot.model_copy(update={"objects": there}) for shot in shots)
     return Again(name, shown, {MESH: mesh}, (format_,), up=up, notes=tuple(notes))

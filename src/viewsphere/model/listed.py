@@ -60,7 +60,9 @@ class ListedShot(Brief):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=100), AfterValidator(_free)] | None = Field(
         default=None, description="its name, that of no other; by default shot-, and its place in the file from 000000 on"
     )
-    split: str | None = Field(default=None, min_length=1, max_length=100, description="its split; by default as the recipe says")
+    split: str | None = Field(
+        default=None, min_length=1, max_length=100, description="its split; by default as the recipe says"
+    )
     image: str | None = Field(default=None, max_length=1000, description="for readers: which picture it is made after")
     world_from_camera: Pose = Field(description="the camera's pose, 4 x 4, rows: x right, y down, z forward")
     camera: Annotated[Intrinsics, AfterValidator(_in_bounds)] | None = Field(

@@ -32,15 +32,15 @@ STAND_IN = "stand-in"
 
 COMMENTS = {
     "models": "the data set's own, where they lie, with their own axes, origin and unit",
-    "viewpoints": "shots.jsonl has a camera a line: world_from_camera, metres, and its lens; `up` is the axis of its world that becomes +Z",
+    "viewpoints": "a line of shots.jsonl each: world_from_camera, metres, and the lens; `up` is the axis there that becomes +Z",
     "scenes": "each shot shows the models that its line lists, where it has them",
     "camera": "size and lens, too, are those of each line",
     "scene": "as plain as possible: only geometry is the data set's; light and background are yours to choose",
     "splits": "each line says its own; these are their shares",
 }
 NONE_OF_ITS_OWN = (
-    "the data set has no mesh, so this is one of the zoo's, at the point nearest to all optical axes (`origin`, below), about half a "
-    "picture wide: put your own here"
+    "the data set has no mesh, so this is one of the zoo's, at the point nearest to all optical axes (`origin`, below), about "
+    "half a picture wide: put your own here"
 )
 
 
@@ -94,7 +94,7 @@ def _joined(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _shots(found: Again, substitute: StandIn | None) -> list[ListedShot]:
-    """The shots with names that are free, and splits as recipes have them; with what stands in, where they have to be listed."""
+    """The shots with free names, and splits as recipes have them; with what stands in, where they have to be listed."""
     splits, names = dict[str, str](), set[str]()
     shots: list[ListedShot] = []
     there: tuple[ListedObject, ...] = ()

@@ -174,8 +174,8 @@ def check_sizes(recipe: Recipe, views: Poses, sampler: object) -> None:
     sizes = {f"{lens.width} x {lens.height}" for i in range(len(views)) if (lens := views.lens(i))}
     if len(sizes) > 1:
         raise RecipeError(
-            f"camera.of_viewpoints: expected lenses of one size; found {', '.join(sorted(sizes)[:3])}: list what they show, with "
-            "scenes: {sampler: listed}"
+            f"camera.of_viewpoints: expected lenses of one size; found {', '.join(sorted(sizes)[:3])}: list what they show, "
+            "with scenes: {sampler: listed}"
         )
 
 

@@ -26,9 +26,9 @@ FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine
 """Where data sets have their models; the first that is there counts."""
 
 SHIFTED = (
-    "{differs:.2%} of the pixels of this data set's masks differ from its models' with cx {x:+g} and cy {y:+g}, as the lenses here have "
-    "it, {differed:.2%} without: renderers that make masks count pixels from elsewhere than pictures and depth, which the lens "
-    "without this fits"
+    "{differs:.2%} of the pixels of this data set's masks differ from its models' with cx {x:+g} and cy {y:+g}, as lenses here "
+    "have it, {differed:.2%} without: renderers that make masks count pixels from elsewhere than pictures and depth, which the "
+    "lens without this fits"
 )
 
 
@@ -53,7 +53,9 @@ def again(path: Path) -> Again:
     try:
         masks = fit(frames, models)
     except MISTAKES as error:
-        raise StoreError(f"{path}: expected masks, and models that can be read; found: {' '.join(str(error).split())}") from None
+        raise StoreError(
+            f"{path}: expected masks, and models that can be read; found: {' '.join(str(error).split())}"
+        ) from None
     x, y = masks.shift
     if x or y:
         notes.append(SHIFTED.format(differs=masks.differs, differed=masks.differed, x=x, y=y))
@@ -91,7 +93,9 @@ def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, AgainModel
         for one in frame.gt:
             if one["obj_id"] not in numbers:
                 name = f"{folder}/obj_{one['obj_id']:06d}.ply"
-                raise StoreError(f"{root}: expected {name}, a model of image {frame.image} of {frame.scene}; found no such file")
+                raise StoreError(
+                    f"{root}: expected {name}, a model of image {frame.image} of {frame.scene}; found no such file"
+                )
     known, found, notes = categories(root, list(numbers)), dict[str, AgainModel](), list[str]()
     info_file = file_inside(root, f"{folder}/models_info.json")
     said = load(info_file)
@@ -102,8 +106,9 @@ def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, AgainModel
             symmetries = None
         category, _ = known[number]
         file = file_inside(root, f"{folder}/obj_{number:06d}.ply")
-        more = {"supercategory": category.supercategory, "unit": 1 / MM, "symmetries": symmetries}
-        found[str(number)] = AgainModel(file, category.name, **more)
+        found[str(number)] = AgainModel(
+            file, category.name, supercategory=category.supercategory, unit=1 / MM, symmetries=symmetries
+        )
     return found, notes
 
 

@@ -1,8 +1,8 @@
 """Where a data set of BOP's counts pixels from, as its masks tell.
 
-BOP's documentation and back-projection have the centre of the first pixel at (0, 0), as pictures and depth have it. What makes masks and
-scene_gt_info need not: bop_toolkit's renderer has the corner of the first pixel there; and pyrender, by which BlenderProc's writer
-makes them, takes the first sample of several in a pixel, wherever the graphics card has that.
+BOP's documentation and back-projection have the centre of the first pixel at (0, 0), as pictures and depth have it. What makes
+masks and scene_gt_info need not: bop_toolkit's renderer has the corner of the first pixel there; and pyrender, by which
+BlenderProc's writer makes them, takes the first sample of several in a pixel, wherever the graphics card has that.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ Shift = tuple[float, float]
 
 @dataclass(frozen=True)
 class Fit:
-    """How far masks lie beside what BOP says, right and down in pixels, and which share of their pixels differs from the models'
+    """What is to be added to cx and cy for masks to fit, pixels, and which share of their pixels differs from the models'
     without this shift and with it.
     """
 
@@ -66,7 +66,7 @@ def fit(frames: Sequence[Frame], models: Mapping[str, AgainModel]) -> Fit:
 
     @cache
     def differ(shift: Shift) -> int:
-        return sum(np.count_nonzero(mask ^ _silhouette(frame, n, models, shift)) for frame, n, mask in masks)
+        return sum(int(np.count_nonzero(mask ^ _silhouette(frame, n, models, shift))) for frame, n, mask in masks)
 
     best = min(STARTS, key=differ)
     for _ in range(MOST_STEPS):
@@ -75,7 +75,7 @@ def fit(frames: Sequence[Frame], models: Mapping[str, AgainModel]) -> Fit:
         best, before = min((best, *around), key=differ), best
         if best == before:
             break
-    pixels = sum(np.count_nonzero(mask) for _, _, mask in masks)
+    pixels = sum(int(np.count_nonzero(mask)) for _, _, mask in masks)
     found = best if differ(best) < CLEARLY * differ(STARTS[0]) else STARTS[0]
     return Fit(found, differ(STARTS[0]) / pixels, differ(found) / pixels)
 

@@ -38,7 +38,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 
 def transforms_files(folder: Path) -> list[Path]:
-    """transforms.json of a folder, else a file a split, train first; the file itself, if it is none. Raises StoreError without."""
+    """transforms.json of a folder, else a file a split, train first; a file itself. Raises StoreError where there is none."""
     if folder.is_file():
         return [folder]
     whole = folder / "transforms.json"

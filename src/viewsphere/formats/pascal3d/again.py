@@ -39,9 +39,9 @@ class _Group:
 def again(path: Path) -> Again:
     """All pictures with objects whose viewpoint is known, in the folder of a release, and the CAD models that they show.
 
-    A picture is one shot where its objects have one lens, as where it says K, else one for each lens: the format's projection has the
-    principal point where it sees an object's origin. The world is that of a shot's first object. Raises StoreError for records
-    that are none, and for objects without a CAD model.
+    A picture is one shot where its objects have one lens, as where it says K, else one for each lens: the format's projection
+    has the principal point where it sees an object's origin. The world is that of a shot's first object. Raises StoreError for
+    records that are none, and for objects without a CAD model.
     """
     files = sorted(path.glob("Annotations/*/*.mat"))
     if not files:
@@ -60,7 +60,9 @@ def again(path: Path) -> Again:
             divided += len(groups) > 1
             named = f"{file.parent.name}/{record.filename or file.stem}"
             shots[source, file.stem] = [
-                _shot(models, group, f"{file.stem}-{i}" if len(groups) > 1 else file.stem, named, splits.get(file.stem, "train"))
+                _shot(
+                    models, group, f"{file.stem}-{i}" if len(groups) > 1 else file.stem, named, splits.get(file.stem, "train")
+                )
                 for i, group in enumerate(groups)
             ]
         except MISTAKES as error:
@@ -84,8 +86,8 @@ def _notes(others: int, divided: int) -> Iterator[str]:
         yield f"{others:,} objects have no exact viewpoint or no CAD model, and are left out"
     if divided:
         yield (
-            f"{divided:,} pictures show objects that have lenses of their own in the format's projection: each lens is a shot, so "
-            "that these do not hide one another"
+            f"{divided:,} pictures show objects that have lenses of their own in the format's projection: each lens is a shot, "
+            "so that these do not hide one another"
         )
 
 
@@ -148,7 +150,9 @@ class _Models:
         whole = file_inside(self.root, f"CAD/{category}.mat")
         cads: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]] = read_cads(whole, category) if whole.is_file() else ()
         if not 1 <= number <= len(cads):
-            raise StoreError(f"{self.root}: expected CAD/{category}/{number:02}.off, or it in CAD/{category}.mat; found neither")
+            raise StoreError(
+                f"{self.root}: expected CAD/{category}/{number:02}.off, or it in CAD/{category}.mat; found neither"
+            )
         return Drafted(f"{word}/{number:02}.off", off_bytes(*cads[number - 1]))
 
 
@@ -173,5 +177,3 @@ def _split_of(stem: str, categories: Iterable[str]) -> str:
         if category and stem.startswith(f"{category}_"):
             return stem.removeprefix(f"{category}_").removeprefix("imagenet_").removeprefix("pascal_")
     return stem
-
-

@@ -19,7 +19,17 @@ from viewsphere.geometry.rotation import quaternion_from_matrix, rigid, transfor
 from viewsphere.limits import limits
 from viewsphere.model.camera import Intrinsics
 
-MISTAKES = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, OSError, NotImplementedError, UserError, zlib.error)
+MISTAKES = (
+    LookupError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    ArithmeticError,
+    OSError,
+    NotImplementedError,
+    UserError,
+    zlib.error,
+)
 """Errors of MATLAB files that are broken, or of another structure."""
 
 Float = NDArray[np.float64]
@@ -96,7 +106,7 @@ def _true_lens(record: Any, size: list[int]) -> Intrinsics | None:
         return None
     k = np.array(record.K, np.float64).reshape(3, 3)
     lens = {"fx": k[0, 0], "fy": k[1, 1], "cx": k[0, 2] - 0.5, "cy": k[1, 2] - 0.5, "skew": k[0, 1]}
-    return Intrinsics(width=size[0], height=size[1], **{name: float(value) for name, value in lens.items()})
+    return Intrinsics.model_validate({"width": size[0], "height": size[1], **lens})
 
 
 def _seen(said: Any, size: list[int], lens: Intrinsics | None) -> Seen | None:
@@ -104,7 +114,7 @@ def _seen(said: Any, size: list[int], lens: Intrinsics | None) -> Seen | None:
     number = np.ravel(np.asarray(getattr(said, "cad_index", ())))
     if number.size != 1 or not hasattr(said, "viewpoint"):
         return None
-    category, cad = str(getattr(said, "class")), int(number[0])  # noqa: B009 (class is a word of Python's)
+    category, cad = str(getattr(said, "class")), int(number[0])
     if lens is not None and hasattr(said, "RT"):
         motion = np.array(said.RT, np.float64).reshape(3, 4)
         quaternion_from_matrix(motion[:, :3])

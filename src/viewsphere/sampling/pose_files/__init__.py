@@ -1,4 +1,4 @@
-"""Files of poses: orbits (CSV, Render for CNN's view files) and motions (TUM, KITTI, nerfstudio, COLMAP), and files of shots."""
+"""Files of poses: orbits (CSV, Render for CNN's view files), motions (TUM, KITTI, nerfstudio, COLMAP) and listed shots."""
 
 from __future__ import annotations
 

@@ -153,5 +153,6 @@ def _check(recipe: Recipe) -> None:
     options = recipe.scenes.options if isinstance(recipe.scenes, SamplerEntry) else {}
     for name in options:
         raise RecipeError(f"scenes.{name}: expected no options of sampler: listed; found one: leave it out")
-    if recipe.rig is not None and recipe.camera.of_viewpoints and len({shot.said.camera for shot in _file(recipe)[1]}) > 1:
+    lenses = [repr(shot.said.camera) for shot in _file(recipe)[1]] if recipe.rig and recipe.camera.of_viewpoints else []
+    if len(set(lenses)) > 1:
         raise RecipeError("rig: expected shots of one lens beside a rig and camera: {of_viewpoints: true}; found several")
