@@ -39,7 +39,8 @@ def new(
     folder: Annotated[
         Path | None,
         typer.Argument(
-            help="Folder to make the recipe in; with --from by default <name of its PATH>-again, here.", show_default=False
+            help="Folder to make the recipe in; with --from by default that of PATH with -again behind it, here.",
+            show_default=False,
         ),
     ] = None,
     kind: Annotated[
@@ -67,7 +68,7 @@ def new(
         _new_again(from_[0], from_[1], folder)
         return
     if folder is None:
-        raise UserError("new: expected a folder to make the recipe in; found none: viewsphere new cars/")
+        raise UserError(for_command("new"))
     _new_start(folder, FIRST if kind is None else kind)
 
 

@@ -7,7 +7,6 @@ from typing import Annotated, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from viewsphere.limits import limits
-from viewsphere.model.brief import Brief
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.frozen import Frozen
@@ -52,10 +51,8 @@ class ListedObject(Frozen):
     )
 
 
-class ListedShot(Brief):
+class ListedShot(Frozen):
     """A shot: its camera, and the models in it, in the order of their ids."""
-
-    UNSAID = ("name", "split", "image", "camera")
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=100), AfterValidator(_free)] | None = Field(
         default=None, description="its name, that of no other; by default shot-, and its place in the file from 000000 on"
