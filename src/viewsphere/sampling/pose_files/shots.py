@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from viewsphere.model.listed import ListedShot, Pose
 from viewsphere.model.mistakes import report
 from viewsphere.sampling.pose_files.entries import Arranged, Extrinsics, PoseFile
 from viewsphere.sampling.pose_files.lines import read_text
-from viewsphere.sampling.pose_files.motions import motion
+from viewsphere.sampling.pose_files.motions import motions
 from viewsphere.store.texts import parsed
 
 
@@ -35,24 +36,20 @@ def read_shots(path: Path) -> PoseFile:
 @lru_cache(maxsize=1)
 def _read(path: Path, _stamp: tuple[int, int]) -> PoseFile:
     """The same of a file as it was last changed: samplers ask more than once."""
-    entries: list[Extrinsics] = []
-    shots: list[Arranged] = []
+    found: list[tuple[int, ListedShot]] = []
     first = dict[str, int]()
     for line, said in _lines(path):
-        named = said.model_copy(update={"name": said.name or f"shot-{len(shots):06d}"})
-        assert named.name is not None
-        before = first.setdefault(named.name.casefold(), line)
+        name = said.name or f"shot-{len(found):06d}"
+        before = first.setdefault(name.casefold(), line)
         if before != line:
-            raise RecipeError(f"{path}:{line}: name: expected one that no other shot has; found {named.name!r}, as in {before}")
-        entries.append(_motion(said.world_from_camera, f"{path}:{line}: world_from_camera"))
-        places = (
-            _motion(one.world_from_object, f"{path}:{line}: objects[{i}].world_from_object")
-            for i, one in enumerate(said.objects)
-        )
-        shots.append(Arranged(named, line, tuple(places)))
+            raise RecipeError(f"{path}:{line}: name: expected one that no other shot has; found {name!r}, as in {before}")
+        found.append((line, said.model_copy(update={"name": name})))
+    entries = _motions([(said.world_from_camera, f"{path}:{line}: world_from_camera") for line, said in found])
+    places = iter(_motions([*_places(path, found)]))
+    shots = [Arranged(said, line, tuple(islice(places, len(said.objects)))) for line, said in found]
     lenses = _lenses(path, shots)
     one = lenses[0] if len(set(lenses)) == 1 else None
-    return PoseFile(tuple(entries), intrinsics=one, lenses=() if one else lenses, shots=tuple(shots))
+    return PoseFile(entries, intrinsics=one, lenses=() if one else lenses, shots=tuple(shots))
 
 
 def _lines(path: Path) -> Iterator[tuple[int, ListedShot]]:
@@ -70,9 +67,15 @@ def _lines(path: Path) -> Iterator[tuple[int, ListedShot]]:
             raise RecipeError("\n".join(f"{path}:{number}: {mistake}" for mistake in mistakes)) from None
 
 
-def _motion(pose: Pose, where: str) -> Extrinsics:
-    matrix = np.array(pose)
-    return motion(matrix[:3, :3], matrix[:3, 3], where)
+def _places(path: Path, found: Sequence[tuple[int, ListedShot]]) -> Iterator[tuple[Pose, str]]:
+    for line, said in found:
+        for i, one in enumerate(said.objects):
+            yield one.world_from_object, f"{path}:{line}: objects[{i}].world_from_object"
+
+
+def _motions(poses: Sequence[tuple[Pose, str]]) -> tuple[Extrinsics, ...]:
+    """Poses, each with its place for messages, as motions."""
+    return motions(np.array([pose for pose, _ in poses]).reshape(-1, 4, 4), lambda i: poses[i][1])
 
 
 def _lenses(path: Path, shots: list[Arranged]) -> tuple[Intrinsics, ...]:
