@@ -34,7 +34,21 @@ def test_import_and_help_do_not_load_the_heavy_packages():
 def test_every_command_has_help():
     top = viewsphere("--help")
     assert top.returncode == 0
-    names = ["new", "schema", "inspect", "plan", "preview", "render", "export", "check", "report", "view", "merge", "import", "convert"]
+    names = [
+        "new",
+        "schema",
+        "inspect",
+        "plan",
+        "preview",
+        "render",
+        "export",
+        "check",
+        "report",
+        "view",
+        "merge",
+        "import",
+        "convert",
+    ]
     for name in names:
         assert f" {name} " in top.stdout
         assert viewsphere(name, "--help").returncode == 0
