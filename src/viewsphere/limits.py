@@ -70,6 +70,7 @@ class Limits:
     MAX_RECIPE_VALUES = Limit(200_000, "values of a recipe: by aliases a few lines can stand for billions")
     MAX_RECIPE_BYTES = Limit(10_000_000, "bytes of a recipe, and of each that it extends")
     MAX_POSES_BYTES = Limit(1 << 30, "bytes of a file of poses")
+    MAX_LISTED_OBJECTS = Limit(10_000, "objects of a shot in a file of shots")
     MAX_RIG_BYTES = Limit(1_000_000, "bytes of a rig's calibration")
     MAX_STORED_PIXELS = Limit(1 << 28, "pixels of a picture or map of a data set, also of an imported one")
     MAX_ANNOTATION_BYTES = Limit(1 << 26, "bytes of a file of annotations of a data set that is imported, unpacked")

@@ -36,16 +36,54 @@ if TYPE_CHECKING:
 
 
 def new(
-    folder: Annotated[Path, typer.Argument(help="Folder to make the recipe in.", show_default=False)],
+    folder: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Folder to make the recipe in; with --from by default that of PATH with -again behind it, here.",
+            show_default=False,
+        ),
+    ] = None,
     kind: Annotated[
-        str,
+        str | None,
         typer.Option(
             help="What for: poses (the default), detector, pose6d, in-memory, blender.",
             autocompletion=completion.starts,
+            show_default=False,
         ),
-    ] = FIRST,
+    ] = None,
+    from_: Annotated[
+        tuple[str, Path] | None,
+        typer.Option(
+            "--from",
+            metavar="FORMAT PATH",
+            help="A data set to render again, with its models, poses and cameras: bop, pascal3d, colmap or nerfstudio.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Write a commented recipe to start from, for some kinds with a script that uses what it makes."""
+    """Write a commented recipe to start from, for some kinds with a script; or one that renders a data set again."""
+    if from_ is not None:
+        if kind is not None:
+            raise UserError(f"new: expected --kind or --from; found --kind {kind} and --from {from_[0]}: leave one of them out")
+        _new_again(from_[0], from_[1], folder)
+        return
+    if folder is None:
+        raise UserError(for_command("new"))
+    _new_start(folder, FIRST if kind is None else kind)
+
+
+def _new_again(format_: str, source: Path, folder: Path | None) -> None:
+    from viewsphere.run.again import make_again
+
+    _announce_compilation()
+    made = make_again(format_, source, folder or Path(f"{source.resolve().stem}-again"))
+    for note in made.notes:
+        typer.echo(f"note: {note}", err=True)
+    what = f"{made.models:,} models" if made.models else "a model of the zoo's, as the data set has none"
+    typer.echo(f"wrote {made.recipe}: {made.shots:,} shots, {what}; next: viewsphere preview {made.recipe}")
+
+
+def _new_start(folder: Path, kind: str) -> None:
     if kind not in kinds():
         from viewsphere.model.mistakes import one_of
 

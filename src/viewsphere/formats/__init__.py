@@ -56,6 +56,7 @@ class Format(Protocol):
     - `notes(categories, *options)`, with lines for the user of what these options mean for a data set's categories.
     - `verify(dataset, folder, sampled)` of `Verified`, with which `viewsphere check` proves an export.
     - `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`), with which data sets of it are imported.
+    - `again(path) -> Again` (`viewsphere.store.again`), with which `viewsphere new --from` makes recipes of its data sets.
     """
 
     def writer(

@@ -207,7 +207,7 @@ class PoseList(Aimed, Brief):
 
     kind: Literal["file"] = Field(description="from a file")
     path: Annotated[str, Field(min_length=1)] = Field(description="the file, or COLMAP's folder")
-    format: Literal["auto", "csv", "view", "tum", "kitti", "nerfstudio", "colmap", "cameras"] = Field(
+    format: Literal["auto", "csv", "view", "tum", "kitti", "nerfstudio", "colmap", "shots", "cameras"] = Field(
         default="auto", description="auto: by the file's ending, and by the numbers in its first line; cameras: of a 3D file"
     )
     every: Count = Field(default=1, description="take every n-th pose")

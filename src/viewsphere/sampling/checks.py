@@ -167,6 +167,18 @@ def check_frames(recipe: Recipe, views: Poses) -> None:
         )
 
 
+def check_sizes(recipe: Recipe, views: Poses, sampler: object) -> None:
+    """Pictures that take their lenses from a file are of one size, unless the sampler makes them of any."""
+    if not recipe.camera.of_viewpoints or getattr(sampler, "OF_ANY_SIZE", False):
+        return
+    sizes = {f"{lens.width} x {lens.height}" for i in range(len(views)) if (lens := views.lens(i))}
+    if len(sizes) > 1:
+        raise RecipeError(
+            f"camera.of_viewpoints: expected lenses of one size; found {', '.join(sorted(sizes)[:3])}: list what they show, "
+            "with scenes: {sampler: listed}"
+        )
+
+
 def check_all_frames(recipe: Recipe, frames: int, factors: str) -> None:
     """Not more frames than are wanted at most, with all time steps or scenes."""
     if frames > recipe.max_frames:

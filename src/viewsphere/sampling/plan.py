@@ -34,6 +34,7 @@ from viewsphere.sampling.checks import (
     check_names,
     check_redraws,
     check_shutter,
+    check_sizes,
     check_splits,
 )
 from viewsphere.sampling.clips import with_clips
@@ -307,6 +308,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         frames = 1 if recipe.scene.is_new_each_frame and recipe.time is None else most
         timings = timings if any(timings) else ()
         sampler: Sampler = plugins.load("samplers", recipe.sampler)
+        check_sizes(recipe, views, sampler)
         planned = Plan(
             recipe,
             specs,

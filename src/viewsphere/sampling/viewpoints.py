@@ -25,7 +25,7 @@ from viewsphere.model.scene import Vector
 from viewsphere.recipe.aim import Fill, FillBetween
 from viewsphere.recipe.values import Range
 from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
-from viewsphere.sampling.pose_files import Extrinsics, Orbit, PoseFile, read_poses
+from viewsphere.sampling.pose_files import Arranged, Extrinsics, Orbit, PoseFile, read_poses
 from viewsphere.sampling.seeds import generator
 
 Float = NDArray[np.float64]
@@ -48,7 +48,11 @@ class Poses(Sequence[Viewpoint]):
 
     @property
     def intrinsics(self) -> Intrinsics | None:
-        """The lens that a file of poses names."""
+        """The lens that a file of poses names, the first one's where poses have lenses of their own."""
+        return None
+
+    def lens(self, index: int) -> Intrinsics | None:
+        """The pose's own lens, None where all have one."""
         return None
 
     @property
@@ -163,6 +167,10 @@ class RepeatedPoses(Poses):
     def intrinsics(self) -> Intrinsics | None:
         """The lens that a file of poses names."""
         return self.base.intrinsics
+
+    def lens(self, index: int) -> Intrinsics | None:
+        """The pose's."""
+        return self.base.lens(self.taken(index))
 
     @property
     def lowest_elevation(self) -> float:
@@ -359,13 +367,18 @@ class ListedPoses(Poses):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the poses and the lens."""
-        return hashlib.sha256(repr(self.file).encode()).hexdigest()
+        """SHA-256 of the poses and the lens, and of all that a file of shots says."""
+        shots = "".join(shot.said.model_dump_json() for shot in self.file.shots)
+        return hashlib.sha256((repr(self.file) + shots).encode()).hexdigest()
 
     @property
     def intrinsics(self) -> Intrinsics | None:
-        """The file's lens, if it names one."""
-        return self.file.intrinsics
+        """The file's lens, if it names one, the first of several."""
+        return self.file.lenses[0] if self.file.lenses else self.file.intrinsics
+
+    def lens(self, index: int) -> Intrinsics | None:
+        """The pose's own lens, where the file names several."""
+        return self.file.lenses[index] if self.file.lenses else None
 
     @property
     def lowest_elevation(self) -> float:
@@ -373,7 +386,7 @@ class ListedPoses(Poses):
         return min((view.elevation for view, target in self._views if target is None), default=90.0)
 
     def name(self, index: int) -> str:
-        """The pose's values, and how often they were there before: a camera that rests has equal poses."""
+        """The pose's values, and how often they were there before: a camera that rests has equal poses; a shot's own name."""
         return self._names[index]
 
     def view(self, index: int) -> Orbit:
@@ -393,6 +406,8 @@ class ListedPoses(Poses):
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
+        if self.file.shots:
+            return tuple(_shot_name(shot) for shot in self.file.shots)
         seen: Counter[str] = Counter()
         names: list[str] = []
         for view, target in self._views:
@@ -405,6 +420,11 @@ class ListedPoses(Poses):
         view = viewpoint_of(placed(motion, turn, self.viewpoints), (0.0, 0.0, 0.0), 0)
         assert view.target is not None
         return Orbit(view.azimuth_deg, view.elevation_deg, view.distance, view.tilt_deg), view.target
+
+
+def _shot_name(shot: Arranged) -> str:
+    """The shot's name, and a digest of what it says: one that is changed is another."""
+    return f"shot {shot.name} {hashlib.sha256(shot.said.model_dump_json().encode()).hexdigest()[:16]}"
 
 
 def world_turn(viewpoints: PoseList, file: PoseFile) -> Float:

@@ -53,6 +53,7 @@ from viewsphere.formats._paper import json_bytes
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._refusals import known_cameras, lacking_labels, pinhole
 from viewsphere.formats._tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item, member
+from viewsphere.formats.bop.again import again as again
 from viewsphere.formats.bop.entries import (
     Entry,
     camera,

@@ -50,28 +50,28 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     files = sorted(path.glob("*/*/scene_camera.json"))
     if not files:
         raise StoreError(f"{path}: expected a BOP data set (<split>/<scene>/scene_camera.json); found no such file")
-    frames = tuple(frame for file in files for frame in _scene(path, file.parent, problems))
+    frames = tuple(frame for file in files for frame in scene_frames(path, file.parent, problems))
     if not keep_going:
         refuse_broken(problems)
     if not frames:
         raise StoreError(f"{path}: expected images that can be used; found none")
-    categories = _categories(path, sorted({gt["obj_id"] for frame in frames for gt in frame.gt}))
+    named = categories(path, sorted({gt["obj_id"] for frame in frames for gt in frame.gt}))
     return ForeignDataset(
         name=path.resolve().name,
         digest=_digest(files, problems),
-        categories=tuple({category.id: category for category, _ in categories.values()}.values()),
+        categories=tuple({category.id: category for category, _ in named.values()}.values()),
         splits=tuple(dict.fromkeys(frame.split for frame in frames)),
         channels=("rgb", "depth") if all(frame.depth for frame in frames) else ("rgb",),
         count=len(frames),
         poses=0,
         max_objects=max(1, *(len(frame.gt) for frame in frames)),
-        frames=partial(_samples, frames, categories),
+        frames=partial(_samples, frames, named),
         left_out=tuple(problems),
     )
 
 
 @dataclass(frozen=True)
-class _Frame:
+class Frame:
     """A picture, what is said of its objects, and where its masks begin: `<scene>/<kind>/<image>_`."""
 
     split: str
@@ -113,7 +113,8 @@ def _digest(files: list[Path], left_out: list[str]) -> str:
     return digest.hexdigest()
 
 
-def _load(file: Path) -> dict[str, Any]:
+def load(file: Path) -> dict[str, Any]:
+    """One of BOP's JSON files, an object; an empty one where there is no such file. Raises StoreError for another."""
     if not file.is_file():
         return {}
     try:
@@ -125,10 +126,10 @@ def _load(file: Path) -> dict[str, Any]:
     return cast(dict[str, Any], found)
 
 
-def _scene(root: Path, scene: Path, problems: list[str]) -> Iterator[_Frame]:
+def scene_frames(root: Path, scene: Path, problems: list[str]) -> Iterator[Frame]:
     """The pictures of a scene."""
     file_inside(root, scene.relative_to(root).as_posix())
-    cameras, gts, infos = (_load(file_inside(scene, f"scene_{name}.json")) for name in ("camera", "gt", "gt_info"))
+    cameras, gts, infos = (load(file_inside(scene, f"scene_{name}.json")) for name in ("camera", "gt", "gt_info"))
     for number in sorted(cameras, key=lambda text: (len(text), text)):
         try:
             if not number.isdecimal() or len(number) > MOST_DIGITS:
@@ -139,7 +140,7 @@ def _scene(root: Path, scene: Path, problems: list[str]) -> Iterator[_Frame]:
             problems.append(f"{scene}: image {number:.20}: expected a lens, poses and a picture; {problem}")
 
 
-def _frame(scene: Path, image: int, said: dict[str, Any], gt: list[Any], info: list[Any]) -> _Frame:
+def _frame(scene: Path, image: int, said: dict[str, Any], gt: list[Any], info: list[Any]) -> Frame:
     named = (file_inside(scene, name.format(image)) for name in PICTURES)
     rgb = next((file for file in named if file.is_file()), None)
     if rgb is None:
@@ -158,7 +159,7 @@ def _frame(scene: Path, image: int, said: dict[str, Any], gt: list[Any], info: l
         _pose(one, "m2c")
         if type(one["obj_id"]) is not int or not 0 <= one["obj_id"] < MOST_OBJECTS:
             raise ValueError(f"found obj_id {one['obj_id']!r:.40}")
-    return _Frame(
+    return Frame(
         split=scene.parent.name,
         scene=scene,
         image=image,
@@ -187,6 +188,11 @@ def _matrix(values: Any, rows: int) -> NDArray[np.float64]:
     return found
 
 
+def object_pose(gt: Mapping[str, Any]) -> NDArray[np.float64]:
+    """An object's pose in the camera, (4, 4), metres."""
+    return _pose(gt, "m2c")
+
+
 def _pose(said: Mapping[str, Any], which: str) -> NDArray[np.float64]:
     """The pose of these names, (4, 4), metres; raises ValueError where it has no rotation."""
     turn, shift = _matrix(said[f"cam_R_{which}"], 3), _matrix(said[f"cam_t_{which}"], 1)[0]
@@ -194,9 +200,9 @@ def _pose(said: Mapping[str, Any], which: str) -> NDArray[np.float64]:
     return rigid(turn, shift / MM)
 
 
-def _categories(path: Path, objects: list[int]) -> dict[int, tuple[Category, str]]:
+def categories(path: Path, objects: list[int]) -> dict[int, tuple[Category, str]]:
     """The category of each object, and its name."""
-    known = _load(path / "dataset_info.json").get("objects")
+    known = load(path / "dataset_info.json").get("objects")
     found: dict[str, Category] = {}
     named: dict[int, tuple[Category, str]] = {}
     for number in objects:
@@ -210,19 +216,19 @@ def _categories(path: Path, objects: list[int]) -> dict[int, tuple[Category, str
     return named
 
 
-def _samples(frames: tuple[_Frame, ...], categories: Mapping[int, tuple[Category, str]]) -> Iterator[ForeignFrame]:
+def _samples(frames: tuple[Frame, ...], named: Mapping[int, tuple[Category, str]]) -> Iterator[ForeignFrame]:
     for index, frame in enumerate(frames):
         files: dict[str, Path | Loaded] = {"rgb": frame.rgb}
         if frame.depth:
             files["depth"] = Loaded(".png", _depth(frame.depth, frame))
-        objects = tuple(_object(frame, n, *categories[gt["obj_id"]]) for n, gt in enumerate(frame.gt))
+        objects = tuple(_object(frame, n, *named[gt["obj_id"]]) for n, gt in enumerate(frame.gt))
         said = {"scene_id": frame.scene.name, "im_id": frame.image}
         whole = all("amodal" in o.more for o in objects)
         sample = Sample(index, frame.split, frame.camera, None, objects, {}, {}, source=said, instant=index)
         yield ForeignFrame(replace(sample, asked=("amodal",) if whole else ()), files)
 
 
-def _depth(file: Path, frame: _Frame) -> bytes:
+def _depth(file: Path, frame: Frame) -> bytes:
     """The same steps, with their length, as the store keeps them."""
     try:
         with opened(file) as image:
@@ -233,12 +239,12 @@ def _depth(file: Path, frame: _Frame) -> bytes:
     return encode_png(steps, unit=frame.step)
 
 
-def _object(frame: _Frame, n: int, category: Category, key: str) -> Any:
+def _object(frame: Frame, n: int, category: Category, key: str) -> Any:
     """The n-th object of a picture; `source` has its obj_id."""
     size = width, height = frame.camera.width, frame.camera.height
     seen, whole = frame.mask("mask_visib", n), frame.mask("mask", n)
     info = frame.info[n] if n < len(frame.info) else None
-    pose = _pose(frame.gt[n], "m2c")
+    pose = object_pose(frame.gt[n])
     known: dict[str, Any] = {
         "key": key,
         "camera_from_object": pose,

@@ -37,6 +37,7 @@ from viewsphere.formats._cameras import Moment, Rigs, world_of
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._refusals import known_cameras, no_skew
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.colmap.again import again as again
 from viewsphere.formats.colmap.points import Sights
 from viewsphere.formats.colmap.reading import read as read
 from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of

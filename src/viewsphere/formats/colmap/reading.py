@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.formats._posed import MISTAKES, Posed, camera_of, check_picture, picture_inside, posed_dataset
@@ -49,32 +50,60 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     Splits are those that `<split>.txt` beside the model lists; without these all is `train`. The world's axes are COLMAP's.
     Raises StoreError with every image that lacks its picture or its camera; with `keep_going` these are left out and reported.
     """
+    model = read_model(path)
+    folder = model.cameras.parent
+    root = next((one for one in (path, folder.parent, folder.parent.parent) if (one / "images").is_dir()), path)
+    problems: list[str] = []
+    found: list[Posed] = []
+    for image in model.images:
+        try:
+            lens, pose, split = model.view(image)
+            file, size = picture_inside(root / "images", image.name)
+            check_picture(size, lens)
+            found.append(Posed(file, camera_of(lens, pose), split))
+        except MISTAKES as error:
+            problems.append(f"{model.file}: image {image.name!r:.80}: {error}")
+    texts = [model.cameras, model.file, *(file for file in sorted(folder.glob("*.txt")) if file.stem not in OWN)]
+    return posed_dataset(path, found, texts, problems, keep_going)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A sparse model: its files of cameras and images, lenses by their numbers, images by their names, splits of some."""
+
+    cameras: Path
+    file: Path
+    lenses: dict[int, Intrinsics]
+    images: tuple[_Image, ...]
+    splits: dict[str, str]
+
+    def view(self, image: _Image) -> tuple[Intrinsics, NDArray[np.float64], str]:
+        """An image's lens, its pose, world_from_camera (3, 4), and its split; raises ValueError where it lacks one."""
+        split = self.splits.get(image.name, "train")
+        if image.camera not in self.lenses:
+            raise ValueError(f"found no camera {image.camera}")
+        if not is_name(split):
+            raise ValueError(f"expected a split's name; found {split!r:.60}")
+        rotation, t = matrix_from_quaternion(image.pose[:4]), np.array(image.pose[4:])
+        return self.lenses[image.camera], np.column_stack((rotation.T, -transform(rotation.T, t))), split
+
+
+def read_model(path: Path) -> Model:
+    """The sparse model in a folder, its images in the order of their names; raises StoreError where there is none."""
     files = next(filter(None, map(_files, (path / "sparse" / "0", path / "sparse", path))), None)
     if files is None:
         raise StoreError(f"{path}: expected sparse/0 with cameras and images as .txt or .bin; found none")
     cameras_file, images_file = files
-    model = cameras_file.parent
-    root = next((one for one in (path, model.parent, model.parent.parent) if (one / "images").is_dir()), path)
-    problems: list[str] = []
-    lenses: dict[int, Intrinsics] = {}
-    splits = {name: file.stem for file in sorted(model.glob("*.txt")) if file.stem not in OWN for name in _lines(file)}
+    folder = cameras_file.parent
+    splits = {name: file.stem for file in sorted(folder.glob("*.txt")) if file.stem not in OWN for name in _lines(file)}
     try:
         binary = cameras_file.suffix == ".bin"
         read_cameras, read_images = (_binary_cameras, _binary_images) if binary else (_text_cameras, _text_images)
-        for number, name, size, values in read_cameras(cameras_file):
-            lenses[number] = _lens(name, size, values)
+        lenses = {number: _lens(name, size, values) for number, name, size, values in read_cameras(cameras_file)}
         images = sorted(read_images(images_file), key=lambda image: image.name)
     except (*MISTAKES, struct.error) as error:
-        raise StoreError(f"{model}: expected a model of COLMAP's; found: {error}") from None
-    found: list[Posed] = []
-    for image in images:
-        try:
-            found.append(_posed(root / "images", image, lenses, splits.get(image.name, "train")))
-        except MISTAKES as error:
-            told = f"found no camera {error}" if isinstance(error, KeyError) else error
-            problems.append(f"{images_file}: image {image.name!r:.80}: {told}")
-    texts = [cameras_file, images_file, *(file for file in sorted(model.glob("*.txt")) if file.stem not in OWN)]
-    return posed_dataset(path, found, texts, problems, keep_going)
+        raise StoreError(f"{folder}: expected a model of COLMAP's; found: {error}") from None
+    return Model(cameras_file, images_file, lenses, tuple(images), splits)
 
 
 def _files(folder: Path) -> tuple[Path, Path] | None:
@@ -84,16 +113,6 @@ def _files(folder: Path) -> tuple[Path, Path] | None:
         if cameras.is_file() and images.is_file():
             return cameras, images
     return None
-
-
-def _posed(folder: Path, image: _Image, lenses: dict[int, Intrinsics], split: str) -> Posed:
-    lens = lenses[image.camera]
-    file, size = picture_inside(folder, image.name)
-    check_picture(size, lens)
-    if not is_name(split):
-        raise ValueError(f"expected a split's name; found {split!r:.60}")
-    rotation, t = matrix_from_quaternion(image.pose[:4]), np.array(image.pose[4:])
-    return Posed(file, camera_of(lens, np.column_stack((rotation.T, -transform(rotation.T, t)))), split)
 
 
 def _lens(model: str, size: tuple[int, int], values: Sequence[float]) -> Intrinsics:

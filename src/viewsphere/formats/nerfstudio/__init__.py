@@ -46,6 +46,7 @@ from viewsphere.formats._cameras import Rigs, measured_png, opengl_pose, points_
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, item
+from viewsphere.formats.nerfstudio.again import again as again
 from viewsphere.formats.nerfstudio.lenses import SYNTHETIC, lens_problem, model_of, said_of
 from viewsphere.formats.nerfstudio.reading import read as read
 from viewsphere.formats.nerfstudio.synthetic import SPLITS, synthetic_files, synthetic_layout

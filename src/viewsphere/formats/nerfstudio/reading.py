@@ -8,6 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.formats._posed import MISTAKES, Posed, camera_of, check_picture, picture_inside, posed_dataset
@@ -27,7 +28,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     the frames counts where a frame does not say it. Raises StoreError with every frame that lacks its picture, its lens or its
     pose; with `keep_going` these are left out and reported.
     """
-    files = [path] if path.is_file() else _files(path)
+    files = transforms_files(path)
     problems: list[str] = []
     found: dict[Path, Posed] = {}
     for file in files:
@@ -36,8 +37,10 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     return posed_dataset(path, list(found.values()), files, problems, keep_going)
 
 
-def _files(folder: Path) -> list[Path]:
-    """transforms.json, else a file a split, train first."""
+def transforms_files(folder: Path) -> list[Path]:
+    """transforms.json of a folder, else a file a split, train first; a file itself. Raises StoreError where there is none."""
+    if folder.is_file():
+        return [folder]
     whole = folder / "transforms.json"
     found = [whole] if whole.is_file() else sorted(folder.glob("transforms_*.json"), key=lambda file: _rank(_split(file)))
     if not found:
@@ -54,6 +57,18 @@ def _rank(split: str) -> tuple[int, str]:
 
 
 def _pictures(file: Path, problems: list[str]) -> Iterator[Posed]:
+    for number, said, lists in said_frames(file):
+        try:
+            yield _picture(file, said, lists)
+        except MISTAKES as error:
+            told = f"found no {error}" if isinstance(error, KeyError) else error
+            problems.append(f"{file}: frame number {number}: {told}")
+
+
+def said_frames(file: Path) -> Iterator[tuple[int, Mapping[str, Any], Mapping[str, set[str]]]]:
+    """The number of each frame, what is said of it or beside the frames, and the files that are listed of each split. Raises
+    StoreError for a file of another structure.
+    """
     try:
         data = parsed(file.read_bytes())
     except (OSError, ValueError) as error:
@@ -63,35 +78,43 @@ def _pictures(file: Path, problems: list[str]) -> Iterator[Posed]:
     whole = cast(dict[str, Any], data)
     lists = {split: set(map(str, whole.get(f"{split}_filenames") or ())) for split in reversed(SPLITS)}
     for number, frame in enumerate(cast(list[Any], whole["frames"])):
-        try:
-            yield _picture(file, {**whole, **frame}, lists)
-        except MISTAKES as error:
-            told = f"found no {error}" if isinstance(error, KeyError) else error
-            problems.append(f"{file}: frame number {number}: {told}")
+        yield number, {**whole, **frame} if isinstance(frame, dict) else {}, lists
 
 
 def _picture(file: Path, said: Mapping[str, Any], lists: Mapping[str, set[str]]) -> Posed:
     name = str(said["file_path"])
     place, size = picture_inside(file.parent, name.removeprefix("./"), ".png", ".jpg")
-    lens = _lens(said, size)
+    lens = lens_of(said, size)
     check_picture(size, lens)
-    folder = PurePosixPath(name).parts[0]
-    split = next((split for split in SPLITS if name in lists.get(split, ())), folder if folder in SPLITS else _split(file))
-    if not is_name(split):
-        raise ValueError(f"expected a split's name; found {split!r:.60}")
-    pose = np.array(said["transform_matrix"], np.float64)
-    if pose.shape not in ((3, 4), (4, 4)):
-        raise ValueError(f"expected a transform_matrix of 4 x 4; found {pose.shape}")
+    split, pose = split_of(file, name, lists), pose_said(said)
     mapped, step = said.get("depth_file_path"), 0.001
     if mapped is None and "integer_depth_scale" in said:
         mapped, step = said.get("depth_path"), float(said["integer_depth_scale"])
     depth = None if mapped is None else file_inside(file.parent, str(mapped))
     if depth is not None and not (depth.is_file() and step > 0):
         raise ValueError(f"expected depth in steps of more than 0 metres; found {mapped}, {step:g}")
-    return Posed(place, camera_of(lens, pose[:3] * (1.0, -1.0, -1.0, 1.0)), split, depth=depth, step=step)
+    return Posed(place, camera_of(lens, pose), split, depth=depth, step=step)
 
 
-def _lens(said: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics:
+def split_of(file: Path, name: str, lists: Mapping[str, set[str]]) -> str:
+    """The split of the picture of a name; raises ValueError for one that is no name."""
+    folder = PurePosixPath(name).parts[0]
+    split = next((split for split in SPLITS if name in lists.get(split, ())), folder if folder in SPLITS else _split(file))
+    if not is_name(split):
+        raise ValueError(f"expected a split's name; found {split!r:.60}")
+    return split
+
+
+def pose_said(said: Mapping[str, Any]) -> NDArray[np.float64]:
+    """The pose of a frame, world_from_camera (3, 4), OpenCV's axes; raises ValueError for another matrix."""
+    pose = np.array(said["transform_matrix"], np.float64)
+    if pose.shape not in ((3, 4), (4, 4)):
+        raise ValueError(f"expected a transform_matrix of 4 x 4; found {pose.shape}")
+    return pose[:3] * (1.0, -1.0, -1.0, 1.0)
+
+
+def lens_of(said: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics:
+    """The lens of a frame, whose picture has a size; raises ValueError for one that viewsphere does not have."""
     width, height = int(said.get("w", size[0])), int(said.get("h", size[1]))
     fx = said.get("fl_x") or width / 2 / math.tan(float(said["camera_angle_x"]) / 2)
     cx, cy = said.get("cx", width / 2), said.get("cy", height / 2)

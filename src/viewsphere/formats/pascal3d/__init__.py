@@ -55,6 +55,7 @@ from viewsphere.formats._refusals import most_categories, most_objects
 from viewsphere.formats._tree import functions
 from viewsphere.formats._viewpoint_mat import Options as Options
 from viewsphere.formats._viewpoint_mat import no_viewpoints, scipy_io
+from viewsphere.formats.pascal3d.again import again as again
 from viewsphere.formats.pascal3d.reading import read as read
 from viewsphere.formats.pascal3d.writing import CLASSES, MOST, Pascal3d
 

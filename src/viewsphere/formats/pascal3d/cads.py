@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import StoreError
 from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats._viewpoint_mat import OWN
 from viewsphere.formats.pascal3d.records import FARTHEST, structs_of, variables
@@ -76,15 +77,29 @@ def _write(mesh: Mesh, key: str, folder: Path) -> None:
     export_glb(mesh, folder / f"{key}.glb")
 
 
-def _mesh(vertices: Any, faces: Any) -> Mesh:
-    """Vertices (V, 3) and faces (T, 3), which count from 1."""
+def read_shapes(file: Path, category: str) -> tuple[tuple[Float, NDArray[np.int32]], ...]:
+    """Vertices (V, 3) and triangles (T, 3) of a category's models; raises StoreError for a file that has none."""
+    try:
+        structs = structs_of(variables(file).get(category), f"a struct array {category}")
+        return tuple(_shape(one.get("vertices"), one.get("faces")) for one in structs)
+    except MISTAKES as error:
+        raise StoreError(f"{file}: expected CAD models of {category}; found: {one_line(error)}") from None
+
+
+def _shape(vertices: Any, faces: Any) -> tuple[Float, NDArray[np.int32]]:
+    """Vertices (V, 3) and triangles (T, 3) of faces, which count from 1."""
     if not (_is_table(vertices) and _is_table(faces) and len(vertices) and len(faces)):
         raise ValueError("expected vertices and faces of three columns; found others")
     if not (np.abs(vertices) < FARTHEST).all():
         raise ValueError(f"expected finite vertices below {FARTHEST:,.0f}; found others")
     if not ((faces == np.floor(faces)) & (faces >= 1) & (faces <= len(vertices))).all():
         raise ValueError(f"expected faces of vertices 1 to {len(vertices)}; found others")
-    places, triangles = vertices.astype(np.float32), faces.astype(np.int32) - np.int32(1)
+    return vertices.astype(np.float64), faces.astype(np.int32) - np.int32(1)
+
+
+def _mesh(vertices: Any, faces: Any) -> Mesh:
+    exact, triangles = _shape(vertices, faces)
+    places = exact.astype(np.float32)
     if not np.ptp(places, axis=0).any():
         raise ValueError("expected vertices that are apart; found all at one place")
     nothing = np.zeros(len(triangles), np.int32)

@@ -52,11 +52,15 @@ class Seen:
 
 @dataclass(frozen=True)
 class Record:
-    """A picture's objects, the problems of others, and, of viewsphere's own, K (3, 3) of pixels from the picture's corner."""
+    """A picture's objects, the problems of others, and, of viewsphere's own, K (3, 3) of pixels from the picture's corner. The
+    name of its file and its size (width, height), None where nothing is said of these.
+    """
 
     objects: Sequence[Seen]
     problems: Sequence[str]
     lens: Float | None
+    filename: str | None
+    size: tuple[int, int] | None
 
 
 def variables(file: Path) -> dict[str, Any]:
@@ -90,7 +94,20 @@ def read_record(file: Path) -> Record:
             objects.append(_seen(place, one))
         except ValueError as error:
             problems.append(f"{file}: object {place}: {error}")
-    return Record(objects, problems, _lens(rows[0]["K"]) if "K" in rows[0] else None)
+    name, lens = rows[0].get("filename"), _lens(rows[0]["K"]) if "K" in rows[0] else None
+    return Record(objects, problems, lens, name if isinstance(name, str) and name else None, _size(rows[0].get("imgsize")))
+
+
+def _size(value: Any) -> tuple[int, int] | None:
+    """The width and height that begin a record's size; None where there are none."""
+    if _is_nothing(value):
+        return None
+    if not isinstance(value, np.ndarray) or value.size < 2:
+        raise ValueError("expected imgsize width height; found another")
+    width, height = _numbers(value.ravel()[:2], "imgsize", 2).tolist()
+    if not (width >= 1 and height >= 1 and width == int(width) and height == int(height)):
+        raise ValueError(f"expected imgsize of whole pixels; found {width:g} {height:g}")
+    return int(width), int(height)
 
 
 def _seen(place: int, said: Mapping[str, Any]) -> Seen:

@@ -1,4 +1,4 @@
-"""Files of poses: orbits (CSV, Render for CNN's view files) and motions (TUM, KITTI, nerfstudio, COLMAP)."""
+"""Files of poses: orbits (CSV, Render for CNN's view files), motions (TUM, KITTI, nerfstudio, COLMAP) and listed shots."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from pathlib import Path
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import one_of
-from viewsphere.sampling.pose_files.entries import Extrinsics, Orbit, PoseFile
+from viewsphere.sampling.pose_files.entries import Arranged, Extrinsics, Orbit, PoseFile
 from viewsphere.sampling.pose_files.lines import read_lines
 
-FORMATS = ("csv", "view", "tum", "kitti", "nerfstudio", "colmap")
+FORMATS = ("csv", "view", "tum", "kitti", "nerfstudio", "colmap", "shots")
 COLUMNS = {4: "view", 8: "tum", 12: "kitti"}
 """Numbers in a line of the formats that have nothing else."""
 
-__all__ = ["FORMATS", "Extrinsics", "Orbit", "PoseFile", "read_poses"]
+ENDINGS = {".json": "nerfstudio", ".csv": "csv", ".jsonl": "shots"}
+
+__all__ = ["FORMATS", "Arranged", "Extrinsics", "Orbit", "PoseFile", "read_poses"]
 
 
 def read_poses(path: Path, kind: str = "auto", every: int = 1) -> PoseFile:
@@ -32,8 +34,8 @@ def read_poses(path: Path, kind: str = "auto", every: int = 1) -> PoseFile:
 def _kind(path: Path) -> str:
     if path.is_dir():
         return "colmap"
-    if path.suffix.lower() in {".json", ".csv"}:
-        return {".json": "nerfstudio", ".csv": "csv"}[path.suffix.lower()]
+    if path.suffix.lower() in ENDINGS:
+        return ENDINGS[path.suffix.lower()]
     if path.name == "images.txt":
         return "colmap"
     number, first = next(iter(read_lines(path)), (1, []))
@@ -63,5 +65,9 @@ def _read(path: Path, kind: str) -> PoseFile:
             from viewsphere.sampling.pose_files.colmap import read_colmap
 
             return read_colmap(path)
+        case "shots":
+            from viewsphere.sampling.pose_files.shots import read_shots
+
+            return read_shots(path)
         case _:
             raise RecipeError(f"viewpoints.format: {one_of(kind, FORMATS)}")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.listed import ListedShot
 from viewsphere.model.model_spec import Axis
 
 Row = tuple[float, float, float]
@@ -27,13 +28,29 @@ class Extrinsics(NamedTuple):
     center: Row
 
 
+class Arranged(NamedTuple):
+    """What a line of a file of shots says, with a name; the line's number, and where each of its objects is, as a camera is:
+    `R` (3, 3) from the world to the object.
+    """
+
+    said: ListedShot
+    line: int
+    places: tuple[Extrinsics, ...]
+
+    @property
+    def name(self) -> str:
+        """The shot's name."""
+        assert self.said.name is not None
+        return self.said.name
+
+
 @dataclass(frozen=True)
 class PoseFile:
     """All of a file's poses in its order, all orbits or all motions.
 
     `up` is the axis of the world that points up, as the format (or its usual writers) have it; `intrinsics` is the lens
     that all frames share, None if the file names none, or several: then `lenses` has one for each. `times` are the seconds of
-    each pose, as the file counts them, None if it does not.
+    each pose, as the file counts them, None if it does not. `shots` say what else a file of shots says of each pose.
     """
 
     entries: tuple[Orbit, ...] | tuple[Extrinsics, ...]
@@ -41,8 +58,10 @@ class PoseFile:
     intrinsics: Intrinsics | None = None
     times: tuple[float, ...] | None = field(default=None, repr=False)
     lenses: tuple[Intrinsics, ...] = field(default=(), repr=False)
+    shots: tuple[Arranged, ...] = field(default=(), repr=False)
 
     def thinned(self, every: int) -> PoseFile:
         """Every so many-th pose."""
         times = self.times and self.times[::every]
-        return replace(self, entries=self.entries[::every], times=times, lenses=self.lenses[::every])
+        thinned = {"lenses": self.lenses[::every], "shots": self.shots[::every]}
+        return replace(self, entries=self.entries[::every], times=times, **thinned)

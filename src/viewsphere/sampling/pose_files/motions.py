@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,26 @@ def nearest_rotation(matrix: Float) -> Float | None:
             return None
         matrix = (matrix + cofactors / determinant) / 2
     return matrix
+
+
+def motions(poses: Float, where: Callable[[int], str]) -> tuple[Extrinsics, ...]:
+    """The same as `motion` of many poses (N, 4, 4), of which `where` tells the place: all at once, which is a hundred times as
+    fast.
+    """
+    given = poses[:, :3, :3]
+    turns = given
+    for _ in range(8):
+        a, b, c = np.moveaxis(turns, 1, 0)
+        cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+        determinants = (a * cofactors[:, 0]).sum(axis=1)
+        safe = np.where(determinants < 0.5, np.inf, determinants)  # a mirror image, or flat: halved again and again
+        turns = (turns + cofactors / safe[:, None, None]) / 2
+    wrong = np.flatnonzero(~(np.abs(turns - given).max(axis=(1, 2), initial=0.0) <= RIGHT_ANGLES))
+    if wrong.size:
+        raise RecipeError(f"{where(int(wrong[0]))}: expected a rotation; found a matrix that is none")
+    rows = np.moveaxis(turns, 1, 2).tolist()
+    centers = poses[:, :3, 3].tolist()
+    return tuple(Extrinsics(((*r[0],), (*r[1],), (*r[2],)), (x, y, z)) for r, (x, y, z) in zip(rows, centers, strict=True))
 
 
 def _row(values: Float) -> Row:

@@ -36,7 +36,7 @@ class Standing:
 
 class Sampler(Protocol):
     """A module that says which shots a recipe means, and makes them. All its randomness follows from the recipe's seed and
-    from names (`viewsphere.sampling.seeds`).
+    from names (`viewsphere.sampling.seeds`). `OF_ANY_SIZE = True`: its shots may have lenses of several sizes.
     """
 
     def subjects(self, recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:

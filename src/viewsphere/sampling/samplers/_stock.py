@@ -236,7 +236,9 @@ class Stock(Sendable):
         return looking(self.viewpoint(subject, view, target), focus, index=number, split=split, **seen)
 
     def drawn_lens(self, subject: str, pose: int) -> Intrinsics | None:
-        """The lens of a subject's frame, or sequence, from a pose; None where the recipe draws none."""
+        """The lens of a subject's frame, or sequence, from a pose: drawn, or the pose's own; None where all have one."""
+        if self.recipe.camera.of_viewpoints:
+            return self.pose_list.lens(pose)
         if not self.recipe.camera.is_random:
             return None
         return _lens(self.recipe, subject, self.scene_name(pose))

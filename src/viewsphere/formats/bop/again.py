@@ -1,0 +1,135 @@
+"""BOP's scenes with the models that they are of, to be rendered again."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from pydantic import ValidationError
+
+from viewsphere.errors import StoreError
+from viewsphere.formats._again import pose_of
+from viewsphere.formats.bop.entries import MM
+from viewsphere.formats.bop.pixels import Shift, fit, shifted
+from viewsphere.formats.bop.reading import MISTAKES, Frame, categories, load, object_pose, scene_frames
+from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.model.listed import ListedObject, ListedShot
+from viewsphere.model.mistakes import first_of
+from viewsphere.model.symmetries import RIGID, Symmetries
+from viewsphere.store.again import Again, AgainModel, refuse_any
+from viewsphere.store.paths import file_inside
+
+FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
+"""Where data sets have their models; the first that is there counts."""
+
+SHIFTED = (
+    "{differs:.2%} of the pixels of this data set's masks differ from its models' with cx {x:+g} and cy {y:+g}, as lenses here "
+    "have it, {differed:.2%} without: renderers that make masks count pixels from elsewhere than pictures and depth, which the "
+    "lens without this fits"
+)
+
+
+def again(path: Path) -> Again:
+    """All pictures of a data set of scenes, or of one of its splits, and all of its models with their symmetries.
+
+    Pixels count from the first one's centre, as BOP says, unless masks fit the models clearly better from elsewhere. The world
+    is that of cam_R_w2c; without it that of each camera, where up is up in the picture. Raises StoreError for
+    pictures that lack their file, their lens or the pose of an object, and for objects without a model.
+    """
+    root, files = path, sorted(path.glob("*/*/scene_camera.json"))
+    if not files:
+        root, files = path.absolute().parent, sorted(path.glob("*/scene_camera.json"))
+    if not files:
+        raise StoreError(f"{path}: expected a BOP data set (<split>/<scene>/scene_camera.json); found no such file")
+    problems: list[str] = []
+    frames = tuple(frame for file in files for frame in scene_frames(root, file.parent, problems))
+    refuse_any(problems)
+    if not frames:
+        raise StoreError(f"{path}: expected images; found none")
+    models, notes = _models(root, frames)
+    try:
+        masks = fit(frames, models)
+    except MISTAKES as error:
+        raise StoreError(
+            f"{path}: expected masks, and models that can be read; found: {' '.join(str(error).split())}"
+        ) from None
+    x, y = masks.shift
+    if x or y:
+        notes.append(SHIFTED.format(differs=masks.differs, differed=masks.differed, x=x, y=y))
+    has_world = any(not np.array_equal(rigid(one.camera.R, one.camera.t), np.eye(4)) for one in frames)
+    return Again(
+        name=root.resolve().name,
+        shots=tuple(_shot(root, frame, masks.shift) for frame in frames),
+        models=models,
+        formats=("bop",),
+        annotations=("amodal",),
+        up="+z" if has_world else "-y",
+        notes=tuple(notes),
+    )
+
+
+def _shot(root: Path, frame: Frame, shift: Shift) -> ListedShot:
+    world_from_camera = rigid(frame.camera.R.T, frame.camera.center)
+    poses = ((str(one["obj_id"]), compose(world_from_camera, object_pose(one))) for one in frame.gt)
+    return ListedShot(
+        name=re.sub(r"[^A-Za-z0-9_]", "_", f"{frame.split}_{frame.scene.name}_{frame.image:06d}")[-100:],
+        split=frame.split,
+        image=frame.rgb.relative_to(root).as_posix(),
+        world_from_camera=pose_of(world_from_camera),
+        camera=shifted(frame.camera.intrinsics, shift),
+        objects=tuple(ListedObject(model=number, world_from_object=pose_of(pose)) for number, pose in poses),
+    )
+
+
+def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, AgainModel], list[str]]:
+    """The models by their numbers, and notes on what is left out."""
+    folder = next((name for name in FOLDERS if (root / name).is_dir()), FOLDERS[0])
+    there = (re.fullmatch(r"obj_(\d{6})\.ply", file.name) for file in sorted((root / folder).glob("obj_*.ply")))
+    numbers = dict.fromkeys(int(match[1]) for match in there if match)
+    for frame in frames:
+        for one in frame.gt:
+            if one["obj_id"] not in numbers:
+                name = f"{folder}/obj_{one['obj_id']:06d}.ply"
+                raise StoreError(
+                    f"{root}: expected {name}, a model of image {frame.image} of {frame.scene}; found no such file"
+                )
+    known, found, notes = categories(root, list(numbers)), dict[str, AgainModel](), list[str]()
+    info_file = file_inside(root, f"{folder}/models_info.json")
+    said = load(info_file)
+    for number in numbers:
+        symmetries = _symmetries(said.get(str(number)), f"{info_file}: {number}")
+        if symmetries is not None and symmetries.unlisted():
+            notes.append(f"symmetries of object {number} are left out: some follow from others that are not listed")
+            symmetries = None
+        category, _ = known[number]
+        file = file_inside(root, f"{folder}/obj_{number:06d}.ply")
+        found[str(number)] = AgainModel(
+            file, category.name, supercategory=category.supercategory, unit=1 / MM, symmetries=symmetries
+        )
+    return found, notes
+
+
+def _symmetries(said: Any, where: str) -> Symmetries | None:
+    """What models_info.json says of a model, mm; None where that is nothing. Raises StoreError for what is no symmetry."""
+    facts = cast(Mapping[str, Any], said if isinstance(said, dict) else {})
+    names = ("discrete", "continuous")
+    given = {name: facts[f"symmetries_{name}"] for name in names if facts.get(f"symmetries_{name}")}
+    try:
+        given["discrete"] = [*_moving(given.get("discrete", ()))]
+        made = Symmetries.model_validate(given)
+    except ValidationError as error:
+        raise StoreError(f"{where}: symmetries: {first_of(error)}") from None
+    except (TypeError, ValueError) as error:
+        raise StoreError(f"{where}: symmetries_discrete: expected lists of 16 numbers; found: {error}") from None
+    return None if made == Symmetries() else made
+
+
+def _moving(listed: Any) -> Iterator[list[float]]:
+    """Motions that are not the identity, which some files list, too."""
+    for motion in listed:
+        matrix = np.array(motion, np.float64).reshape(16)
+        if np.abs(matrix - np.eye(4).ravel()).max() > RIGID:
+            yield matrix.tolist()

@@ -1,0 +1,34 @@
+"""COLMAP's cameras, and its mesh where there is one, to be rendered again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewsphere.formats._again import cameras_again, nearest_up, pose_of
+from viewsphere.formats._posed import MISTAKES, camera_of
+from viewsphere.formats.colmap.reading import read_model
+from viewsphere.model.listed import ListedShot
+from viewsphere.store.again import Again, refuse_any
+
+FOLDERS = ("", "sparse/0", "sparse", "dense/0", "dense")
+"""Where COLMAP's programs put meshes, from the folder of the data set."""
+
+
+def again(path: Path) -> Again:
+    """All cameras of a folder with `sparse/0`, or of such a `sparse/0`, text or binary, in the order of their images' names.
+
+    Pictures need not be there. Up is the axis of the world that is nearest to the cameras' mean up. Raises StoreError where
+    there is no model, for an image without its camera, and for a lens that viewsphere does not have.
+    """
+    model = read_model(path)
+    problems: list[str] = []
+    shots: list[ListedShot] = []
+    for image in model.images:
+        try:
+            lens, pose, split = model.view(image)
+            camera_of(lens, pose)
+            shots.append(ListedShot(split=split, image=image.name, world_from_camera=pose_of(pose), camera=lens))
+        except MISTAKES as error:
+            problems.append(f"{model.file}: image {image.name!r:.80}: {error}")
+    refuse_any(problems)
+    return cameras_again(path, tuple(shots), path, FOLDERS, "colmap", nearest_up(shots))

@@ -1,0 +1,46 @@
+"""The cameras of transforms.json, and a mesh where there is one, to be rendered again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from viewsphere.formats._again import cameras_again, pose_of
+from viewsphere.formats._posed import MISTAKES, camera_of, picture_inside
+from viewsphere.formats.nerfstudio.reading import lens_of, pose_said, said_frames, split_of, transforms_files
+from viewsphere.model.listed import ListedShot
+from viewsphere.store.again import Again, refuse_any
+
+FOLDERS = ("", "exports/mesh", "exports/poisson", "exports/tsdf", "exports")
+"""Where nerfstudio's users put meshes, from the folder of transforms.json."""
+
+
+def again(path: Path) -> Again:
+    """All cameras of a world's folder, or of one of its files. Pictures have to be there only where the file does not say w and
+    h. Raises StoreError where there is no such file, and for a frame that lacks its lens or its pose.
+    """
+    problems: list[str] = []
+    shots: dict[str, ListedShot] = {}
+    files = transforms_files(path)
+    for file in files:
+        for number, said, lists in said_frames(file):
+            try:
+                shot = _shot(file, said, lists)
+                shots.setdefault(shot.image or str(len(shots)), shot)
+            except MISTAKES as error:
+                told = f"found no {error}" if isinstance(error, KeyError) else error
+                problems.append(f"{file}: frame number {number}: {told}")
+    refuse_any(problems)
+    return cameras_again(path, tuple(shots.values()), files[0].parent, FOLDERS, "nerfstudio", "+z")
+
+
+def _shot(file: Path, said: Mapping[str, Any], lists: Mapping[str, set[str]]) -> ListedShot:
+    name = str(said["file_path"])
+    if said.get("w") and said.get("h"):
+        size = int(said["w"]), int(said["h"])
+    else:
+        _, size = picture_inside(file.parent, name.removeprefix("./"), ".png", ".jpg")
+    lens, pose = lens_of(said, size), pose_said(said)
+    camera_of(lens, pose)
+    return ListedShot(split=split_of(file, name, lists), image=name, world_from_camera=pose_of(pose), camera=lens)

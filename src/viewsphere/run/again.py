@@ -1,0 +1,72 @@
+"""Recipes that render data sets of others again: a folder with the recipe, its file of shots, and what else it names."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from viewsphere import plugins
+from viewsphere.errors import RecipeError, UserError
+from viewsphere.model.mistakes import one_of
+from viewsphere.run.again_recipe import RECIPE, draft
+from viewsphere.sampling.plan import plan
+from viewsphere.store.again import Again
+
+
+@dataclass(frozen=True)
+class Made:
+    """A recipe that was made: its file, how many shots and models it has, and what is to be said of it."""
+
+    recipe: Path
+    shots: int
+    models: int
+    notes: tuple[str, ...]
+
+
+def formats_again() -> tuple[str, ...]:
+    """Names of the formats whose data sets can be rendered again, sorted."""
+    return tuple(name for name in plugins.names("formats") if hasattr(plugins.load("formats", name), "again"))
+
+
+def make_again(kind: str, source: Path, folder: Path) -> Made:
+    """Make a folder with a recipe that renders a data set again.
+
+    The folder appears when all of it is there and its recipe has been planned. Raises UserError for a format that cannot be
+    rendered again and for a folder that holds something, StoreError for a data set that is broken.
+    """
+    known = formats_again()
+    if kind not in known:
+        raise UserError(f"--from: {one_of(kind, known)}")
+    _check_folder(folder)
+    if not source.exists():
+        raise UserError(f"--from {kind}: expected a data set; found no {source}")
+    found: Again = plugins.load("formats", kind).again(source)
+    try:
+        _make(found, f"{kind} {source}", folder)
+    except OSError as error:
+        raise UserError(f"{folder}: expected a place to write, found: {error.strerror or error}") from None
+    return Made(folder / RECIPE, len(found.shots), len(found.models), found.notes)
+
+
+def _check_folder(folder: Path) -> None:
+    if folder.suffix in {".yaml", ".yml"}:
+        raise UserError(f"{folder}: expected a folder beside --from, which makes several files; found the name of a recipe")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UserError(f"{folder}: expected a new folder, found one that exists: choose another")
+
+
+def _make(found: Again, of: str, folder: Path) -> None:
+    folder.absolute().parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.absolute().parent) as place:
+        made = Path(place) / "made"
+        for name, data in draft(found, of, made):
+            (made / name).parent.mkdir(parents=True, exist_ok=True)
+            (made / name).write_bytes(data)
+        try:
+            plan(str(made / RECIPE))
+        except RecipeError as error:
+            raise RecipeError(str(error).replace(str(made), str(folder))) from None
+        if folder.exists():
+            folder.rmdir()
+        made.rename(folder)

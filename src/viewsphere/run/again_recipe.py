@@ -1,0 +1,192 @@
+"""The files of a recipe that renders a data set again."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import chain, count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere.geometry.rotation import rigid
+from viewsphere.model.file_names import is_reserved
+from viewsphere.model.listed import ListedObject, ListedShot
+from viewsphere.model.scene import IDENTITY
+from viewsphere.recipe.file import dump
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.viewpoints import PoseList
+from viewsphere.run.stand_in import CATEGORY, SOURCE, StandIn, stand_in
+from viewsphere.sampling.models import numbered_specs
+from viewsphere.sampling.pose_files import PoseFile
+from viewsphere.sampling.viewpoints import world_turn
+from viewsphere.store.again import Again, AgainModel, Drafted
+
+RECIPE, SHOTS, MODELS, SIDECARS = "recipe.yaml", "shots.jsonl", "models", "symmetries"
+STAND_IN = "stand-in"
+"""The key, among an `Again`'s models, of what stands where there are none."""
+
+COMMENTS = {
+    "models": "the data set's own, where they lie, with their own axes, origin and unit",
+    "viewpoints": "a line of shots.jsonl each: world_from_camera, metres, and the lens; `up` is the axis there that becomes +Z",
+    "scenes": "each shot shows the models that its line lists, where it has them",
+    "camera": "size and lens, too, are those of each line",
+    "scene": "as plain as possible: only geometry is the data set's; light and background are yours to choose",
+    "splits": "each line says its own; these are their shares",
+}
+NONE_OF_ITS_OWN = (
+    "the data set has no mesh, so this is one of the zoo's, at the point nearest to all optical axes (`origin`, below), about "
+    "half a picture wide: put your own here"
+)
+
+
+def draft(found: Again, of: str, folder: Path) -> Iterator[tuple[str, bytes]]:
+    """The files, by their names from the folder in which they are going to lie, those that the recipe names first: each has to
+    be written before the next is asked for. `of`: what is rendered again, in words.
+    """
+    entries: list[dict[str, Any]] = []
+    sources: dict[str, str] = {}
+    for key, model in found.models.items():
+        if isinstance(model.source, Drafted):
+            yield f"{MODELS}/{model.source.name}", model.source.data
+        sidecar = f"{SIDECARS}/{len(sources) + 1:06d}.yaml" if model.symmetries else None
+        if model.symmetries:
+            yield sidecar or "", dump({"symmetries": model.symmetries.model_dump(mode="json")}).encode()
+        sources[key] = _source(model)
+        entries.append(_entry(model, sources[key], sidecar))
+    substitute = None if found.models else stand_in(found.shots)
+    shots = _shots(found, substitute)
+    data = _recipe(found, _joined(entries), shots, substitute)
+    keys = _keys(data, sources, folder)
+    lines = (json.dumps(_line(shot, keys)) for shot in shots)
+    yield SHOTS, ("\n".join(lines) + "\n").encode()
+    yield RECIPE, _text(data, of, found, substitute).encode()
+
+
+def _source(model: AgainModel) -> str:
+    if isinstance(model.source, Drafted):
+        return f"{MODELS}/{model.source.name}"
+    return Path(os.path.normpath(model.source.absolute())).as_posix()
+
+
+def _entry(model: AgainModel, source: str, sidecar: str | None) -> dict[str, Any]:
+    entry: dict[str, Any] = {"source": [source], "category": model.category or "object"}
+    entry |= {"supercategory": model.supercategory} if model.supercategory else {}
+    entry |= {"name": model.name} if model.name else {}
+    entry |= {"unit": {1.0: "m", 0.001: "mm"}.get(model.unit, model.unit), "up": "+z", "forward": "-y"}
+    return entry | {"centring": "as_is"} | ({"sidecar": sidecar} if sidecar else {})
+
+
+def _joined(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Entries that differ in their files alone as one."""
+    found: dict[str, dict[str, Any]] = {}
+    for entry in entries:
+        rest = json.dumps({name: value for name, value in entry.items() if name != "source"})
+        if rest in found:
+            found[rest]["source"] += entry["source"]
+        else:
+            found[rest] = entry
+    return list(found.values())
+
+
+def _shots(found: Again, substitute: StandIn | None) -> list[ListedShot]:
+    """The shots with free names, and splits as recipes have them; with what stands in, where they have to be listed."""
+    splits, names = dict[str, str](), set[str]()
+    shots: list[ListedShot] = []
+    there: tuple[ListedObject, ...] = ()
+    if substitute is not None and _are_listed(found):
+        turn = world_turn(PoseList(kind="file", path=SHOTS, up=found.up), PoseFile(()))
+        a, b, c = ((x, y, z, w) for x, y, z, w in rigid(turn.T, np.array(substitute.origin))[:3].tolist())
+        there = (ListedObject(model=STAND_IN, world_from_object=(a, b, c, IDENTITY[3])),)
+    for shot in found.shots:
+        split = splits.setdefault(shot.split or "train", _split(shot.split or "train"))
+        name = shot.name and _free(shot.name, names)
+        shots.append(shot.model_copy(update={"name": name, "split": split, "objects": shot.objects or there}))
+    return shots
+
+
+def _are_listed(found: Again) -> bool:
+    """Whether shots differ in what only listed ones may: their pictures' sizes, and the splits that they say."""
+    sizes = {(shot.camera.width, shot.camera.height) for shot in found.shots if shot.camera}
+    return len(sizes) > 1 or len({shot.split for shot in found.shots}) > 1
+
+
+def _split(name: str) -> str:
+    """A split's name as recipes take it."""
+    plain = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:90]
+    return plain if re.match("[A-Za-z]", plain) and not is_reserved(plain) else f"split_{plain}"
+
+
+def _free(name: str, names: set[str]) -> str:
+    """The name, with a number behind it where it is taken."""
+    ways = chain((name,), (f"{name[:90]}-{i}" for i in count(2)))
+    free = next(way for way in ways if way.casefold() not in names)
+    names.add(free.casefold())
+    return free
+
+
+def _recipe(
+    found: Again, entries: list[dict[str, Any]], shots: Sequence[ListedShot], substitute: StandIn | None
+) -> dict[str, Any]:
+    views: dict[str, Any] = {"kind": "file", "path": SHOTS, "up": found.up}
+    if substitute is not None:
+        entries = [{"source": SOURCE, "category": CATEGORY, "count": 1, "scale": {"length": substitute.length}}]
+        views["origin"] = list(substitute.origin)
+    listed = {"scenes": {"sampler": "listed"}} if any(shot.objects for shot in shots) or found.models else {}
+    return {
+        "name": f"{''.join(c for c in found.name if c.isprintable())[:150]}-again".lstrip(),
+        "seed": 0,
+        "models": entries,
+        "viewpoints": views,
+        **listed,
+        "camera": {"of_viewpoints": True},
+        "scene": {"background": "#777777", "ground": "off"},
+        "channels": ["rgb", "depth", "instances"],
+        **({"annotations": list(found.annotations)} if found.annotations else {}),
+        "formats": list(found.formats),
+        "splits": {"by": "frame", **_shares(Counter(shot.split or "" for shot in shots))},
+    }
+
+
+def _shares(counts: Counter[str]) -> dict[str, float]:
+    """The share of each split; they add up to 1."""
+    *others, last = counts
+    found = {name: round(counts[name] / counts.total(), 6) for name in others}
+    return {**found, last: round(1 - sum(found.values()), 6)}
+
+
+def _keys(data: dict[str, Any], sources: dict[str, str], folder: Path) -> dict[str, str]:
+    """The keys, in the recipe, of the models of an `Again`."""
+    specs = numbered_specs(Recipe.model_validate(data, context={"folder": folder}))
+    by_source = {spec.source: spec.key for spec, _ in specs}
+    if not sources:
+        return {STAND_IN: next(iter(by_source.values()))}
+    return {key: by_source[Path(os.path.normpath(folder / source)).as_posix()] for key, source in sources.items()}
+
+
+def _line(shot: ListedShot, keys: dict[str, str]) -> dict[str, Any]:
+    objects = tuple(one.model_copy(update={"model": keys[one.model]}) for one in shot.objects)
+    return shot.model_copy(update={"objects": objects}).model_dump(mode="json", exclude_defaults=True)
+
+
+def _text(data: dict[str, Any], of: str, found: Again, substitute: StandIn | None) -> str:
+    """The recipe, with a comment before each part that has one."""
+    head = [
+        f"Renders a data set again: {of}",
+        "Try it:   viewsphere preview recipe.yaml     then:   viewsphere render recipe.yaml -o dataset",
+        *(f"Note: {note}" for note in found.notes),
+    ]
+    comments = COMMENTS if substitute is None else COMMENTS | {"models": NONE_OF_ITS_OWN}
+    lines = [_comment(head)]
+    for line in dump(data).splitlines():
+        name = line.partition(":")[0]
+        lines.append(("\n" + _comment([comments[name]]) if name in comments else "") + line + "\n")
+    return "".join(lines)
+
+
+def _comment(lines: Sequence[str]) -> str:
+    return "".join(f"# {''.join(c if c.isprintable() else '?' for c in line)}\n" for line in lines)
