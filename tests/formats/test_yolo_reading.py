@@ -125,8 +125,10 @@ def test_coco_has_the_same_pixels(task, tmp_path):
                     assert abs(coco.annToMask(a).sum() - a["area"]) < 0.2 * a["area"] + 6
                 if task == "pose":
                     points = np.reshape(values[4:], (3, 3)) * [*size, 1]
+                    points[points[:, 2] > 0, :2] -= 0.5  # COCO's whole numbers are the centres of pixels
                     close("yolo", "import, pycocotools: points", np.reshape(a["keypoints"], (3, 3)), points, "px", atol=1e-9)
                     assert a["num_keypoints"] == (points[:, 2] > 0).sum()
+                    assert tuple(coco.cats[a["category_id"]]["keypoints"]) == tuple(POINTS["kpt_names"][0])
     assert found == sum(map(len, LINES[task].values()))
 
 

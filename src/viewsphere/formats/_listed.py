@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from viewsphere.errors import StoreError, UserError
+from viewsphere.formats._upright import upright
 from viewsphere.limits import limits
 from viewsphere.model.sample import Sample
 from viewsphere.store import Category
@@ -26,7 +27,9 @@ SPLITS = TRAIN, VAL, TEST = ("train", "val", "test")
 
 @dataclass(frozen=True)
 class Listed:
-    """A picture of a split, its name in the data set, and the files that say what it shows, None for one that is not there."""
+    """A picture of a split, its name in the data set, its size as it is shown, and the files that say what it shows, None for
+    one that is not there.
+    """
 
     split: str
     name: str
@@ -134,4 +137,4 @@ def _digest(pictures: Sequence[Listed], texts: Sequence[str]) -> str:
 
 def _frames(pictures: Sequence[Picture], shown: Callable[[Picture, int], Sample]) -> Iterator[ForeignFrame]:
     for index, picture in enumerate(pictures):
-        yield ForeignFrame(shown(picture, index), {"rgb": picture.file})
+        yield ForeignFrame(shown(picture, index), {"rgb": upright(picture.file, picture.size)})

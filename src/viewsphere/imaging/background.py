@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.srgb import linear
+from viewsphere.codecs.orientation import SWAPPED, orientation
 from viewsphere.errors import RecipeError
 from viewsphere.limits import limits
 from viewsphere.model.scene import Background
@@ -35,8 +36,6 @@ COARSE = 4.0
 
 SMALLEST = 48
 """Pixels a side below which a picture's resolution is not lowered further."""
-
-_ORIENTATION = 0x0112  # EXIF's tag; from 5 on, width and height are swapped
 
 
 def shows_sky(background: Background) -> bool:
@@ -152,10 +151,10 @@ def _head(path: str, stamp: int) -> tuple[Size, int]:
     """Width and height of the upright picture, and EXIF's orientation."""
     with _opened(path) as picture:
         width, height = picture.size
-        orientation = _orientation(picture)
+        turn = orientation(picture)
     if width * height > limits.MAX_PICTURE_PIXELS:
         _too_large(path, f"{width} x {height}")
-    return ((height, width) if orientation >= 5 else (width, height)), orientation
+    return ((height, width) if turn in SWAPPED else (width, height)), turn
 
 
 def _opened(path: str) -> Image:
@@ -171,15 +170,6 @@ def _opened(path: str) -> Image:
         _too_large(path, "many more")
     except (OSError, ValueError, SyntaxError) as error:
         _refuse(path, str(error))
-
-
-def _orientation(picture: Image) -> int:
-    """EXIF's orientation, 1 where there is none that can be read."""
-    try:
-        found = int(picture.getexif().get(_ORIENTATION, 1))
-    except Exception:  # the parser of a damaged block may raise anything
-        return 1
-    return found if 1 <= found <= 8 else 1
 
 
 def _decoded(wanted: _Wanted) -> Image:
@@ -199,7 +189,7 @@ def _decoded(wanted: _Wanted) -> Image:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                orientation, width = _orientation(picture), picture.width
+                turned, width = orientation(picture), picture.width
                 picture.draft(None, (picture.width // wanted.step, picture.height // wanted.step))
                 plain = _opaque(picture, wanted.under)
         except MemoryError:
@@ -208,7 +198,7 @@ def _decoded(wanted: _Wanted) -> Image:
             _refuse(wanted.path, str(error))
     left = wanted.step * plain.width // width
     upright = plain.reduce(left) if left > 1 else plain
-    for turn in turns.get(orientation, ()):
+    for turn in turns.get(turned, ()):
         upright = upright.transpose(turn)
     return upright
 

@@ -73,7 +73,7 @@ def _link_frames(foreign: ForeignDataset, store: Store, record: PlanRecord, list
 
 def _plan_record(foreign: ForeignDataset) -> PlanRecord:
     made = version("viewsphere")
-    recipe = {"name": foreign.name}
+    recipe = {"name": foreign.name, **({"said": dict(foreign.said)} if foreign.said else {})}
     part = Part(
         digest=foreign.digest,
         version=made,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -52,6 +52,8 @@ class ForeignDataset:
     """The result of a format's `read`: facts about the whole data set, and its frames one by one, in order.
 
     Frames are numbered from 0, and `frames` can be called again. `left_out` names the broken entries that were left out.
+    `said`: what the data set says of itself, as COCO has it (`info` of each split, `licenses`, and of categories, by their
+    names, the other keys, such as `keypoints`); JSON that is kept in the plan.
     """
 
     name: str
@@ -65,6 +67,7 @@ class ForeignDataset:
     frames: Callable[[], Iterator[ForeignFrame]]
     models: tuple[ForeignModel, ...] = ()
     left_out: tuple[str, ...] = ()
+    said: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
 def refuse_broken(problems: Sequence[str]) -> None:

@@ -19,7 +19,10 @@ Data sets that were made elsewhere are imported by their folder or by one file: 
 are those of instances files, else of person_keypoints files, else of whatever JSON there is; what image_info files name of
 other splits has none, where its pictures are there. Folders of splits, each with labels.json and `data` (FiftyOne) or
 _annotations.coco.json (Roboflow), are read, too; a file called so, annotations.json (supervision) or coco_annotations.json
-(BlenderProc) alone is `train`. Names of points, which categories have, are not kept.
+(BlenderProc) alone is `train`. A split's `info`, `licenses` and all that categories say (`keypoints`, `skeleton`) are kept,
+and go out again; in a merged data set `info.sources` has what each said, and licences of one id get ids of their own. Pictures
+are turned as their EXIF tag says, and kept as PNG without it, unless the width and height in the file are those of the pixels
+as they are stored.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ from viewsphere.formats._contents import Expected
 from viewsphere.formats._paper import faces, json_bytes, transformation_matrix
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.options import Options
-from viewsphere.formats.coco.points import object_points, point_names
+from viewsphere.formats.coco.points import Names, object_points, point_names
+from viewsphere.formats.coco.said import Licences
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.labels.captions import MOST
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
@@ -45,12 +46,14 @@ class Entries:
     def __init__(self, dataset: Dataset, options: Options) -> None:
         self._dataset, self._options = dataset, options
         self._ids, self._names = category_ids(dataset, options), point_names(dataset)
+        self._licences = Licences(dataset)
 
     def of(self, sample: Sample, masks: Masks) -> Entry:
         """A sample's entry."""
         annotations = tuple(json_bytes(one) for one in self._annotations(sample, masks))
         captions = tuple(map(json_bytes, _captions(sample)))
-        return Entry(sample.split, json_bytes(_image(self._dataset, sample)), annotations, captions)
+        image = self._licences.numbered(_image(self._dataset, sample))
+        return Entry(sample.split, json_bytes(image), annotations, captions)
 
     def _annotations(self, sample: Sample, masks: Masks) -> Iterator[dict[str, Any]]:
         """COCO's annotations of all visible objects, and of imported ones that have a box."""
@@ -61,7 +64,7 @@ class Entries:
                 "category_id": self._ids[o.category_id],
             }
             if o.source is not None and (o.area or o.box2d is not None):
-                yield _foreign_annotation(o, own)
+                yield _foreign_annotation(o, own, self._names)
             elif o.source is None and o.area:
                 outline = _outline(o, masks[o.id], self._options)
                 mask_file = _mask_file(self._dataset, sample, o.id)
@@ -143,10 +146,14 @@ def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
     }
 
 
-def _foreign_annotation(o: ObjectAnnotation, own: Mapping[str, int]) -> dict[str, Any]:
-    """An imported object's own annotation with this export's ids; its mask file, which is not in the store, is not named."""
+def _foreign_annotation(o: ObjectAnnotation, own: Mapping[str, int], names: Names) -> dict[str, Any]:
+    """An imported object's own annotation with this export's ids; its mask file, which is not in the store, is not named. Its
+    points come in the category's order where that has others than when it was imported.
+    """
     source = {k: v for k, v in (o.source or {}).items() if k != "path_mask"}
-    return {"iscrowd": 0, "area": o.area, **source, **own}
+    told = o.more.get("keypoint_names")
+    points = object_points(o, names) if told and tuple(told) != names.get(o.category_id) else {}
+    return {"iscrowd": 0, "area": o.area, **source, **points, **own}
 
 
 def _annotation(sample: Sample, o: ObjectAnnotation, outline: Any, mask_file: str) -> dict[str, Any]:

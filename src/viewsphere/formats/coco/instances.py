@@ -14,6 +14,7 @@ from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.entries import CAPTIONS, Entry
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.points import category_points, has_label, point_names
+from viewsphere.formats.coco.said import Licences, imported_info, imported_info_of_parts
 from viewsphere.store import Dataset
 from viewsphere.store.credits import credited
 
@@ -39,13 +40,14 @@ def instances(dataset: Dataset, folder: Path, options: Options) -> Generator[Cal
     folder.mkdir(exist_ok=True)
     ids = category_ids(dataset, options)
     head = _head(dataset, ids)
-    heads = {"instances": head, **{kind: {key: head[key] for key in ("info", "licenses")} for kind in _captions(dataset)}}
+    kinds = {"instances": head, **{kind: {key: head[key] for key in ("info", "licenses")} for kind in _captions(dataset)}}
     with ExitStack() as stack:
-        files = {
-            (split, kind): stack.enter_context(_written(folder / file_name(split, kind), json_bytes(own)[:-1]))
-            for split in dataset.splits
-            for kind, own in heads.items()
-        }
+        files: dict[tuple[str, str], Callable[[bytes, Iterable[bytes]], None]] = {}
+        for split in dataset.splits:
+            info = imported_info(dataset, split) or head["info"]
+            for kind, own in kinds.items():
+                start = json_bytes({**own, "info": info})[:-1]
+                files[split, kind] = stack.enter_context(_written(folder / file_name(split, kind), start))
 
         def add(entry: Entry) -> None:
             files[entry.split, "instances"](entry.image, entry.annotations)
@@ -78,12 +80,12 @@ def _written(file: Path, head: bytes) -> Generator[Callable[[bytes, Iterable[byt
 def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
     info = {"description": dataset.name, "version": "1.0", "contributor": f"viewsphere {dataset.plan.version}"}
     licenses, credits = _terms(dataset)
-    names = point_names(dataset)
+    names, sources = point_names(dataset), imported_info_of_parts(dataset)
     return {
-        "info": {**info, "credits": credits} if credits else info,
+        "info": {**info, **({"sources": sources} if sources else {}), **({"credits": credits} if credits else {})},
         "licenses": licenses,
         "categories": [
-            {"id": ids[c.id], "name": c.name, "supercategory": c.supercategory, **category_points(dataset, c.id, names)}
+            {"id": ids[c.id], "name": c.name, "supercategory": c.supercategory, **category_points(dataset, c, names)}
             for c in dataset.categories
         ],
         "models": vehicles(dataset.models),
@@ -91,12 +93,11 @@ def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
 
 
 def _terms(dataset: Dataset) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """The list of licences, ids from 1; and whose the models are, each with its licence's id."""
+    """The list of licences, imported ones first; and whose the models are, each with its licence's id."""
     groups = {credit: keys for credit, keys in credited(dataset.models).items() if credit}
-    names = dict.fromkeys(credit.licence for credit in groups if credit.licence)
-    ids = {name: number for number, name in enumerate(names, 1)}
-    credits = [
-        {"models": keys, **credit.model_dump(exclude_none=True), **({"license": ids[credit.licence]} if credit.licence else {})}
-        for credit, keys in groups.items()
-    ]
-    return [{"id": ids[name], "name": name, "url": name if name.startswith("http") else ""} for name in ids], credits
+    licences, credits = Licences(dataset), list[dict[str, Any]]()
+    for credit, keys in groups.items():
+        name = credit.licence
+        number = {"license": licences.add({"name": name, "url": name if name.startswith("http") else ""})} if name else {}
+        credits.append({"models": keys, **credit.model_dump(exclude_none=True), **number})
+    return licences.listed, credits

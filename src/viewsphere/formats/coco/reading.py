@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,9 +13,11 @@ from typing import Any, cast
 
 import numpy as np
 
-from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
+from viewsphere.formats._upright import shown_size, upright
 from viewsphere.formats.coco.places import annotation_files, picture_file
+from viewsphere.formats.coco.points import KEYPOINTS, named_points
+from viewsphere.formats.coco.said import licences_by_id, licensed, said
 from viewsphere.geometry.mask import rle_of_polygons, rle_of_runs, rle_runs
 from viewsphere.model.sample import Box, Sample
 from viewsphere.store import Category
@@ -29,6 +31,9 @@ LARGEST_CATEGORY = 2**31
 LARGEST_NUMBER = 2**53
 MOST_IMAGES_BESIDE = 10
 """Largest distance of a polygon's corner from the image, in image sizes."""
+
+HEAD = ("info", "licenses", "categories")
+"""What a file says of itself."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
@@ -63,6 +68,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
         max_objects=max(1, *(len(found) for part in parts for found in part.annotations.values()), 1),
         frames=partial(_frames, parts),
         left_out=tuple(problems),
+        said=said((part.split, part.head) for part in parts),
     )
 
 
@@ -78,10 +84,11 @@ def _digest(files: Sequence[tuple[str, Path]], left_out: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class _Split:
-    """One instances file: its valid entries, and the problems of the others."""
+    """One instances file: its valid entries, and the problems of the others. `head`: what it says of itself."""
 
     split: str
     file: Path
+    head: dict[str, Any]
     categories: dict[int, Category]
     images: tuple[tuple[dict[str, Any], Path], ...]
     annotations: dict[int, list[dict[str, Any]]]
@@ -95,8 +102,13 @@ def _read_split(split: str, file: Path, root: Path) -> _Split:
         raise StoreError(f"{file}: expected COCO's JSON; found: {error}") from None
     if not isinstance(data, dict) or not all(isinstance(data.get(k), list) for k in ("images", "annotations", "categories")):
         raise StoreError(f"{file}: expected lists of images, annotations and categories; found something else")
-    lists = cast(dict[str, list[Any]], data)
+    lists, head = cast(dict[str, list[Any]], data), {key: data[key] for key in HEAD if key in data}
     problems: list[str] = []
+    try:
+        json.dumps(head, allow_nan=False)
+    except ValueError:
+        problems.append(f"{file}: expected finite numbers in {', '.join(HEAD)}; found NaN or infinity")
+        head = {}
     categories = {
         c["id"]: Category(c["id"], str(c["name"]), str(c.get("supercategory") or ""))
         for c in _with_ids(lists["categories"], "category", file, problems, LARGEST_CATEGORY)
@@ -114,15 +126,16 @@ def _read_split(split: str, file: Path, root: Path) -> _Split:
         else:
             images.append(({**image, "width": int(image["width"]), "height": int(image["height"])}, place))
     sizes = {image["id"]: (image["width"], image["height"]) for image, _ in images}
+    points = _points(head)
     known = {image["id"] for image in lists["images"] if isinstance(image, dict) and _is_id(image.get("id"))}
     annotations: defaultdict[int, list[dict[str, Any]]] = defaultdict(list)
     for annotation in _with_ids(lists["annotations"], "annotation", file, problems):
-        problem = _annotation_problem(annotation, categories, known, sizes)
+        problem = _annotation_problem(annotation, categories, known, sizes) or _points_problem(annotation, points)
         if problem:
             problems.append(f"{file}: annotation {annotation['id']}: {problem}")
         elif annotation["image_id"] in sizes:
             annotations[annotation["image_id"]].append(annotation)
-    return _Split(split, file, categories, tuple(images), annotations, tuple(problems))
+    return _Split(split, file, head, categories, tuple(images), annotations, tuple(problems))
 
 
 def _is_id(value: object, largest: int = LARGEST_ID) -> bool:
@@ -149,16 +162,15 @@ def _image_problem(image: dict[str, Any], place: Path | None) -> str | None:
     if place is None:
         return f"expected its file below the folder; found no {image.get('file_name')!r}"
     try:
-        with opened(place) as picture:
-            size = picture.size
+        size = shown_size(place, (image.get("width"), image.get("height")))
     except (OSError, ValueError, SyntaxError, UserError) as error:
         return f"expected a readable image; found: {error}"
-    said = image.get("width"), image.get("height")
+    told = image.get("width"), image.get("height")
     try:
         json.dumps(image, allow_nan=False)
     except ValueError:
         return "expected finite numbers; found NaN or infinity"
-    return None if size == said else f"expected {place.name} of {said[0]} x {said[1]} pixels; found {size[0]} x {size[1]}"
+    return None if size == told else f"expected {place.name} of {told[0]} x {told[1]} pixels; found {size[0]} x {size[1]}"
 
 
 def _annotation_problem(
@@ -186,6 +198,21 @@ def _annotation_problem(
         except Exception as error:  # pycocotools' C code raises errors of many kinds
             return f"expected a segmentation of COCO; found {outline!r:.60} ({error})"
     return None
+
+
+def _points(head: dict[str, Any]) -> dict[int, tuple[str, ...]]:
+    """Names of the points of each category that has any."""
+    named = said([("", head)]).get("categories", {})
+    categories = (c for c in head.get("categories", ()) if isinstance(c, dict) and _is_id(c.get("id")))
+    points = {c["id"]: named.get(str(c.get("name")), {}).get(KEYPOINTS) for c in categories}
+    return {number: tuple(names) for number, names in points.items() if names}
+
+
+def _points_problem(annotation: dict[str, Any], points: dict[int, tuple[str, ...]]) -> str | None:
+    found, names = annotation.get(KEYPOINTS), points.get(annotation["category_id"])
+    if names is None or found is None or _are_numbers(found, 3 * len(names)):
+        return None
+    return f"expected keypoints [x, y, v, ...] of the category's {len(names)} points; found {found!r:.60}"
 
 
 def _are_numbers(value: Any, count: int | None) -> bool:
@@ -233,12 +260,14 @@ def _clashes(parts: Sequence[_Split]) -> Iterator[str]:
 def _frames(parts: Sequence[_Split]) -> Iterator[ForeignFrame]:
     index = 0
     for part in parts:
+        points, licences = _points(part.head), licences_by_id(part.head)
         for image, file in part.images:
-            yield ForeignFrame(_sample(part, image, index), {"rgb": file})
+            sample = _sample(part, points, licensed(image, licences), index)
+            yield ForeignFrame(sample, {"rgb": upright(file, (sample.width, sample.height))})
             index += 1
 
 
-def _sample(part: _Split, image: dict[str, Any], index: int) -> Sample:
+def _sample(part: _Split, points: Mapping[int, tuple[str, ...]], image: dict[str, Any], index: int) -> Sample:
     size = image["width"], image["height"]
     objects = tuple(
         foreign_object(
@@ -248,11 +277,17 @@ def _sample(part: _Split, image: dict[str, Any], index: int) -> Sample:
             source,
             _rle(source.get("segmentation"), size),
             _corners(source),
+            **_more(points.get(source["category_id"]), source),
         )
         for number, source in enumerate(part.annotations.get(image["id"], ()), 1)
     )
-    said = {name: value for name, value in image.items() if name not in {"id", "width", "height"}}
-    return Sample(index, part.split, None, None, objects, {}, {}, size, said)
+    told = {name: value for name, value in image.items() if name not in {"id", "width", "height"}}
+    return Sample(index, part.split, None, None, objects, {}, {}, size, told)
+
+
+def _more(names: tuple[str, ...] | None, source: dict[str, Any]) -> dict[str, Any]:
+    """The label of an annotation's points, if it has any."""
+    return {"more": named_points(names, source[KEYPOINTS])} if names and source.get(KEYPOINTS) else {}
 
 
 def _corners(source: dict[str, Any]) -> Box | None:

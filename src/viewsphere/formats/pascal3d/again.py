@@ -73,7 +73,7 @@ def again(path: Path) -> Again:
                 for i, group in enumerate(groups)
             ]
         except MISTAKES as error:
-            problems.append(f"{file}: expected a record of PASCAL3D+; {one_line(error)}")
+            problems.append(f"{file}: {one_line(error)}")
     refuse_any(problems)
     found = tuple(shot for one in shots.values() for shot in one)
     if not found:

@@ -81,7 +81,10 @@ def structs_of(value: Any, what: str) -> Struct:
 
 def read_record(file: Path) -> Record:
     """A picture's record; raises ValueError where there is none, or where it has too many objects."""
-    rows = structs_of(variables(file).get("record"), "a struct `record`")
+    found = variables(file)
+    if "record" not in found:
+        raise ValueError("expected a struct `record`; found none")
+    rows = structs_of(found["record"], "a struct `record`")
     if len(rows) != 1:
         raise ValueError(f"expected one struct `record`; found {len(rows)}")
     said = structs_of(rows[0].get("objects", np.zeros(0)), "a struct array `record.objects`")

@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError
 from viewsphere.formats._listed import MISTAKES, SUFFIXES, TRAIN, Listed, check_bytes, listed_dataset, lists, one_line, unposed
+from viewsphere.formats._upright import shown_size
 from viewsphere.formats.voc.maps import boxes_of, check_map, numbered, numbers_of, unannotated
 from viewsphere.formats.voc.writing import BOX
 from viewsphere.geometry.mask import encode_rle, mask_polygons, rle_of_polygons
@@ -163,12 +163,12 @@ def _picture(kit: _Kit, split: str, name: str) -> Listed:
     if path is None:
         raise StoreError(f"expected a picture {paths[0]}; found no such file")
     file, maps = file_inside(root, path), [file_inside(root, f"Segmentation{kind}/{name}.png") for kind in MAPS]
-    with opened(file) as found:
-        size = found.size
+    said = (0, 0)
     if xml.is_file():
         said = tuple(int(float(_parsed(xml).findtext(f"size/{key}") or 0)) for key in ("width", "height"))
-        if all(said) and said != size:
-            raise StoreError(f"expected {said[0]} x {said[1]} pixels, as {xml.name} says; found {size[0]} x {size[1]}")
+    size = shown_size(file, said)
+    if all(said) and said != size:
+        raise StoreError(f"expected {said[0]} x {said[1]} pixels, as {xml.name} says; found {size[0]} x {size[1]}")
     there = tuple(one if one.is_file() else None for one in (xml, *maps))
     for one in filter(None, there[1:]):
         check_map(one, size)

@@ -112,7 +112,7 @@ def coco_of(row: Row, size: tuple[int, int]) -> dict[str, Any]:
     x, y, width, height = (share * side for share, side in zip(row.box, size * 2, strict=True))
     said: dict[str, Any] = {"bbox": [x - width / 2, y - height / 2, width, height], "area": width * height}
     if row.points is not None:
-        places = np.where(row.points[:, 2:] > 0, row.points[:, :2] * size, 0.0)
+        places = np.where(row.points[:, 2:] > 0, row.points[:, :2] * size - 0.5, 0.0)  # of pixels' centres, as in COCO
         marked = zip(places.tolist(), row.points[:, 2].tolist(), strict=True)
         said["keypoints"] = [number for (x, y), seen in marked for number in (x, y, int(seen))]
         said["num_keypoints"] = int((row.points[:, 2] > 0).sum())

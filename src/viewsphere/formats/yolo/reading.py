@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, cast
@@ -12,9 +13,9 @@ from typing import Any, cast
 import numpy as np
 import yaml
 
-from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError
 from viewsphere.formats._listed import MISTAKES, Listed, listed_dataset, one_line, text_of, unposed
+from viewsphere.formats._upright import shown_size
 from viewsphere.formats.yolo.describing import DARKNET, NAMES, darknet, unsaid
 from viewsphere.formats.yolo.lines import Kind, Row, coco_of, kind_of, parsed_line
 from viewsphere.geometry.mask import rle_of_polygons
@@ -47,7 +48,9 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     for picture in pictures:
         most = max(most, sum(1 for _ in _rows(picture, kind, len(categories), problems)))
     also = hashlib.sha256(file.read_bytes()).hexdigest()
-    return listed_dataset(file, pictures, categories, most, partial(_shown, categories, kind), problems, keep_going, also=also)
+    found = listed_dataset(file, pictures, categories, most, partial(_shown, categories, kind), problems, keep_going, also=also)
+    named = {"keypoints": list(kind.names), "skeleton": list[Any]()}
+    return replace(found, said={"categories": {one.name: named for one in categories}}) if kind.names else found
 
 
 def _described(path: Path) -> Path:
@@ -165,9 +168,7 @@ def _labels_of(picture: str) -> str:
 def _picture(root: Path, split: str, name: str, file: Path, problems: list[str]) -> Listed | None:
     try:
         place, labels = file_inside(root, name), file_inside(root, _labels_of(name))
-        with opened(place) as found:
-            size = found.size
-        return Listed(split, name, place, size, (labels if labels.is_file() else None,))
+        return Listed(split, name, place, shown_size(place), (labels if labels.is_file() else None,))
     except MISTAKES as error:
         problems.append(f"{file}: {split}: expected a picture that can be read; found {name}: {one_line(error)}")
         return None
