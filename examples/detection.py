@@ -56,6 +56,9 @@ SPARE = 1.1
 BLOCKS, WIDTHS, CHANNELS, CONVOLUTIONS = (1, 1, 1, 1), (128, 256, 512), 128, 2
 """Of the network: residual blocks of each stage, channels of the three last ones, channels and convolutions of the head."""
 
+LEAST_SCORE = 0.05
+"""What is found with less is left out."""
+
 BATCH, RATE, DECAY, WARM_UP, LARGEST_GRADIENT = 16, 1e-3, 0.05, 0.1, 5.0
 """Pictures in a step, its highest rate, weight decay, share of the steps before that rate, and where gradients are clipped."""
 
@@ -125,7 +128,8 @@ def detector(categories: int) -> FCOS:
     features = BackboneWithFPN(body, levels, list(WIDTHS), CHANNELS)
     anchors = AnchorGenerator(((8,), (16,), (32,), (64,)), ((1.0,),) * (len(WIDTHS) + 1))
     head = FCOSHead(CHANNELS, 1, categories + 1, CONVOLUTIONS)
-    return FCOS(features, categories + 1, min_size=SIZE[1], max_size=SIZE[0], anchor_generator=anchors, head=head)
+    options = {"min_size": SIZE[1], "max_size": SIZE[0], "score_thresh": LEAST_SCORE}
+    return FCOS(features, categories + 1, anchor_generator=anchors, head=head, **options)
 
 
 def augmentation() -> v2.Compose:
