@@ -1,7 +1,7 @@
 """A detector is trained from scratch on rendered pictures, and judged on models it never saw: the more pictures, the better.
 
     pip install viewsphere torch torchvision
-    python examples/detection.py OUT [--sizes 100 300 1000] [--steps 800]
+    python examples/detection.py OUT [--sizes 100 300 1000] [--steps 1500]
 
 1. Cars, chairs, bicycles and boats of the zoo are rendered in random scenes. One in five models is held out, and the scenes of
    these are the test: no picture to train on shows any of them.
@@ -20,6 +20,7 @@ import io
 import itertools
 import json
 import math
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -147,8 +148,8 @@ def augmentation() -> v2.Compose:
     )
 
 
-def batches(count: int) -> Iterator[torch.Tensor]:
-    """The numbers of the pictures of each step, (BATCH,): all in random order, then all in another."""
+def batches(count: int) -> Iterator[list[int]]:
+    """The numbers of the pictures of each step, BATCH of them: all in random order, then all in another."""
     endless = itertools.chain.from_iterable(torch.randperm(count).tolist() for _ in itertools.count())
     return iter(lambda: list(itertools.islice(endless, BATCH)), None)
 
@@ -201,11 +202,10 @@ def learning_curve(coco: Path, sizes: list[int], steps: int) -> dict[str, Any]:
         begun = time.perf_counter()
         model = trained(seen[:size], true[:size], len(train.cats), steps)
         curve.append({"pictures": size, **judged(model, unseen, test), "seconds": round(time.perf_counter() - begun)})
+        print(curve[-1], file=sys.stderr, flush=True)
     return {
         "test_pictures": len(unseen),
-        "models": {
-            split: sorted({a["id_model"] for a in of.anns.values()}) for split, of in (("train", train), ("test", test))
-        },
+        "models": {"train": models_in(train), "test": models_in(test)},
         "curve": curve,
     }
 
@@ -215,7 +215,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("out", type=Path)
     options.add_argument("--sizes", type=int, nargs="+", default=[100, 300, 1000])
-    options.add_argument("--steps", type=int, default=800)
+    options.add_argument("--steps", type=int, default=1500)
     options.add_argument("--models", type=int, default=30)
     asked = options.parse_args()
     begun = time.perf_counter()
