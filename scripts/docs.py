@@ -307,7 +307,8 @@ def by_reader(proofs: list[dict[str, Any]]) -> Iterator[str]:
     read: dict[str, dict[str, str]] = {}
     for proof in proofs:
         reader, is_named, what = proof["against"].partition(": ")
-        read.setdefault(reader if is_named else "tests", {})[what or reader] = error_of(proof) if proof["error"] else "equal"
+        by = f"{reader} {proof['version']}" if "version" in proof else reader
+        read.setdefault(by if is_named else "tests", {})[what or reader] = error_of(proof) if proof["error"] else "equal"
     for reader, errors in read.items():
         same = {error: ", ".join(what for what in errors if errors[what] == error) for error in errors.values()}
         yield f"*{reader}*: {'; '.join(f'{what} {error}' for error, what in same.items())}"

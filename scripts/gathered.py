@@ -35,10 +35,14 @@ def gathered(folder: str, pythons: Iterable[str] = (sys.executable,), *, slow: b
 def largest(noted: Path) -> Proofs:
     """The largest differences in a file that tests wrote."""
     errors: dict[tuple[str, str, str, str], float] = {}
+    versions: dict[str, str] = {}
     for line in map(json.loads, noted.read_text("utf-8").splitlines()):
         key = line["label"], line["against"], line["unit"], line["test"]
         errors[key] = max(errors.get(key, 0.0), line["error"])
+        versions.setdefault(line["against"], line["version"])
     found: Proofs = {}
     for (label, against, unit, test), error in sorted(errors.items()):
-        found.setdefault(label, []).append({"against": against, "error": float(f"{error:.2g}"), "unit": unit, "test": test})
+        by = {"version": versions[against]} if versions[against] else {}
+        told = {"against": against, **by, "error": float(f"{error:.2g}"), "unit": unit, "test": test}
+        found.setdefault(label, []).append(told)
     return found

@@ -6,12 +6,18 @@ from __future__ import annotations
 
 import json
 import os
+import re
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 
 VARIABLE = "VIEWSPHERE_PROVEN"
 """Names the file to which differences are appended, a line of JSON each; without it nothing is written."""
+
+DISTRIBUTIONS = {"OpenCV": "opencv-python-headless", "PIL": "pillow", "cv2.FileStorage": "opencv-python-headless"}
+"""Of programs that are called otherwise."""
 
 
 def close(label, against, found, expected, unit="", *, atol=0.0, rtol=0.0):
@@ -36,5 +42,14 @@ def told(label, against, error, unit=""):
     if file and len(errors := errors[np.isfinite(errors)]):
         test = os.environ["PYTEST_CURRENT_TEST"].partition("::")[0]
         line = {"label": label, "against": against, "error": float(errors.max()), "unit": unit, "test": test}
+        line["version"] = version_of(against)
         with Path(file).open("a", encoding="utf-8") as out:
             out.write(json.dumps(line) + "\n")
+
+
+def version_of(against):
+    """The version of the first program that `against`, up to its colon, names; empty where none has one."""
+    for word in re.split(r"[ ,]+", against.partition(":")[0]):
+        with suppress(PackageNotFoundError, ValueError):
+            return version(DISTRIBUTIONS.get(word, word))
+    return ""

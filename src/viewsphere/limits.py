@@ -74,6 +74,7 @@ class Limits:
     MAX_RIG_BYTES = Limit(1_000_000, "bytes of a rig's calibration")
     MAX_STORED_PIXELS = Limit(1 << 28, "pixels of a picture or map of a data set, also of an imported one")
     MAX_ANNOTATION_BYTES = Limit(1 << 26, "bytes of a file of annotations of a data set that is imported, unpacked")
+    MAX_MAT_ARRAYS = Limit(1_000_000, "arrays of a MATLAB file of a data set that is imported")
     MAX_IMPORTED_OBJECTS = Limit(10_000, "objects of an imported picture")
     MAX_VOXELS = Limit(100_000_000, "cells of the grid of a label voxels; 1 GB while it is computed")
     MAX_FETCHED_BYTES = Limit(10 << 30, "bytes of the folder of a recipe at a URL, which is copied to this machine")

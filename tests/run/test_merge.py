@@ -208,3 +208,13 @@ def test_scenery_goes_along(tmp_path):
     assert report.ok, report.findings
     assert report.checked["surface"] == 4
     assert not any("surface" in note for note in report.notes)
+
+
+def test_names_that_sentences_tell_are_not_respelled(tmp_path):
+    for name, spelled in (("a", "bin"), ("b", "Bin")):
+        generate(
+            recipe(name=name, models=[{**BIN, "category": spelled}], annotations=["captions"], formats=[]), tmp_path / name
+        )
+    with pytest.raises(UserError, match=r"expected category 'bin', spelled as in a data set before it, .*; found 'Bin'"):
+        merge([tmp_path / "a", tmp_path / "b"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()

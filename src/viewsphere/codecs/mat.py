@@ -9,10 +9,12 @@ import math
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
+from viewsphere.limits import limits
 
 HEAD, TAG = 128, 8
 DTYPES = {
@@ -22,10 +24,7 @@ MATRIX, COMPRESSED, UTF8 = 14, 15, 16
 CELL, STRUCT, CHAR, FIRST_NUMBER, LAST_NUMBER = 1, 2, 4, 6, 15
 COMPLEX = 0x0800
 DEEPEST = 16
-"""Arrays within one another."""
-
-MOST = 1_000_000
-"""Arrays of a file."""
+"""Arrays within one another: each takes several calls of Python's stack."""
 
 Struct = list[dict[str, Any]]
 """A struct array, column by column."""
@@ -36,7 +35,7 @@ class _Reader:
     """The elements of some bytes, and how many arrays may still come."""
 
     order: str
-    left: int = MOST
+    left: int = field(default_factory=lambda: limits.MAX_MAT_ARRAYS)
 
     def elements(self, data: memoryview) -> Iterator[tuple[int, memoryview]]:
         """The types and the bytes of all elements, one after another."""
@@ -56,8 +55,9 @@ class _Reader:
     def array(self, data: memoryview, depth: int) -> tuple[str, Any]:
         """An array's name and value."""
         self.left -= 1
-        if self.left < 0 or depth > DEEPEST:
-            raise ValueError(f"found more than {MOST:,} arrays, or more than {DEEPEST} within one another")
+        self._check(0)
+        if depth > DEEPEST:
+            raise ValueError(f"expected at most {DEEPEST} arrays within one another; found more")
         if not len(data):
             return "", np.zeros((0, 0))
         parts = self.elements(data)
@@ -75,6 +75,11 @@ class _Reader:
             raise ValueError(f"found an array of class {kind}, which is not read")
         return name, self._text(parts, shape) if kind == CHAR else _shaped(self._next(parts), shape)
 
+    def _check(self, count: int) -> None:
+        """Raise ValueError where so many more arrays are too many."""
+        if count > self.left:
+            raise ValueError(f"expected at most {limits.MAX_MAT_ARRAYS:,} arrays (limit MAX_MAT_ARRAYS); found more")
+
     def _next(self, parts: Iterator[tuple[int, memoryview]]) -> Any:
         """The numbers of the next element."""
         kind, data = next(parts, (0, memoryview(b"")))
@@ -87,8 +92,7 @@ class _Reader:
 
     def _arrays(self, parts: Iterator[tuple[int, memoryview]], count: int, depth: int) -> list[Any]:
         """The values of the next arrays."""
-        if count > self.left:
-            raise ValueError(f"found more than {MOST:,} arrays")
+        self._check(count)
         found: list[Any] = []
         for _ in range(count):
             kind, data = next(parts, (0, memoryview(b"")))

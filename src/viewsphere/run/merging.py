@@ -25,6 +25,9 @@ from viewsphere.store.index import length
 from viewsphere.store.linking import link_model, link_shot
 from viewsphere.store.paths import files_inside
 
+SENTENCES = {"captions", "referring"}
+"""Labels that tell categories' names."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Source:
@@ -160,7 +163,12 @@ def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tupl
     for number, dataset in enumerate(datasets):
         joined: dict[int, Category] = {}
         for category in dataset.categories:
-            joined[category.id] = _joined(categories, category, {c.id for c in joined.values()})
+            new = joined[category.id] = _joined(categories, category, {c.id for c in joined.values()})
+            if new.name != category.name and _tells_names(dataset):
+                raise UserError(
+                    f"{dataset.root}: expected category {new.name!r}, spelled as in a data set before it, as captions tell its "
+                    f"name; found {category.name!r}: render one of them anew with the other's spelling"
+                )
         for info in dataset.models:
             if info.category_id not in joined:
                 raise StoreError(f"{dataset.root}: model {info.key}: expected a category of the plan, found {info.category_id}")
@@ -172,6 +180,11 @@ def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tupl
         frames += len(dataset)
         poses += dataset.plan.poses
     return tuple(sorted(categories.values(), key=lambda c: c.id)), tuple(contents), tuple(sources)
+
+
+def _tells_names(dataset: Dataset) -> bool:
+    """Whether the data set has sentences about its objects."""
+    return any(SENTENCES & set(part.recipe.get("annotations") or ()) for part in dataset.plan.parts)
 
 
 def _free(name: str, taken: set[str]) -> str:
