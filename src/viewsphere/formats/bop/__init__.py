@@ -31,8 +31,9 @@ canvas of three times the picture's width and height, and boxes in scene_gt_info
 are exact. bbox_obj of an object that reaches out of the picture may be a pixel off; where it reaches behind the camera, it is
 the box of what lies in the picture. bop_toolkit's readers of masks fail at pictures without objects.
 
-Trees of scenes are imported, others' too, with what of this they have; models are not, and an import that is exported again has
-its objects' numbers, and an empty models_info.json.
+Trees of scenes are imported, others' too, with what of this they have, and with their models, from the first of `models`,
+`models_cad`, `models_reconst`, `models_eval` and `models_fine` that is there. Objects that are exported again have numbers from
+1 on in the order of their models, those without a model their own.
 
 Lost: looks and parts of models (PLY files have no colours), categories but for dataset_info.json, names of sensors and
 sequences, times. Models that deform are refused. There is no models_eval: the toolkit's remesh script makes it.

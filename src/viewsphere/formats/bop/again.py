@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
-from pydantic import ValidationError
 
 from viewsphere.errors import StoreError
 from viewsphere.formats._again import pose_of
+from viewsphere.formats.bop.cads import model_files, model_folder, symmetries_of
 from viewsphere.formats.bop.entries import MM
 from viewsphere.formats.bop.pixels import Shift, fit, shifted
-from viewsphere.formats.bop.reading import MISTAKES, Frame, categories, load, object_pose, scene_frames
+from viewsphere.formats.bop.reading import MISTAKES, Frame, categories, object_pose, scene_frames
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.listed import ListedObject, ListedShot
-from viewsphere.model.mistakes import first_of
-from viewsphere.model.symmetries import RIGID, Symmetries
 from viewsphere.store.again import Again, AgainModel, refuse_any
-from viewsphere.store.paths import file_inside
-
-FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
-"""Where data sets have their models; the first that is there counts."""
 
 SHIFTED = (
     "{differs:.2%} of the pixels of this data set's masks differ from its models' with cx {x:+g} and cy {y:+g}, as lenses here "
@@ -86,50 +78,22 @@ def _shot(root: Path, frame: Frame, shift: Shift) -> ListedShot:
 
 def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, AgainModel], list[str]]:
     """The models by their numbers, and notes on what is left out."""
-    folder = next((name for name in FOLDERS if (root / name).is_dir()), FOLDERS[0])
-    there = (re.fullmatch(r"obj_(\d{6})\.ply", file.name) for file in sorted((root / folder).glob("obj_*.ply")))
-    numbers = dict.fromkeys(int(match[1]) for match in there if match)
+    files = model_files(root)
     for frame in frames:
         for one in frame.gt:
-            if one["obj_id"] not in numbers:
-                name = f"{folder}/obj_{one['obj_id']:06d}.ply"
+            if one["obj_id"] not in files:
+                name = f"{model_folder(root)}/obj_{one['obj_id']:06d}.ply"
                 raise StoreError(
                     f"{root}: expected {name}, a model of image {frame.image} of {frame.scene}; found no such file"
                 )
-    known, found, notes = categories(root, list(numbers)), dict[str, AgainModel](), list[str]()
-    info_file = file_inside(root, f"{folder}/models_info.json")
-    said = load(info_file)
-    for number in numbers:
-        symmetries = _symmetries(said.get(str(number)), f"{info_file}: {number}")
+    known, found, notes, said = categories(root, list(files)), dict[str, AgainModel](), list[str](), symmetries_of(root)
+    for number, file in files.items():
+        symmetries = said.get(number)
         if symmetries is not None and symmetries.unlisted():
             notes.append(f"symmetries of object {number} are left out: some follow from others that are not listed")
             symmetries = None
         category, _ = known[number]
-        file = file_inside(root, f"{folder}/obj_{number:06d}.ply")
         found[str(number)] = AgainModel(
             file, category.name, supercategory=category.supercategory, unit=1 / MM, symmetries=symmetries
         )
     return found, notes
-
-
-def _symmetries(said: Any, where: str) -> Symmetries | None:
-    """What models_info.json says of a model, mm; None where that is nothing. Raises StoreError for what is no symmetry."""
-    facts = cast(Mapping[str, Any], said if isinstance(said, dict) else {})
-    names = ("discrete", "continuous")
-    given = {name: facts[f"symmetries_{name}"] for name in names if facts.get(f"symmetries_{name}")}
-    try:
-        given["discrete"] = [*_moving(given.get("discrete", ()))]
-        made = Symmetries.model_validate(given)
-    except ValidationError as error:
-        raise StoreError(f"{where}: symmetries: {first_of(error)}") from None
-    except (TypeError, ValueError) as error:
-        raise StoreError(f"{where}: symmetries_discrete: expected lists of 16 numbers; found: {error}") from None
-    return None if made == Symmetries() else made
-
-
-def _moving(listed: Any) -> Iterator[list[float]]:
-    """Motions that are not the identity, which some files list, too."""
-    for motion in listed:
-        matrix = np.array(motion, np.float64).reshape(16)
-        if np.abs(matrix - np.eye(4).ravel()).max() > RIGID:
-            yield matrix.tolist()

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from viewsphere.assets.cache import load_normalised
 from viewsphere.codecs.size import opened
 from viewsphere.formats._again import pose_of
+from viewsphere.formats.bop.cads import model_spec
 from viewsphere.formats.bop.reading import Frame, object_pose
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.store.again import AgainModel
 from viewsphere.store.paths import file_inside
@@ -104,17 +104,9 @@ def _mask(frame: Frame, n: int) -> NDArray[np.bool_]:
 
 
 def _silhouette(frame: Frame, n: int, models: Mapping[str, AgainModel], shift: Shift) -> NDArray[np.bool_]:
-    model = models[str(frame.gt[n]["obj_id"])]
-    spec = ModelSpec(
-        key="model",
-        source=str(model.source),
-        category="object",
-        category_id=1,
-        up="+z",
-        forward="-y",
-        unit=model.unit,
-        centring="as_is",
-    )
+    file = models[str(frame.gt[n]["obj_id"])].source
+    assert isinstance(file, Path)
+    spec = model_spec(file)
     thing = Thing(id=1, model=spec, motion=Motion.still(pose_of(object_pose(frame.gt[n]))))
     geometry = build_geometry((thing,), (load_normalised(spec),), False, 0.01)
     return rasterize(geometry, Camera(shifted(frame.camera.intrinsics, shift), np.eye(3), np.zeros(3))).triangle >= 0

@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
+from viewsphere.formats._placed import placed
+from viewsphere.formats.bop.cads import foreign_models, model_files
 from viewsphere.formats.bop.entries import MM, NO_BOX
+from viewsphere.formats.bop.texts import load
 from viewsphere.geometry.box import clip_to_image
 from viewsphere.geometry.mask import encode_rle, rle_area, rle_box
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid
@@ -25,7 +28,6 @@ from viewsphere.model.sample import Rle, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, Loaded, foreign_object, refuse_broken
 from viewsphere.store.paths import file_inside, is_name
-from viewsphere.store.texts import parsed
 
 PICTURES = ("rgb/{:06d}.png", "rgb/{:06d}.jpg", "gray/{:06d}.png", "gray/{:06d}.tif")
 MOST_DIGITS = 9
@@ -33,6 +35,9 @@ MOST_DIGITS = 9
 
 MOST_OBJECTS = 10**6
 """Numbers of objects, which have six digits."""
+
+UNKNOWN = np.full((8, 3), np.nan)
+"""The box of an object without a model."""
 
 MISTAKES = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, OSError, SyntaxError, UserError)
 """Errors raised by JSON of another structure than expected, and by broken pictures."""
@@ -42,20 +47,21 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """All pictures of the scenes in `<split>/<scene>/`, with lenses, poses, depth, masks and boxes as far as they are there.
 
     A picture without its camera's pose counts as taken from the world's origin. Categories are the objects, named as
-    dataset_info.json of viewsphere's own exports says, else `obj_<number>`. Models are not read: what is exported again to BOP
-    has none. Raises StoreError with every picture that lacks its file, its lens or the pose of an object; with `keep_going`
-    these are left out and reported.
+    dataset_info.json of viewsphere's own exports says, else `obj_<number>`. Raises StoreError with every picture that lacks its
+    file, its lens or the pose of an object, and every model that cannot be read; with `keep_going` these are left out and
+    reported.
     """
     problems: list[str] = []
     files = sorted(path.glob("*/*/scene_camera.json"))
     if not files:
         raise StoreError(f"{path}: expected a BOP data set (<split>/<scene>/scene_camera.json); found no such file")
     frames = tuple(frame for file in files for frame in scene_frames(path, file.parent, problems))
+    named = categories(path, sorted({*model_files(path), *(gt["obj_id"] for frame in frames for gt in frame.gt)}))
+    models = foreign_models(path, named, problems)
     if not keep_going:
         refuse_broken(problems)
     if not frames:
         raise StoreError(f"{path}: expected images that can be used; found none")
-    named = categories(path, sorted({gt["obj_id"] for frame in frames for gt in frame.gt}))
     return ForeignDataset(
         name=path.resolve().name,
         digest=_digest(files, problems),
@@ -65,7 +71,8 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
         count=len(frames),
         poses=0,
         max_objects=max(1, *(len(frame.gt) for frame in frames)),
-        frames=partial(_samples, frames, named),
+        frames=partial(_samples, frames, named, {number: model.info.box3d_object for number, model in models.items()}),
+        models=tuple(models.values()),
         left_out=tuple(problems),
     )
 
@@ -111,19 +118,6 @@ def _digest(files: list[Path], left_out: list[str]) -> str:
         digest.update(f"{file.parent.name}/{file.name}\0{hashlib.sha256(file.read_bytes()).hexdigest()}".encode())
     digest.update("\n".join(left_out).encode(errors="backslashreplace"))
     return digest.hexdigest()
-
-
-def load(file: Path) -> dict[str, Any]:
-    """One of BOP's JSON files, an object; an empty one where there is no such file. Raises StoreError for another."""
-    if not file.is_file():
-        return {}
-    try:
-        found = parsed(file.read_bytes())
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{file}: expected BOP's JSON; found: {error}") from None
-    if not isinstance(found, dict):
-        raise StoreError(f"{file}: expected an object of images; found something else")
-    return cast(dict[str, Any], found)
 
 
 def scene_frames(root: Path, scene: Path, problems: list[str]) -> Iterator[Frame]:
@@ -204,24 +198,27 @@ def categories(path: Path, objects: list[int]) -> dict[int, tuple[Category, str]
     """The category of each object, and its name."""
     known = load(path / "dataset_info.json").get("objects")
     found: dict[str, Category] = {}
-    named: dict[int, tuple[Category, str]] = {}
+    named, keys = dict[int, tuple[Category, str]](), set[str]()
     for number in objects:
         said: Any = known.get(str(number)) if isinstance(known, dict) else None
         facts = cast(dict[str, Any], said if isinstance(said, dict) else {})
         key = str(facts.get("key", ""))
-        key = key if is_name(key) else f"obj_{number:06d}"
+        key = key if is_name(key) and key not in keys else f"obj_{number:06d}"
+        keys.add(key)
         name = str(facts.get("category") or key)
         category = found.setdefault(name, Category(len(found) + 1, name, str(facts.get("supercategory") or "")))
         named[number] = category, key
     return named
 
 
-def _samples(frames: tuple[Frame, ...], named: Mapping[int, tuple[Category, str]]) -> Iterator[ForeignFrame]:
+def _samples(
+    frames: tuple[Frame, ...], named: Mapping[int, tuple[Category, str]], boxes: Mapping[int, NDArray[np.float64]]
+) -> Iterator[ForeignFrame]:
     for index, frame in enumerate(frames):
         files: dict[str, Path | Loaded] = {"rgb": frame.rgb}
         if frame.depth:
             files["depth"] = Loaded(".png", _depth(frame.depth, frame))
-        objects = tuple(_object(frame, n, *named[gt["obj_id"]]) for n, gt in enumerate(frame.gt))
+        objects = tuple(_object(frame, n, *named[gt["obj_id"]], boxes.get(gt["obj_id"])) for n, gt in enumerate(frame.gt))
         said = {"scene_id": frame.scene.name, "im_id": frame.image}
         whole = all("amodal" in o.more for o in objects)
         sample = Sample(index, frame.split, frame.camera, None, objects, {}, {}, source=said, instant=index)
@@ -239,27 +236,25 @@ def _depth(file: Path, frame: Frame) -> bytes:
     return encode_png(steps, unit=frame.step)
 
 
-def _object(frame: Frame, n: int, category: Category, key: str) -> Any:
-    """The n-th object of a picture; `source` has its obj_id."""
+def _object(frame: Frame, n: int, category: Category, key: str, box: NDArray[np.float64] | None) -> Any:
+    """The n-th object of a picture, of a model with this box (8, 3); `source` has its obj_id."""
     size = width, height = frame.camera.width, frame.camera.height
     seen, whole = frame.mask("mask_visib", n), frame.mask("mask", n)
     info = frame.info[n] if n < len(frame.info) else None
     pose = object_pose(frame.gt[n])
-    known: dict[str, Any] = {
-        "key": key,
-        "camera_from_object": pose,
-        "world_from_object": compose(rigid(frame.camera.R.T, frame.camera.center), pose),
-        "quaternion": quaternion_from_matrix(pose[:3, :3]),
-    }
+    world = compose(rigid(frame.camera.R.T, frame.camera.center), pose)
+    standing = placed(UNKNOWN if box is None else box, world, rigid(frame.camera.R, frame.camera.t), frame.camera.intrinsics)
+    known = {name: value for name, value in standing.items() if name not in ("view", "pose_category")}
+    known |= {"key": key, "camera_from_object": pose, "quaternion": quaternion_from_matrix(pose[:3, :3])}
     if whole is not None:
         tight = rle_box(height, width, whole)
         known["more"] = {"amodal": Rle(height, width, whole), "box2d_amodal": tight and tuple(map(float, tight))}
     if info is not None:
         known["visibility"] = float(info["visib_fract"])
-        everything, box = int(info["px_count_all"]), _corners(info["bbox_obj"])
+        everything, outer = int(info["px_count_all"]), _corners(info["bbox_obj"])
         inside = rle_area(height, width, whole) if whole is not None else math.nan
         known["truncation"] = max(0.0, (everything - inside) / everything) if everything else math.nan
-        known |= {"box2d_unclipped": box, "box2d_projected": box and clip_to_image(box, width, height)}
+        known |= {"box2d_unclipped": outer, "box2d_projected": outer and clip_to_image(outer, width, height)}
     visible = None if info is None else _corners(info["bbox_visib"])
     return foreign_object(n + 1, category, size, {"obj_id": frame.gt[n]["obj_id"]}, seen, visible, **known)
 

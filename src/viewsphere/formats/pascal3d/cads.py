@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
+from viewsphere.formats._cads import foreign_model
 from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats._viewpoint_mat import OWN
 from viewsphere.formats.pascal3d.records import FARTHEST, structs_of, variables
-from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.model.keypoints import Keypoints, Place
-from viewsphere.store import Category, ModelInfo
+from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignModel
 from viewsphere.store.paths import file_inside
 
@@ -49,32 +46,7 @@ def _models(file: Path, category: Category) -> Iterator[ForeignModel]:
 
 def _model(said: Mapping[str, Any], category: Category, key: str) -> ForeignModel:
     mesh, points = _mesh(said.get("vertices"), said.get("faces")), dict(_points(said))
-    vertices = mesh.vertices.astype(np.float64)
-    box, digest = box_vertices(vertices.min(axis=0), vertices.max(axis=0)), hashlib.sha256(repr(points).encode())
-    for array in (mesh.vertices, mesh.triangles):
-        digest.update(array.tobytes())
-    info = ModelInfo(
-        key=key,
-        category=category.name,
-        supercategory=category.supercategory,
-        category_id=category.id,
-        obj=f"{key}.obj",
-        glb=f"{key}.glb",
-        box3d_object=box,
-        size=box_size(box),
-        real_size=None,
-        parts=mesh.parts,
-        triangles=len(mesh.triangles),
-        digest=digest.hexdigest(),
-        keypoints=Keypoints(points=points) if points else None,
-    )
-    return ForeignModel(info, (), partial(_write, mesh, key))
-
-
-def _write(mesh: Mesh, key: str, folder: Path) -> None:
-    """The files of a model."""
-    export_obj(mesh, folder, key)
-    export_glb(mesh, folder / f"{key}.glb")
+    return foreign_model(mesh, key, category, keypoints=Keypoints(points=points) if points else None)
 
 
 def read_shapes(file: Path, category: str) -> tuple[tuple[Float, NDArray[np.int32]], ...]:

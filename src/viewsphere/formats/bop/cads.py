@@ -1,0 +1,94 @@
+"""BOP's models, as others may have made them, and what models_info.json says of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from pydantic import ValidationError
+
+from viewsphere.assets.cache import load_normalised
+from viewsphere.errors import StoreError, UserError
+from viewsphere.formats._cads import foreign_model
+from viewsphere.formats.bop.entries import MM
+from viewsphere.formats.bop.texts import load
+from viewsphere.model.mistakes import first_of
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.symmetries import RIGID, Symmetries
+from viewsphere.store import Category
+from viewsphere.store.foreign import ForeignModel
+from viewsphere.store.paths import file_inside
+
+FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
+"""Where data sets have their models; the first that is there counts."""
+
+METRES = np.diag([1 / MM, 1 / MM, 1 / MM, 1.0])
+
+
+def model_folder(root: Path) -> str:
+    """The name of the folder of models."""
+    return next((name for name in FOLDERS if (root / name).is_dir()), FOLDERS[0])
+
+
+def model_files(root: Path) -> dict[int, Path]:
+    """The files of all models, by their objects' numbers, ascending."""
+    folder = model_folder(root)
+    there = (re.fullmatch(r"obj_(\d{6})\.ply", file.name) for file in sorted((root / folder).glob("obj_*.ply")))
+    return {int(match[1]): file_inside(root, f"{folder}/{match[0]}") for match in there if match}
+
+
+def symmetries_of(root: Path) -> dict[int, Symmetries]:
+    """What models_info.json says of models that have symmetries, in millimetres, by their objects' numbers. Raises StoreError
+    for what is no symmetry.
+    """
+    file = file_inside(root, f"{model_folder(root)}/models_info.json")
+    found = {int(number): _symmetries(one, f"{file}: {number}") for number, one in load(file).items() if number.isdecimal()}
+    return {number: one for number, one in found.items() if one is not None}
+
+
+def model_spec(file: Path) -> ModelSpec:
+    """How a model's file is read: as it is, in its own axes, from millimetres."""
+    axes: dict[str, Any] = {"up": "+z", "forward": "-y", "unit": 1 / MM, "centring": "as_is"}
+    return ModelSpec(key="model", source=str(file), category="object", category_id=1, **axes)
+
+
+def foreign_models(root: Path, named: Mapping[int, tuple[Category, str]], problems: list[str]) -> dict[int, ForeignModel]:
+    """The models of objects, by their numbers; the problems of others are appended."""
+    found: dict[int, ForeignModel] = {}
+    try:
+        symmetries = {number: one.moved(METRES) for number, one in symmetries_of(root).items()}
+    except StoreError as error:
+        problems.append(str(error))
+        symmetries = {}
+    for number, file in model_files(root).items():
+        category, key = named[number]
+        try:
+            found[number] = foreign_model(load_normalised(model_spec(file)), key, category, symmetries=symmetries.get(number))
+        except UserError as error:
+            problems.append(f"{file}: expected a model; found: {' '.join(str(error).split())}")
+    return found
+
+
+def _symmetries(said: Any, where: str) -> Symmetries | None:
+    facts = cast(Mapping[str, Any], said if isinstance(said, dict) else {})
+    names = ("discrete", "continuous")
+    given = {name: facts[f"symmetries_{name}"] for name in names if facts.get(f"symmetries_{name}")}
+    try:
+        given["discrete"] = [*_moving(given.get("discrete", ()))]
+        made = Symmetries.model_validate(given)
+    except ValidationError as error:
+        raise StoreError(f"{where}: symmetries: {first_of(error)}") from None
+    except (TypeError, ValueError) as error:
+        raise StoreError(f"{where}: symmetries_discrete: expected lists of 16 numbers; found: {error}") from None
+    return None if made == Symmetries() else made
+
+
+def _moving(listed: Any) -> Iterator[list[float]]:
+    """Motions that are not the identity, which some files list, too."""
+    for motion in listed:
+        matrix = np.array(motion, np.float64).reshape(16)
+        if np.abs(matrix - np.eye(4).ravel()).max() > RIGID:
+            yield matrix.tolist()
