@@ -8,6 +8,7 @@ import shutil
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from proven import close, equal
 from viewsphere import Dataset
@@ -162,3 +163,49 @@ def test_broken_files_are_told(tree, tmp_path):
     (tree / "train" / "000000" / "scene_gt.json").write_text("{")
     with pytest.raises(StoreError, match="expected BOP's JSON; found"):
         read(tree)
+
+
+def test_models_come_in_and_go_out(stills, exported, imported, tmp_path):
+    known = {model.key: model for model in stills.models}
+    assert [model.key for model in imported.models] == list(known)
+    for model in imported.models:
+        own = known[model.key]
+        close("bop", "import: models' boxes", model.box3d_object, own.box3d_object, "m", atol=1e-6)
+        assert (model.category, model.triangles) == (own.category, own.triangles)
+        assert (model.symmetries is None) == (own.symmetries is None)
+        vertices, wanted = imported.mesh(model.key).vertices, stills.mesh(model.key).vertices
+        assert len(vertices) <= len(wanted)
+        gaps, _ = cKDTree(wanted).query(vertices)
+        close("bop", "import: models' vertices", gaps, 0, "m", atol=1e-6)
+    pairs = {(s.split, s.source["im_id"]): s for s in imported}
+    for own in stills:
+        for o, other in zip(pairs[own.split, own.index].objects, own.objects, strict=True):
+            for name in ("box3d_object", "box3d", "box3d_camera", "size"):
+                close("bop", f"import: {name}", getattr(o, name), getattr(other, name), "m", atol=2e-6)
+            assert np.isnan(o.view.azimuth_deg)
+    export(imported.root, "bop", output=tmp_path)
+    before, after = (json.loads((at / "models/models_info.json").read_text()) for at in (exported, tmp_path / "bop"))
+    same_within(before, after, 2e-3)
+    assert (
+        json.loads((exported / "dataset_info.json").read_text())["objects"]
+        == json.loads((tmp_path / "bop/dataset_info.json").read_text())["objects"]
+    )
+
+
+def same_within(before, after, atol):
+    if isinstance(before, dict):
+        assert before.keys() == after.keys()
+        for name in before:
+            same_within(before[name], after[name], atol)
+    else:
+        np.testing.assert_allclose(np.array(after, float), np.array(before, float), atol=atol)
+
+
+def test_models_that_cannot_be_read_are_told_and_left_out(tree, tmp_path):
+    (tree / "models/obj_000001.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 3\n")
+    with pytest.raises(StoreError, match=r"obj_000001.ply: expected a model; found: .*") as error:
+        import_dataset("bop", tree, tmp_path / "out")
+    assert "\n" not in str(error.value).rpartition("\nmend them")[0] and not (tmp_path / "out").exists()
+    foreign = import_dataset("bop", tree, tmp_path / "out", keep_going=True)
+    assert len(foreign.left_out) == 1 and foreign.count == len(Dataset(tmp_path / "out"))
+    assert check(Dataset(tmp_path / "out")).ok

@@ -11,7 +11,7 @@ from test_kitti import corners, nearest
 
 from proven import close, equal
 from small import tree_hash
-from viewsphere import Dataset
+from viewsphere import Dataset, convert
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.report import write_report
@@ -370,3 +370,34 @@ def test_what_is_no_data_set_says_so(tmp_path):
     with pytest.raises(StoreError, match="expected pictures that can be used; found none"):
         import_dataset("kitti", tmp_path, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_two_pictures_of_an_instant_are_told(tmp_path):
+    folder = tracked(tmp_path / "mine") / "training/image_02/0011"
+    (folder / "2.png").write_bytes((folder / "000002.png").read_bytes())
+    with pytest.raises(StoreError, match=r"expected one picture of an instant; found 0011/000002, too"):
+        import_dataset("kitti", tmp_path / "mine", tmp_path / "out")
+    foreign = import_dataset("kitti", tmp_path / "mine", tmp_path / "out", keep_going=True)
+    assert (foreign.count, len(foreign.left_out)) == (3, 1)
+
+
+def test_what_some_pictures_tell_is_enough(tmp_path):
+    """The first picture has no calibration, and the others have one: formats that leave some out take the data set."""
+    source = data_set(tmp_path / "mine")
+    (source / "training/calib/000000.txt").unlink()
+    convert("kitti", source, "pascal3d", tmp_path / "out")
+    assert (tmp_path / "out/pascal3d/Annotations").is_dir()
+    with pytest.raises(UserError, match="found imported pictures, of which nobody knows when they were taken"):
+        convert("kitti", tracked(tmp_path / "moving"), "mot", tmp_path / "mot")
+
+
+def test_a_damaged_picture_is_named_as_the_source_has_it(tmp_path):
+    source = data_set(tmp_path / "mine")
+    file = source / "training/image_2/000002.png"
+    file.write_bytes(file.read_bytes()[:300])
+    with pytest.raises(StoreError, match=r"mine/training/image_2/000002.png: expected a whole picture; found a damaged one"):
+        convert("kitti", source, "hdf5", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    for inside in (source, source / "training"):
+        with pytest.raises(UserError, match="-o: expected a folder outside of the data set that is read"):
+            convert("kitti", source, "kitti", inside)

@@ -78,7 +78,7 @@ def test_all_that_formats_cannot_hold_is_told_at_once_and_nothing_is_written(pho
         f"viewsphere: {photos}: format tum: expected pictures of known cameras; found imported ones, and expected depth of all "
         "pictures; found rgb of imported ones"
     )
-    assert flying.startswith(f"viewsphere: {photos}: format flyingthings: expected sequences (a recipe's time); found still")
+    assert flying.startswith(f"viewsphere: {photos}: format flyingthings: expected sequences (a recipe's time); found imported")
     assert names_in(tmp_path) == []
 
 
@@ -164,7 +164,7 @@ def test_other_files_stay_and_are_named(photos, tmp_path):
         (("--to", "yolo", "-o", "out"), r"--from: expected one of bop, coco, .*; found none"),
         (("--from", "coco", "-o", "out"), r"--to: expected one or more of airsim, .*; found none"),
         (("--from", "coco", "--to", "yolo"), r"-o: expected a folder for the formats' folders; found none"),
-        (("--from", "imagefolder", "--to", "yolo", "-o", "out"), r"from: expected one of bop, coco, .*; found 'imagefolder'"),
+        (("--from", "imagefolder", "--to", "yolo", "-o", "out"), r"--from: expected one of bop, coco, .*; found 'imagefolder'"),
         (("--from", "coco", "--to", "yol", "-o", "out"), r"--to: expected .*yolo"),
         (("--from", "yolo", "--to", "voc", "-o", "out"), r"real: expected a YOLO data set \(data.yaml\); found no such file"),
     ],

@@ -141,7 +141,7 @@ def convert(
     _tell_left_out(made.left_out)
     for note in made.notes:
         typer.echo(note)
-    for name in names:
+    for name in dict.fromkeys(names):
         typer.echo(f"wrote {target / name}")
 
 

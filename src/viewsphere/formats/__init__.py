@@ -23,8 +23,8 @@ Remark = tuple[int | None, str]
 class Scope:
     """What is known of a data set before any of it is rendered. `rig`: that of its first part, None where nobody knows it, as
     of imported pictures; `is_moving`: its pictures are of sequences; `most_objects`: of one picture; `channels` and
-    `annotations`: labels and passes that it keeps, and those that can be computed of its shots; `pictures`: one of each part,
-    where the shots of any part are not kept, as those of imported ones.
+    `annotations`: labels and passes that it keeps, and those that can be computed of its shots; `pictures`: a few of each part,
+    of those of which different things are known, where the shots of any part are not kept, as those of imported ones.
     """
 
     categories: tuple[Category, ...]

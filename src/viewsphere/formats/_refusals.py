@@ -67,7 +67,8 @@ def _has_view(sample: Sample) -> bool:
 def sequences(scope: Scope) -> Iterator[str]:
     """Of a format of videos."""
     if not scope.is_moving:
-        yield "expected sequences (a recipe's time); found still pictures"
+        found = "imported pictures, of which nobody knows when they were taken" if scope.pictures else "still pictures"
+        yield f"expected sequences (a recipe's time); found {found}"
 
 
 def stereo(scope: Scope) -> Iterator[str]:

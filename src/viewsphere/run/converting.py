@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from viewsphere.aside import aside
@@ -15,6 +17,7 @@ from viewsphere.run.importing import put_in_store, read_dataset
 from viewsphere.run.progress import Listener, unheard
 from viewsphere.run.scope import refuse, scope_of_foreign
 from viewsphere.store import Dataset, located, new_folder
+from viewsphere.store.foreign import ForeignDataset
 
 
 @dataclass(frozen=True)
@@ -44,16 +47,17 @@ def convert(
     """
     entries = read_formats(formats)
     for entry in entries:
-        writable(entry.name, "to")
+        writable(entry.name, "--to")
+        _check_outside(source, located(out) / entry.name)
         entry.arguments()
     if not entries:
-        raise UserError("to: expected a format; found none")
-    foreign = read_dataset(kind, source, keep_going=keep_going, field="from")
+        raise UserError("--to: expected a format; found none")
+    foreign = read_dataset(kind, source, keep_going=keep_going, field="--from")
     refuse(entries, scope_of_foreign(foreign), source)
     with ExitStack() as whole:
         folders = [(entry, whole.enter_context(new_folder(located(out) / entry.name))) for entry in entries]
         store = whole.enter_context(aside(folders[0][1].parent)) / "store"  # on the same disk, for links
-        with _told_of(store, source):
+        with _told_of(store, foreign, source):
             put_in_store(foreign, store, listener)
             dataset = Dataset(store)
             notes = write(dataset, folders, listener or unheard, workers)
@@ -61,9 +65,21 @@ def convert(
 
 
 @contextmanager
-def _told_of(store: Path, source: Path | str) -> Generator[None]:
+def _told_of(store: Path, foreign: ForeignDataset, source: Path | str) -> Generator[None]:
     """Tell the user's mistakes of the source, and not of a store that nobody sees."""
     try:
         yield
     except UserError as error:
-        raise type(error)(str(error).replace(str(store), str(source))) from None
+        found = re.search(rf"{re.escape(str(store))}\S*/(\w+)/(\d{{8}})\.\w+: ", str(error))
+        if found is None:
+            raise type(error)(str(error).replace(str(store), str(source))) from None
+        frame = next(islice(foreign.frames(), int(found[2]), None))
+        file = frame.files[found[1]]
+        name = file if isinstance(file, Path) else f"{source}, picture {found[2]}"
+        raise type(error)(f"{name}: expected a whole picture; found a damaged one: mend it, or take it out") from None
+
+
+def _check_outside(source: Path | str, folder: Path) -> None:
+    """Raise UserError for a folder that lies in the data set that is read."""
+    if folder.resolve().is_relative_to(Path(source).resolve()):
+        raise UserError(f"-o: expected a folder outside of the data set that is read; found {folder}")

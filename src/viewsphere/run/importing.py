@@ -9,6 +9,7 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
+from viewsphere.model.mistakes import one_of
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.store import Block, Dataset, Part, PlanRecord, Store, located
 from viewsphere.store.credits import write_credits
@@ -44,7 +45,7 @@ def read_dataset(kind: str, source: Path | str, *, keep_going: bool = False, fie
     """
     known = readable_formats()
     if kind not in known:
-        raise UserError(f"{field}: expected one of {', '.join(known)}; found {kind!r}")
+        raise UserError(f"{field}: {one_of(kind, known)}")
     return plugins.load("formats", kind).read(Path(source), keep_going=keep_going)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import islice
+from itertools import chain, islice
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
@@ -12,10 +12,14 @@ from viewsphere.formats import Format, Scope
 from viewsphere.formats._refusals import lacking_labels
 from viewsphere.labels import channel_labels, on_request
 from viewsphere.model.channel import PASSES, missing
+from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
 from viewsphere.store.foreign import ForeignDataset
+
+LOOKED_AT = 1000
+"""Pictures of a part that are asked what is known of them: many data sets have no cameras at all."""
 
 
 def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
@@ -49,14 +53,14 @@ def scope_of(dataset: Dataset) -> Scope:
         known = replace(known, channels=computed, annotations=tuple(on_request()))
     if shots and shots[0] and all(shots):
         return replace(known, rig=shots[0].rig)
-    pictures = tuple(dataset.samples_of_parts)
+    pictures = tuple(chain.from_iterable(map(telling, dataset.samples_of_parts)))
     asked = dict.fromkeys(name for sample in pictures for name in sample.asked)
     return replace(known, annotations=tuple(dict.fromkeys((*known.annotations, *asked))), pictures=pictures)
 
 
 def scope_of_foreign(foreign: ForeignDataset) -> Scope:
     """What is known of a data set that is about to be imported."""
-    pictures = tuple(frame.sample for frame in islice(foreign.frames(), 1))
+    pictures = telling(frame.sample for frame in foreign.frames())
     return Scope(
         categories=foreign.categories,
         splits=foreign.splits,
@@ -67,6 +71,17 @@ def scope_of_foreign(foreign: ForeignDataset) -> Scope:
         annotations=pictures[0].asked if pictures else (),
         pictures=pictures,
     )
+
+
+def telling(samples: Iterable[Sample]) -> tuple[Sample, ...]:
+    """The first of the samples, and the first of each kind of which more or less is known: a camera, a viewpoint, where an
+    object is. No more than LOOKED_AT of them are asked.
+    """
+    kinds: dict[tuple[bool, bool, bool], Sample] = {}
+    for sample in islice(samples, LOOKED_AT):
+        is_placed = any(o.is_placed for o in sample.objects)
+        kinds.setdefault((sample.known_camera is not None, sample.known_pose is not None, is_placed), sample)
+    return tuple(kinds.values())
 
 
 def needs_of(module: Format, entry: FormatEntry) -> tuple[str, ...]:

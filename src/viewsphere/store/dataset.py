@@ -144,9 +144,11 @@ class Dataset(Shown, Sequence[Sample]):
         return tuple(found.get(number, some) for number in range(len(self.plan.parts)))
 
     @property
-    def samples_of_parts(self) -> Iterator[Sample]:
-        """A finished picture, chosen or not, of each part that has any."""
-        return (self.sample_at(row.key, 0) for row in self._first_rows.values())
+    def samples_of_parts(self) -> Iterator[Iterator[Sample]]:
+        """The finished pictures, chosen or not, of each part that has any."""
+        for part in self._first_rows:
+            rows = (row for row in self.rows if row.part == part)
+            yield (self.sample_at(row.key, place) for row in rows for place in range(row.count))
 
     @cached_property
     def _first_rows(self) -> dict[int, Row]:

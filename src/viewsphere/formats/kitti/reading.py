@@ -121,11 +121,16 @@ def _places(root: Path) -> Iterator[_Place]:
 def _pictures(root: Path, places: tuple[_Place, ...], labels_of: Of, problems: list[str]) -> Iterator[_Frame]:
     """The pictures of all lists, each in the first that has it; without lists, those of all folders."""
     camera_of, seen = lru_cache(FILES_KEPT)(read_camera), set[tuple[_Place, str]]()
+    frames: dict[tuple[str, int], str] = {}
     for split, source, place, name in _named(root, places, problems):
         if (place, name) not in seen:
             seen.add((place, name))
             try:
-                yield _picture(root, place, split, name, labels_of, camera_of)
+                frame = _picture(root, place, split, name, labels_of, camera_of)
+                first = frames.setdefault((frame.sequence, frame.instant), name) if place.is_tracked else name
+                if first != name:
+                    raise ValueError(f"expected one picture of an instant; found {first}, too")
+                yield frame
             except MISTAKES as error:
                 problems.append(f"{source}: {name}: {one_line(error)}")
 
