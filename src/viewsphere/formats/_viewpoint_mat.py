@@ -217,11 +217,15 @@ class Cads:
 
     def off(self, info: ModelInfo) -> bytes:
         """A model as OFF text."""
-        vertices, triangles = self.shape(info)
-        rows = [f"OFF\n{len(vertices)} {len(triangles)} 0"]
-        rows += [f"{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-        rows += [f"3 {a} {b} {c}" for a, b, c in triangles.tolist()]
-        return ("\n".join(rows) + "\n").encode()
+        return off_bytes(*self.shape(info))
+
+
+def off_bytes(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> bytes:
+    """A shape as OFF text."""
+    rows = [f"OFF\n{len(vertices)} {len(triangles)} 0"]
+    rows += [f"{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    rows += [f"3 {a} {b} {c}" for a, b, c in triangles.tolist()]
+    return ("\n".join(rows) + "\n").encode()
 
 
 def _motion(o: ObjectAnnotation) -> NDArray[np.float64]:

@@ -1,0 +1,69 @@
+"""PASCAL3D+ as others have it is rendered again as it is imported: objects, splits, sizes, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+from test_pascal3d_reading import KIT, data_set, record, thing, viewpoint
+
+from viewsphere import Dataset
+from viewsphere.errors import StoreError
+from viewsphere.run.again import make_again
+from viewsphere.run.importing import import_dataset
+
+
+def shots_of(source, place):
+    """The recipe that is made, and its lines."""
+    made = make_again("pascal3d", source, place / "again")
+    return made, [json.loads(line) for line in (place / "again/shots.jsonl").read_text().splitlines()]
+
+
+@pytest.fixture
+def mine(tmp_path):
+    """A data set of which all objects of a picture have one lens."""
+    source = data_set(tmp_path / "mine")
+    record(source / "Annotations/car_imagenet/n03.mat", [thing(view=viewpoint())])
+    return source
+
+
+def test_a_category_is_read_from_its_own_folder(mine, tmp_path):
+    """2008_01 lies in those of car and bus, and each record knows the viewpoint of its own category alone."""
+    _, lines = shots_of(mine, tmp_path)
+    shown = [line for line in lines if line["name"].startswith("2008_01")]
+    assert sorted(o["model"].split("_")[0] for line in shown for o in line["objects"]) == ["bus", "car"]
+
+
+def test_splits_and_order_are_those_of_the_import(mine, tmp_path):
+    main, lists = mine / KIT / "ImageSets/Main", mine / "Image_sets"
+    shutil.rmtree(lists)
+    shutil.rmtree(main)
+    main.mkdir()
+    for name, text in {"bus_val": "n01\n", "car_trainval": "n03\n2008_01\n", "car_test": "n02\n"}.items():
+        (main / f"{name}.txt").write_text(text)
+    import_dataset("pascal3d", mine, tmp_path / "in")
+    known = [
+        (sample.source["file_name"].rpartition("/")[2].partition(".")[0], sample.split) for sample in Dataset(tmp_path / "in")
+    ]
+    _, lines = shots_of(mine, tmp_path)
+    found = dict.fromkeys((line["name"].partition("-")[0], line["split"]) for line in lines)
+    assert list(found) == [one for one in known if one[0] != "n02"]  # which has no exact viewpoint
+    assert dict(found) == {("n01", "train"): None, ("n03", "trainval"): None, ("2008_01", "trainval"): None}
+
+
+@pytest.mark.parametrize("what", ["folder", "dangling", "large"])
+def test_lists_that_cannot_be_read_are_told(mine, tmp_path, monkeypatch, what):
+    file = mine / KIT / "ImageSets/Main/car_train.txt"
+    match what:
+        case "folder":
+            file.mkdir()
+        case "dangling":
+            file.symlink_to("nowhere.txt")
+        case "large":
+            monkeypatch.setenv("VIEWSPHERE_MAX_ANNOTATION_BYTES", "100000")
+            file.write_text("n01\n" * 30_000)
+    with pytest.raises(StoreError, match=r"car_train.txt: expected names of pictures; found: ") as error:
+        make_again("pascal3d", mine, tmp_path / "again")
+    assert "\n" not in str(error.value) and ("MAX_ANNOTATION_BYTES" in str(error.value)) == (what == "large")
+    assert not (tmp_path / "again").exists()
