@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import shutil
 
+import numpy as np
 import pytest
-from test_pascal3d_reading import KIT, data_set, record, thing, viewpoint
+from test_pascal3d_reading import KIT, SIZE, data_set, record, thing, viewpoint
 
 from viewsphere import Dataset
 from viewsphere.errors import StoreError
@@ -67,3 +68,31 @@ def test_lists_that_cannot_be_read_are_told(mine, tmp_path, monkeypatch, what):
         make_again("pascal3d", mine, tmp_path / "again")
     assert "\n" not in str(error.value) and ("MAX_ANNOTATION_BYTES" in str(error.value)) == (what == "large")
     assert not (tmp_path / "again").exists()
+
+
+LENS = np.array([[60.0, 0, 25.5], [0, 60, 20.5], [0, 0, 1]])
+
+
+def test_a_lens_of_another_size_than_its_picture_is_refused(mine, tmp_path):
+    """K is for pictures of imgsize; without K, whose pixels nobody knows, the picture counts."""
+    record(mine / "Annotations/car_imagenet/n01.mat", [thing(view=viewpoint())], imgsize=np.array([[25.0, 20, 3]]), K=LENS)
+    message = r"n01.mat: expected a picture of 25 x 20 pixels, as imgsize beside K says; found 50 x 40"
+    with pytest.raises(StoreError, match=message):
+        make_again("pascal3d", mine, tmp_path / "again")
+    with pytest.raises(StoreError, match=message):
+        import_dataset("pascal3d", mine, tmp_path / "in")
+    assert import_dataset("pascal3d", mine, tmp_path / "in", keep_going=True).count == 3
+
+
+def test_without_a_lens_the_picture_says_its_size(mine, tmp_path):
+    record(mine / "Annotations/car_imagenet/n01.mat", [thing(view=viewpoint())], imgsize=np.array([[25.0, 20, 3]]))
+    made, lines = shots_of(mine, tmp_path)
+    assert {(line["camera"]["width"], line["camera"]["height"]) for line in lines} == {SIZE}
+    assert "1 pictures have another size than their record's imgsize, and are taken for right" in made.notes
+
+
+def test_without_pictures_the_record_says_their_size(mine, tmp_path):
+    record(mine / "Annotations/car_imagenet/n01.mat", [thing(view=viewpoint())], imgsize=np.array([[25.0, 20, 3]]))
+    shutil.rmtree(mine / "Images")
+    _, lines = shots_of(mine, tmp_path)
+    assert {line["name"]: line["camera"]["width"] for line in lines if line["name"].startswith("n")} == {"n01": 25, "n03": 50}

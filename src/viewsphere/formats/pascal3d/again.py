@@ -13,9 +13,9 @@ from viewsphere.formats._again import pose_of
 from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats._viewpoint_mat import off_bytes
 from viewsphere.formats.pascal3d.cads import read_shapes
-from viewsphere.formats.pascal3d.pictures import FILES_KEPT, objects_of, told_pictures
+from viewsphere.formats.pascal3d.pictures import FILES_KEPT, Told, objects_of, picture_of, told_pictures
 from viewsphere.formats.pascal3d.posed import Posed, pinhole, posed
-from viewsphere.formats.pascal3d.records import read_record
+from viewsphere.formats.pascal3d.records import Record, read_record
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.listed import ListedObject, ListedShot
@@ -45,15 +45,15 @@ def again(path: Path) -> Again:
         raise StoreError(f"{path}: expected PASCAL3D+ (Annotations/<category>_pascal/<index>.mat); found no such file")
     problems, record_of = list[str](), lru_cache(FILES_KEPT)(read_record)
     models, found = _Models(path, {}), list[ListedShot]()
-    others = divided = 0
+    others = divided = resized = 0
     for told in told_pictures(path, record_of, problems):
         try:
             record = record_of(told.files[0])
-            if record.size is None:
-                raise ValueError("expected imgsize width height; found none")
+            size = _size(path, told, record)
             objects = objects_of(told, record_of)
-            own = None if record.lens is None else pinhole(record.lens, record.size)
-            seen = tuple(posed(objects, own, record.size))
+            own = None if record.lens is None else pinhole(record.lens, size)
+            seen = tuple(posed(objects, own, size))
+            resized += record.size not in (None, size)
             groups = tuple(_groups(seen))
             others += len(objects) - len(seen)
             divided += len(groups) > 1
@@ -71,11 +71,20 @@ def again(path: Path) -> Again:
         shots=tuple(found),
         models=models.found,
         formats=({"pascal3d": {"anchors": False}},),
-        notes=tuple(_notes(others, divided)),
+        notes=tuple(_notes(others, divided, resized)),
     )
 
 
-def _notes(others: int, divided: int) -> Iterator[str]:
+def _size(root: Path, told: Told, record: Record) -> tuple[int, int]:
+    """The width and height of a picture, as its record says where it is not there."""
+    there = picture_of(root, told, record)
+    size = there[1] if there else record.size
+    if size is None:
+        raise ValueError("expected a picture, or imgsize width height; found neither")
+    return size
+
+
+def _notes(others: int, divided: int, resized: int) -> Iterator[str]:
     if others:
         yield f"{others:,} objects have no exact viewpoint or no CAD model, and are left out"
     if divided:
@@ -83,6 +92,8 @@ def _notes(others: int, divided: int) -> Iterator[str]:
             f"{divided:,} pictures show objects that have lenses of their own in the format's projection: each lens is a shot, "
             "so that these do not hide one another"
         )
+    if resized:
+        yield f"{resized:,} pictures have another size than their record's imgsize, and are taken for right"
 
 
 def _groups(objects: Iterable[Posed]) -> Iterator[_Group]:

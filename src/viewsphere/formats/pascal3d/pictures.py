@@ -90,8 +90,16 @@ def objects_of(told: Told, record_of: Of) -> list[Seen]:
     return found if is_numbered else [replace(o, id=number) for number, o in enumerate(found, 1)]
 
 
-def picture_of(root: Path, told: Told) -> tuple[Path, tuple[int, int]]:
-    """A picture, in the first folder that has it, and its width and height; raises ValueError where there is none."""
-    places = [f"Images/{kind}_{told.source}/{told.name}" for kind in told.kinds]
-    there = next((place for place in places if any((root / f"{place}{end}").is_file() for end in SUFFIXES)), places[0])
-    return picture_inside(root, there, *SUFFIXES)
+def picture_of(root: Path, told: Told, record: Record) -> tuple[Path, tuple[int, int]] | None:
+    """A picture, in the first folder that has it, and its width and height, None where it is nowhere; raises ValueError for one
+    of another size than K, if the record says it, is for.
+    """
+    places = [f"Images/{kind}_{told.source}/{told.name}{end}" for kind in told.kinds for end in SUFFIXES]
+    there = next((place for place in places if (root / place).is_file()), None)
+    if there is None:
+        return None
+    file, size = picture_inside(root, there)
+    if record.lens is not None and record.size is not None and record.size != size:
+        said, found = (f"{width} x {height}" for width, height in (record.size, size))
+        raise ValueError(f"expected a picture of {said} pixels, as imgsize beside K says; found {found}")
+    return file, size

@@ -20,7 +20,7 @@ from viewsphere.formats._viewpoint_mat import KIT
 from viewsphere.formats.pascal3d.cads import read_cads
 from viewsphere.formats.pascal3d.pictures import FILES_KEPT, Of, Told, objects_of, picture_of, told_pictures
 from viewsphere.formats.pascal3d.posed import pinhole
-from viewsphere.formats.pascal3d.records import Seen, read_record
+from viewsphere.formats.pascal3d.records import Record, Seen, read_record
 from viewsphere.geometry.camera import orbit_rotation
 from viewsphere.geometry.mask import encode_rle, mask_box
 from viewsphere.geometry.pose_category import pose_category
@@ -97,14 +97,17 @@ def _named(root: Path) -> Iterator[str]:
 def _pictures(root: Path, record_of: Of, problems: list[str]) -> Iterator[_Shown]:
     for told in told_pictures(root, record_of, problems):
         try:
-            yield _picture(root, told)
+            yield _picture(root, told, record_of(told.files[0]))
         except MISTAKES as error:
             problems.append(f"{told.files[0]}: {one_line(error)}")
 
 
-def _picture(root: Path, told: Told) -> _Shown:
+def _picture(root: Path, told: Told, record: Record) -> _Shown:
     """A picture of which all that is said can be read."""
-    file, size = picture_of(root, told)
+    there = picture_of(root, told, record)
+    if there is None:
+        raise ValueError(f"expected a picture; found no Images/{told.kinds[0]}_{told.source}/{told.name}")
+    file, size = there
     masks = file_inside(root, f"{KIT}/SegmentationObject/{told.name}.png")
     own = masks if told.source == PASCAL and masks.is_file() else None
     if own:
