@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError
 from viewsphere.formats._listed import MISTAKES, Listed, listed_dataset, one_line, unposed
+from viewsphere.formats._maps import ALIKE, boxes_of, check_map, numbered, numbers_of, overlap
 from viewsphere.formats._placed import placed
 from viewsphere.formats._viewpoint_mat import KIT
 from viewsphere.formats.pascal3d.cads import read_cads
@@ -22,11 +22,11 @@ from viewsphere.formats.pascal3d.pictures import FILES_KEPT, Of, Told, objects_o
 from viewsphere.formats.pascal3d.posed import pinhole
 from viewsphere.formats.pascal3d.records import Record, Seen, read_record
 from viewsphere.geometry.camera import orbit_rotation
-from viewsphere.geometry.mask import encode_rle, mask_box
+from viewsphere.geometry.mask import encode_rle
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import product, rigid
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.sample import ObjectAnnotation, ObjectView, Sample
+from viewsphere.model.sample import Box, ObjectAnnotation, ObjectView, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignModel, foreign_object
 from viewsphere.store.paths import file_inside, is_name
@@ -40,7 +40,7 @@ STATES = {1: 0, 2: 1, 3: 1, 4: 2}
 """Of keypoints by the status of anchors: visible, occluded, outside; of others nobody knows (3)."""
 
 NEAR = 3.0
-"""Pixels by which a mask may reach out of its object's box."""
+"""Pixels by which a mask that overlaps its object's box too little may reach out of it."""
 
 SAME = 1e-9
 
@@ -111,21 +111,20 @@ def _picture(root: Path, told: Told, record: Record) -> _Shown:
     masks = file_inside(root, f"{KIT}/SegmentationObject/{told.name}.png")
     own = masks if told.source == PASCAL and masks.is_file() else None
     if own:
-        with opened(own) as found:
-            if found.size != size or found.mode not in ("P", "L"):
-                raise StoreError(f"expected objects' numbers in {own.name}, of the picture's size; found other pixels")
+        check_map(own, size)
     return _Shown(told.split, file.relative_to(root / "Images").as_posix(), file, size, (*told.files, own), told, own)
 
 
 def _sample(
     categories: Mapping[str, Category], cads: Mapping[str, Sequence[ForeignModel]], record_of: Of, picture: _Shown, index: int
 ) -> Sample:
-    seen, masks = objects_of(picture.told, record_of), None
-    if picture.masks:
-        with opened(picture.masks) as found:
-            masks = np.array(found)
+    seen = objects_of(picture.told, record_of)
+    masks = _masks(picture.masks, seen) if picture.masks else [None] * len(seen)
     lens = _lens(record_of(picture.told.files[0]).lens, seen, picture.size)
-    objects = [_annotation(o, categories[o.kind], cads.get(o.kind, ()), picture, lens, masks) for o in seen]
+    objects = [
+        _annotation(o, categories[o.kind], cads.get(o.kind, ()), picture, lens, mask)
+        for o, mask in zip(seen, masks, strict=True)
+    ]
     sample = replace(unposed(picture, index, objects, {"file_name": picture.name}), asked=("keypoints",), instant=index)
     camera = lens and Camera(lens, np.eye(3), np.zeros(3))
     return sample if camera is None else replace(sample, known_camera=camera, image_size=None)
@@ -152,26 +151,30 @@ def _annotation(
     cads: Sequence[ForeignModel],
     picture: Listed,
     lens: Intrinsics | None,
-    masks: NDArray[Any] | None,
+    mask: str | None,
 ) -> ObjectAnnotation:
     """An object with its mask, model and pose, and as COCO would have it in `source`."""
     x0, y0, x1, y1 = o.box
     source: dict[str, Any] = {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": (x1 - x0) * (y1 - y0), **o.flags}
     source |= {"cad_index": o.cad, "viewpoint": dict(o.view)} if o.cad or o.view else {}
     source |= {"anchors": {name: status for name, (_, status) in o.anchors.items()}} if o.anchors else {}
-    counts = None if masks is None else _mask(masks == o.place, o)
     info = cads[o.cad - 1].info if 0 < o.cad <= len(cads) else None
     known: dict[str, Any] = {"key": info.key if info else "", **_standing(o, info and info.box3d_object, lens)}
     assert o.id is not None
-    return foreign_object(o.id, category, picture.size, source, counts, o.box, box2d=o.box, more=_keypoints(o), **known)
+    return foreign_object(o.id, category, picture.size, source, mask, o.box, box2d=o.box, more=_keypoints(o), **known)
 
 
-def _mask(mask: NDArray[np.bool_], o: Seen) -> str | None:
-    """The run-length code of a mask; None for one of nothing, or that is another object's by its box."""
-    found = mask_box(mask)
-    if found is None or any(found[i] < o.box[i] - NEAR or found[i + 2] > o.box[i + 2] + NEAR for i in (0, 1)):
-        return None
-    return encode_rle(mask)
+def _masks(file: Path, seen: Sequence[Seen]) -> Iterator[str | None]:
+    """The run-length code of each object's mask; None for one of nothing, or that is another object's by its box."""
+    numbers = numbers_of(file)
+    found = boxes_of(numbers)
+    for o, number in zip(seen, numbered([(o.place, o.box) for o in seen], found), strict=True):
+        is_own = number > 0 and (overlap(o.box, found[number]) >= ALIKE or _is_inside(found[number], o.box))
+        yield encode_rle(numbers == number) if is_own else None
+
+
+def _is_inside(one: Box, other: Box) -> bool:
+    return all(one[i] >= other[i] - NEAR and one[i + 2] <= other[i + 2] + NEAR for i in (0, 1))
 
 
 def _keypoints(o: Seen) -> dict[str, Any]:
