@@ -72,7 +72,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     categories = {name: Category(number, name, "") for number, name in enumerate(names, 1)}
     cads = read_cads(path, {name: one for name, one in categories.items() if is_name(name)}, problems)
     problems += (
-        f"{picture.name}: object {o.place}: expected cad_index 1 to {len(cads[o.kind])}; found {o.cad}"
+        f"{o.file}: object {o.place}: expected cad_index 1 to {len(cads[o.kind])}; found {o.cad}: its model is left out"
         for picture in pictures
         for o in objects_of(picture.told, record_of)
         if o.kind in cads and o.cad > len(cads[o.kind])
