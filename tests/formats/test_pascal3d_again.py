@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from test_pascal3d_reading import KIT, SIZE, data_set, record, thing, viewpoint
+from scipy.io import savemat
+from test_pascal3d_reading import FACES, KIT, SIZE, VERTICES, data_set, record, structs, thing, viewpoint
 
 from viewsphere import Dataset
-from viewsphere.errors import StoreError
+from viewsphere.errors import RecipeError, StoreError
+from viewsphere.formats import pascal3d
+from viewsphere.formats._viewpoint_mat import off_bytes
 from viewsphere.run.again import make_again
 from viewsphere.run.importing import import_dataset
+from viewsphere.sampling.plan import plan
+from viewsphere.store.again import AgainModel, Drafted
 
 
 def shots_of(source, place):
@@ -96,3 +103,33 @@ def test_without_pictures_the_record_says_their_size(mine, tmp_path):
     shutil.rmtree(mine / "Images")
     _, lines = shots_of(mine, tmp_path)
     assert {line["name"]: line["camera"]["width"] for line in lines if line["name"].startswith("n")} == {"n01": 25, "n03": 50}
+
+
+@pytest.mark.parametrize("names", [("a.b", "a b"), ("Car", "car"), ("car", "car_2", "car.2")])
+@pytest.mark.parametrize("files", ["mat", "off"])
+def test_categories_that_become_one_word_stay_apart(tmp_path, names, files):
+    source, place = tmp_path / "mine", tmp_path / "mine/CAD"
+    for i, name in enumerate(names):
+        record(source / f"Annotations/{name}_pascal/p{i}.mat", [thing(name, view=viewpoint())])
+        (place / name).mkdir(parents=True)
+        if files == "mat":
+            savemat(place / f"{name}.mat", {name: structs([{"vertices": VERTICES * (i + 1), "faces": FACES}])})
+        else:
+            (place / name / "01.off").write_bytes(off_bytes(VERTICES * (i + 1), FACES - 1))
+    _, lines = shots_of(source, tmp_path)
+    keys = [line["objects"][0]["model"] for line in lines]
+    specs = {spec.key: spec for spec in plan(str(tmp_path / "again/recipe.yaml")).model_specs}
+    assert len(set(keys)) == len(names)
+    for i, (name, key) in enumerate(zip(names, keys, strict=True)):
+        first = Path(specs[key].source).read_text().splitlines()[2]
+        assert specs[key].category == name and first == " ".join(map(repr, (VERTICES * (i + 1))[0].tolist()))
+
+
+def test_what_a_recipe_refuses_names_the_folder_that_is_asked_for(mine, tmp_path, monkeypatch):
+    """Two models of one key, as of a format that does not tell its words apart."""
+    twice = {str(i): AgainModel(Drafted(f"car/0{i}.off", b"OFF"), kind, name="car") for i, kind in enumerate(("a", "b"))}
+    shown = pascal3d.again(mine)
+    monkeypatch.setattr(pascal3d, "again", lambda _: replace(shown, models={**shown.models, **twice}))
+    with pytest.raises(RecipeError, match="expected every model once") as error:
+        make_again("pascal3d", mine, tmp_path / "again")
+    assert str(tmp_path / "again/models/car/0") in str(error.value) and ".again-" not in str(error.value)

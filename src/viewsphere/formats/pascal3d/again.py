@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain, count
 from pathlib import Path
 
 from viewsphere.errors import StoreError
@@ -44,7 +45,7 @@ def again(path: Path) -> Again:
     if not any(path.glob("Annotations/*/*.mat")):
         raise StoreError(f"{path}: expected PASCAL3D+ (Annotations/<category>_pascal/<index>.mat); found no such file")
     problems, record_of = list[str](), lru_cache(FILES_KEPT)(read_record)
-    models, found = _Models(path, {}), list[ListedShot]()
+    models, found = _Models(path, {}, {}), list[ListedShot]()
     others = divided = resized = 0
     for told in told_pictures(path, record_of, problems):
         try:
@@ -137,6 +138,7 @@ class _Models:
 
     root: Path
     found: dict[str, AgainModel]
+    words: dict[str, str]
 
     def key(self, category: str, number: int) -> str:
         """The key of a model, counted from 1; raises StoreError where there is none."""
@@ -144,9 +146,18 @@ class _Models:
             raise ValueError(f"found a category {category!r:.60}")
         key = f"{category} {number}"
         if key not in self.found:
-            word = re.sub(r"[^A-Za-z0-9_-]", "_", category).lstrip("_-")[:90] or "model"
+            word = self._word(category)
             self.found[key] = AgainModel(self._source(category, number, word), category, name=word)
         return key
+
+    def _word(self, category: str) -> str:
+        """A category's name in letters, digits, `_` and `-`, unlike those of others."""
+        if category not in self.words:
+            plain = re.sub(r"[^A-Za-z0-9_-]", "_", category).lstrip("_-")[:90] or "model"
+            taken = {word.casefold() for word in self.words.values()}
+            ways = chain((plain,), (f"{plain}_{i}" for i in count(2)))
+            self.words[category] = next(way for way in ways if way.casefold() not in taken)
+        return self.words[category]
 
     def _source(self, category: str, number: int, word: str) -> Path | Drafted:
         file = file_inside(self.root, f"CAD/{category}/{number:02}.off")
