@@ -43,6 +43,7 @@ NEAR = 3.0
 """Pixels by which a mask that overlaps its object's box too little may reach out of it."""
 
 SAME = 1e-9
+"""Share by which the focal lengths of one lens may differ: products of two numbers of 64 bits."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,7 @@ def _keypoints(o: Seen) -> dict[str, Any]:
 
 def _standing(o: Seen, box: Float | None, lens: Intrinsics | None) -> dict[str, Any]:
     """What is known of where an object is: its pose, or only a coarse view, or nothing."""
-    motion = o.motion if o.motion is not None else _motion(o.view, lens) if o.is_fine and lens is not None else None
+    motion = o.motion if o.motion is not None else _turned(o.view, lens) if o.is_fine and lens is not None else None
     if motion is not None:
         pose = rigid(motion[:, :3], motion[:, 3])
         return placed(np.full((8, 3), np.nan) if box is None else box, pose, np.eye(4), lens)
@@ -201,7 +202,7 @@ def _standing(o: Seen, box: Float | None, lens: Intrinsics | None) -> dict[str, 
     return {"view": view, "pose_category": pose_category(view.azimuth_deg, elevation)}
 
 
-def _motion(view: Mapping[str, float], lens: Intrinsics) -> Float:
+def _turned(view: Mapping[str, float], lens: Intrinsics) -> Float:
     """RT (3, 4) of a viewpoint: the camera that looks at the model from there, turned the shortest way so that px, py is where
     the model's origin is seen.
     """

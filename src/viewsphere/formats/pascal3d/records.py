@@ -134,7 +134,7 @@ def _seen(file: Path, place: int, said: Mapping[str, Any]) -> Seen:
         flags=flags,
         anchors=_anchors(said.get("anchors")),
         id=own or None,
-        motion=None if _is_nothing(motion) else _motion(motion),
+        motion=None if _is_nothing(motion) else _rigid(motion),
     )
 
 
@@ -193,7 +193,7 @@ def _lens(value: Any) -> Float:
     return k
 
 
-def _motion(value: Any) -> Float:
+def _rigid(value: Any) -> Float:
     found = _numbers(value, "RT", 12).reshape(3, 4, order="F")
     quaternion_from_matrix(found[:, :3])
     return found
