@@ -14,6 +14,7 @@ from proven import close, equal
 from small import tree_hash
 from viewsphere import Dataset
 from viewsphere.check import check
+from viewsphere.codecs.palette import palette
 from viewsphere.errors import StoreError, UserError
 from viewsphere.report import write_report
 from viewsphere.run.exporting import export
@@ -294,7 +295,7 @@ BAD = [
     (thing(view="side"), "object 1: expected a struct `viewpoint`; found another"),
     (thing(anchors={"a": {"location": np.ones((1, 3)), "status": 1}}), "object 1: expected location of a, 2 numbers"),
     ({**thing(), "RT": np.ones((3, 4))}, r"object 1: quaternion_from_matrix: expected a \(3, 3\) rotation"),
-    (thing(cad=9), "object 1: expected cad_index 1 to 1; found 9"),
+    (thing(cad=9), "object 1: expected cad_index 1 to 1; found 9: its model is left out"),
 ]  # fmt: skip
 
 
@@ -302,7 +303,7 @@ BAD = [
 def test_broken_objects_are_named_and_left_out(tmp_path, broken, message):
     source = data_set(tmp_path / "mine")
     record(source / "Annotations/car_imagenet/n01.mat", [broken])
-    with pytest.raises(StoreError, match=f"n01.*: {message}") as error:
+    with pytest.raises(StoreError, match=rf"Annotations/car_imagenet/n01\.mat: {message}") as error:
         import_dataset("pascal3d", source, tmp_path / "in")
     assert len(str(error.value).splitlines()) == 2 and not (tmp_path / "in").exists()
     assert len(import_dataset("pascal3d", source, tmp_path / "in", keep_going=True).left_out) == 1
@@ -368,3 +369,24 @@ def test_what_is_no_data_set_says_so(tmp_path):
         (tmp_path / name).mkdir()
     with pytest.raises(StoreError, match="expected pictures that can be used; found none"):
         import_dataset("pascal3d", tmp_path, tmp_path / "out")
+
+
+@pytest.mark.parametrize("colors", [False, True])
+@pytest.mark.parametrize("numbers", [(1, 2), (2, 1), (0, 1)])
+def test_masks_belong_to_the_boxes_that_they_fill(tmp_path, numbers, colors):
+    """A small object's place in a map may be a large one's by its number, or that of the next where one has no pixels."""
+    record(tmp_path / "mine/Annotations/car_pascal/a.mat", [thing(box=(1, 1, 48, 38)), thing(box=(11, 11, 20, 20))])
+    picture(tmp_path / "mine/Images/car_pascal/a.jpg")
+    ids = np.zeros(SIZE[::-1], np.uint8)
+    large, small = np.s_[0:38, 0:48], np.s_[10:20, 10:20]
+    if numbers[0]:
+        ids[large] = numbers[0]
+    ids[small] = numbers[1]
+    place = tmp_path / "mine" / KIT / "SegmentationObject/a.png"
+    place.parent.mkdir(parents=True)
+    image = Image.fromarray(ids, "P")
+    image.putpalette(np.array(palette(), np.uint8).ravel().tolist())
+    (image.convert("RGB") if colors else image).save(place)
+    import_dataset("pascal3d", tmp_path / "mine", tmp_path / "in")
+    (sample,) = whole(Dataset(tmp_path / "in"))
+    assert [int(o.mask.sum()) for o in sample.objects] == [38 * 48 - 100 if numbers[0] else 0, 100]

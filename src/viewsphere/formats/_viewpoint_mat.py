@@ -149,7 +149,7 @@ class Cads:
         anchors, inside = self._anchors(o), 1 - o.truncation
         seen = sum(anchor["status"] == 1 for anchor in anchors.values())
         said = dict(o.source or {})
-        motion = None if sample.known_camera is None or not o.is_placed else _motion(o)
+        motion = None if sample.known_camera is None or not o.is_placed else _camera_from_cad(o)
         number = self._places.get(o.key) or said.get("cad_index")
         return {
             "class": o.category,
@@ -217,14 +217,18 @@ class Cads:
 
     def off(self, info: ModelInfo) -> bytes:
         """A model as OFF text."""
-        vertices, triangles = self.shape(info)
-        rows = [f"OFF\n{len(vertices)} {len(triangles)} 0"]
-        rows += [f"{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-        rows += [f"3 {a} {b} {c}" for a, b, c in triangles.tolist()]
-        return ("\n".join(rows) + "\n").encode()
+        return off_bytes(*self.shape(info))
 
 
-def _motion(o: ObjectAnnotation) -> NDArray[np.float64]:
+def off_bytes(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> bytes:
+    """A shape as OFF text."""
+    rows = [f"OFF\n{len(vertices)} {len(triangles)} 0"]
+    rows += [f"{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    rows += [f"3 {a} {b} {c}" for a, b, c in triangles.tolist()]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def _camera_from_cad(o: ObjectAnnotation) -> NDArray[np.float64]:
     """From the axes of an object's CAD model to those of the camera, (3, 4); of an unknown model, whose origin is its own."""
     motion = o.camera_from_object[:3].copy()
     motion[:, 3] = transform(motion, np.nan_to_num(o.box3d_object.mean(axis=0)))

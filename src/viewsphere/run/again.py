@@ -60,10 +60,10 @@ def _make(found: Again, of: str, folder: Path) -> None:
     folder.absolute().parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.absolute().parent) as place:
         made = Path(place) / "made"
-        for name, data in draft(found, of, made):
-            (made / name).parent.mkdir(parents=True, exist_ok=True)
-            (made / name).write_bytes(data)
         try:
+            for name, data in draft(found, of, made):
+                (made / name).parent.mkdir(parents=True, exist_ok=True)
+                (made / name).write_bytes(data)
             plan(str(made / RECIPE))
         except RecipeError as error:
             raise RecipeError(str(error).replace(str(made), str(folder))) from None

@@ -37,8 +37,9 @@ the middle of its model's box, of a coarse one without a distance; truncated, oc
 poses. Elsewhere the lens has the length focal x viewport: where one object has a viewpoint, px, py is where its axis meets the
 picture, and the pose is exactly the format's projection; where several have, that is the picture's middle, each is turned the
 shortest way to its px, py, and its pose is as near to the format's projection as said above. Where lengths differ, the lens and
-poses are not known. Masks are SegmentationObject's, of `pascal` pictures alone, where they lie in their objects' boxes. Not
-verified: that their numbers are places in `record.objects` in PASCAL3D+'s own files, too.
+poses are not known. Masks are SegmentationObject's, of `pascal` pictures alone: the numbers are places in `record.objects`, or
+as the boxes tell, and a mask that neither overlaps its object's box by half nor lies in it is none. Not verified: which of both
+they are in PASCAL3D+'s own files. A picture of another size than imgsize is refused where there is K; else the picture counts.
 
 Lost: sequences and sensors. `interval_azimuth`, `interval_elevation` and `error`, which tell of human annotators, are left out;
 azimuth_coarse and elevation_coarse are the exact ones. Not verified: that pixels count from 1, and status 2 (occluded) and 4

@@ -5,29 +5,23 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import chain, count
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.formats._again import pose_of
 from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._viewpoint_mat import off_bytes
 from viewsphere.formats.pascal3d.cads import read_shapes
-from viewsphere.formats.pascal3d.posed import Posed, posed
-from viewsphere.formats.pascal3d.records import read_record
+from viewsphere.formats.pascal3d.pictures import FILES_KEPT, Told, objects_of, picture_of, told_pictures
+from viewsphere.formats.pascal3d.posed import Posed, pinhole, posed
+from viewsphere.formats.pascal3d.records import Record, read_record
 from viewsphere.geometry.rotation import compose, rigid, transform
-from viewsphere.limits import limits
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.store.again import Again, AgainModel, Drafted, refuse_any
 from viewsphere.store.paths import file_inside, is_name
-
-Float = NDArray[np.float64]
-
-MAIN = "PASCAL/VOCdevkit/VOC2012/ImageSets/Main"
-LISTS = (MAIN, "Image_sets")
-"""Where files list the pictures of a split."""
 
 ALIKE = 1e-6
 """Pixels by which the lenses of two objects of one picture may differ."""
@@ -48,46 +42,50 @@ def again(path: Path) -> Again:
     has the principal point where it sees an object's origin. The world is that of a shot's first object. Raises StoreError for
     records that are none, and for objects without a CAD model.
     """
-    files = sorted(path.glob("Annotations/*/*.mat"))
-    if not files:
+    if not any(path.glob("Annotations/*/*.mat")):
         raise StoreError(f"{path}: expected PASCAL3D+ (Annotations/<category>_pascal/<index>.mat); found no such file")
-    splits, problems = _splits(path), list[str]()
-    models, shots = _Models(path, {}), dict[tuple[str, str], list[ListedShot]]()
-    others = divided = 0
-    for file in files:
-        source = file.parent.name.rpartition("_")[2]
-        if (source, file.stem) in shots:
-            continue  # a picture lies in the folders of all categories that it shows
+    problems, record_of = list[str](), lru_cache(FILES_KEPT)(read_record)
+    models, found = _Models(path, {}, {}), list[ListedShot]()
+    others = divided = resized = 0
+    for told in told_pictures(path, record_of, problems):
         try:
-            record = read_record(file_inside(path, file.relative_to(path).as_posix()))
-            seen = tuple(posed(record))
-            groups = list(_groups(seen))
-            problems += record.problems
-            others += len(record.objects) - len(seen)
+            record = record_of(told.files[0])
+            size = _size(path, told, record)
+            objects = objects_of(told, record_of)
+            own = None if record.lens is None else pinhole(record.lens, size)
+            seen = tuple(posed(objects, own, size))
+            resized += record.size not in (None, size)
+            groups = tuple(_groups(seen))
+            others += len(objects) - len(seen)
             divided += len(groups) > 1
-            named = f"{file.parent.name}/{record.filename or file.stem}"
-            shots[source, file.stem] = [
-                _shot(
-                    models, group, f"{file.stem}-{i}" if len(groups) > 1 else file.stem, named, splits.get(file.stem, "train")
-                )
-                for i, group in enumerate(groups)
-            ]
+            named = f"{told.files[0].parent.name}/{record.filename or told.name}"
+            for i, group in enumerate(groups):
+                name = f"{told.name}-{i}" if len(groups) > 1 else told.name
+                found.append(_shot(models, group, name, named, told.split))
         except MISTAKES as error:
-            problems.append(f"{file}: {one_line(error)}")
+            problems.append(f"{told.files[0]}: {one_line(error)}")
     refuse_any(problems)
-    found = tuple(shot for one in shots.values() for shot in one)
     if not found:
         raise StoreError(f"{path}: expected pictures with objects of known viewpoint; found none")
     return Again(
         name=path.resolve().name,
-        shots=found,
+        shots=tuple(found),
         models=models.found,
         formats=({"pascal3d": {"anchors": False}},),
-        notes=tuple(_notes(others, divided)),
+        notes=tuple(_notes(others, divided, resized)),
     )
 
 
-def _notes(others: int, divided: int) -> Iterator[str]:
+def _size(root: Path, told: Told, record: Record) -> tuple[int, int]:
+    """The width and height of a picture, as its record says where it is not there."""
+    there = picture_of(root, told, record)
+    size = there[1] if there else record.size
+    if size is None:
+        raise ValueError("expected a picture, or imgsize width height; found neither")
+    return size
+
+
+def _notes(others: int, divided: int, resized: int) -> Iterator[str]:
     if others:
         yield f"{others:,} objects have no exact viewpoint or no CAD model, and are left out"
     if divided:
@@ -95,6 +93,8 @@ def _notes(others: int, divided: int) -> Iterator[str]:
             f"{divided:,} pictures show objects that have lenses of their own in the format's projection: each lens is a shot, "
             "so that these do not hide one another"
         )
+    if resized:
+        yield f"{resized:,} pictures have another size than their record's imgsize, and are taken for right"
 
 
 def _groups(objects: Iterable[Posed]) -> Iterator[_Group]:
@@ -138,6 +138,7 @@ class _Models:
 
     root: Path
     found: dict[str, AgainModel]
+    words: dict[str, str]
 
     def key(self, category: str, number: int) -> str:
         """The key of a model, counted from 1; raises StoreError where there is none."""
@@ -145,9 +146,18 @@ class _Models:
             raise ValueError(f"found a category {category!r:.60}")
         key = f"{category} {number}"
         if key not in self.found:
-            word = re.sub(r"[^A-Za-z0-9_-]", "_", category).lstrip("_-")[:90] or "model"
+            word = self._word(category)
             self.found[key] = AgainModel(self._source(category, number, word), category, name=word)
         return key
+
+    def _word(self, category: str) -> str:
+        """A category's name in letters, digits, `_` and `-`, unlike those of others."""
+        if category not in self.words:
+            plain = re.sub(r"[^A-Za-z0-9_-]", "_", category).lstrip("_-")[:90] or "model"
+            taken = {word.casefold() for word in self.words.values()}
+            ways = chain((plain,), (f"{plain}_{i}" for i in count(2)))
+            self.words[category] = next(way for way in ways if way.casefold() not in taken)
+        return self.words[category]
 
     def _source(self, category: str, number: int, word: str) -> Path | Drafted:
         file = file_inside(self.root, f"CAD/{category}/{number:02}.off")
@@ -159,35 +169,4 @@ class _Models:
             raise StoreError(
                 f"{self.root}: expected CAD/{category}/{number:02}.off, or it in CAD/{category}.mat; found neither"
             )
-        return Drafted(f"{word}/{number:02}.off", _off_bytes(*cads[number - 1]))
-
-
-def _off_bytes(vertices: Float, triangles: NDArray[np.int32]) -> bytes:
-    """A model as OFF text."""
-    rows = [f"OFF\n{len(vertices)} {len(triangles)} 0"]
-    rows += [f"{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    rows += [f"3 {a} {b} {c}" for a, b, c in triangles.tolist()]
-    return ("\n".join(rows) + "\n").encode()
-
-
-def _splits(root: Path) -> dict[str, str]:
-    """The split of each picture that a list names."""
-    categories = {folder.name.rpartition("_")[0] for folder in (root / "Annotations").iterdir()}
-    found: dict[str, str] = {}
-    for file in (file for name in LISTS for file in sorted((root / name).glob("*.txt"))):
-        own = file_inside(root, file.relative_to(root).as_posix())
-        split = _split_of(file.stem, categories)
-        if own.stat().st_size > limits.MAX_POSES_BYTES:
-            raise StoreError(f"{own}: expected at most {limits.MAX_POSES_BYTES:,} bytes (limit MAX_POSES_BYTES); found more")
-        for words in map(str.split, own.read_text("utf-8", errors="replace").splitlines()):
-            if words and split and split != "trainval":
-                found.setdefault(words[0], split)
-    return found
-
-
-def _split_of(stem: str, categories: Iterable[str]) -> str:
-    """The split that a list's name ends with, behind the category and, of release lists, the source."""
-    for category in sorted(categories, key=len, reverse=True):
-        if category and stem.startswith(f"{category}_"):
-            return stem.removeprefix(f"{category}_").removeprefix("imagenet_").removeprefix("pascal_")
-    return stem
+        return Drafted(f"{word}/{number:02}.off", off_bytes(*cads[number - 1]))

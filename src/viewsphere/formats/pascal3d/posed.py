@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from viewsphere.formats.pascal3d.records import Float, Record, Seen
+from viewsphere.formats.pascal3d.records import Float, Seen
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import rigid, transform
 from viewsphere.model.camera import Intrinsics
@@ -24,20 +24,19 @@ class Posed:
     camera_from_object: Float
 
 
-def posed(record: Record) -> Iterator[Posed]:
-    """The objects of which the exact viewpoint and the model are known. Raises ValueError for a record without a size."""
-    if record.size is None:
-        raise ValueError("expected imgsize width height; found none")
-    width, height = record.size
-    own = None
-    if record.lens is not None:
-        k = record.lens
-        own = Intrinsics(width=width, height=height, fx=k[0, 0], fy=k[1, 1], cx=k[0, 2], cy=k[1, 2], skew=k[0, 1])
-    for seen in record.objects:
+def posed(objects: Iterable[Seen], own: Intrinsics | None, size: tuple[int, int]) -> Iterator[Posed]:
+    """The objects of which the exact viewpoint and the model are known. `own`: the lens of a picture that says K."""
+    for seen in objects:
         if seen.cad and own is not None and seen.motion is not None:
             yield Posed(seen.kind, seen.cad, own, rigid(seen.motion[:, :3], seen.motion[:, 3]))
         elif seen.cad and seen.is_fine:
-            yield _by_viewpoint(seen, width, height)
+            yield _by_viewpoint(seen, *size)
+
+
+def pinhole(k: Float, size: tuple[int, int]) -> Intrinsics:
+    """The lens of K (3, 3), of a picture of a width and a height."""
+    (fx, skew, cx), (_, fy, cy), _ = k.tolist()
+    return Intrinsics(width=size[0], height=size[1], fx=fx, fy=fy, cx=cx, cy=cy, skew=skew)
 
 
 def _by_viewpoint(seen: Seen, width: int, height: int) -> Posed:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -13,27 +12,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError
-from viewsphere.formats._listed import MISTAKES, TRAIN, VAL, Listed, listed_dataset, lists, one_line, unposed
+from viewsphere.formats._listed import MISTAKES, Listed, listed_dataset, one_line, unposed
+from viewsphere.formats._maps import ALIKE, boxes_of, check_map, numbered, numbers_of, overlap
 from viewsphere.formats._placed import placed
-from viewsphere.formats._posed import picture_inside
 from viewsphere.formats._viewpoint_mat import KIT
 from viewsphere.formats.pascal3d.cads import read_cads
+from viewsphere.formats.pascal3d.pictures import FILES_KEPT, Of, Told, objects_of, picture_of, told_pictures
+from viewsphere.formats.pascal3d.posed import pinhole
 from viewsphere.formats.pascal3d.records import Record, Seen, read_record
 from viewsphere.geometry.camera import orbit_rotation
-from viewsphere.geometry.mask import encode_rle, mask_box
+from viewsphere.geometry.mask import encode_rle
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import product, rigid
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.sample import ObjectAnnotation, ObjectView, Sample
+from viewsphere.model.sample import Box, ObjectAnnotation, ObjectView, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignModel, foreign_object
 from viewsphere.store.paths import file_inside, is_name
 
 Float = NDArray[np.float64]
 
-SUFFIXES = (".jpg", ".JPEG", ".jpeg", ".JPG", ".png")
 PASCAL = "pascal"
 """The source of pictures that have masks; that of others is imagenet."""
 
@@ -41,20 +40,18 @@ STATES = {1: 0, 2: 1, 3: 1, 4: 2}
 """Of keypoints by the status of anchors: visible, occluded, outside; of others nobody knows (3)."""
 
 NEAR = 3.0
-"""Pixels by which a mask may reach out of its object's box."""
+"""Pixels by which a mask that overlaps its object's box too little may reach out of it."""
 
 SAME = 1e-9
-FILES_KEPT = 64
-
-Of = Callable[[Path], Record]
+"""Share by which the focal lengths of one lens may differ: products of two numbers of 64 bits."""
 
 
 @dataclass(frozen=True)
 class _Shown(Listed):
-    """A picture, the categories in whose folders it lies, and its map of objects, None where it has none."""
+    """A picture, what is told of it, and its map of objects, None where it has none."""
 
-    kinds: tuple[str, ...] = ()
-    masks: Path | None = None
+    told: Told
+    masks: Path | None
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
@@ -69,18 +66,16 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     pictures = tuple(_pictures(path, record_of, problems))
     kinds, shown, most = dict.fromkeys(_named(path)), set[str](), 1
     for picture in pictures:
-        for file in filter(None, picture.said[: len(picture.kinds)]):
-            problems += record_of(file).problems
-        found = _objects(picture, record_of)
+        found = objects_of(picture.told, record_of)
         shown |= {o.kind for o in found}
         most = max([most, len(found), *(o.id or 0 for o in found)])
     names = (*kinds, *sorted(shown - kinds.keys()))
     categories = {name: Category(number, name, "") for number, name in enumerate(names, 1)}
     cads = read_cads(path, {name: one for name, one in categories.items() if is_name(name)}, problems)
     problems += (
-        f"{picture.name}: object {o.place}: expected cad_index 1 to {len(cads[o.kind])}; found {o.cad}"
+        f"{o.file}: object {o.place}: expected cad_index 1 to {len(cads[o.kind])}; found {o.cad}: its model is left out"
         for picture in pictures
-        for o in _objects(picture, record_of)
+        for o in objects_of(picture.told, record_of)
         if o.kind in cads and o.cad > len(cads[o.kind])
     )
     models = [model for found in cads.values() for model in found]
@@ -101,83 +96,36 @@ def _named(root: Path) -> Iterator[str]:
 
 
 def _pictures(root: Path, record_of: Of, problems: list[str]) -> Iterator[_Shown]:
-    """The pictures of all folders, each once."""
-    folders: defaultdict[tuple[str, str], list[Path]] = defaultdict(list)
-    for file in sorted((root / "Annotations").glob("*/*.mat")):
-        kind, _, source = file.parent.name.rpartition("_")
-        if kind and source:
-            folders[source, file.stem].append(file)
-    splits = _splits(root, {file.parent.name.rpartition("_")[0] for files in folders.values() for file in files}, problems)
-    for (source, name), files in sorted(folders.items()):
+    for told in told_pictures(root, record_of, problems):
         try:
-            yield _picture(root, splits, source, name, files, record_of)
+            yield _picture(root, told, record_of(told.files[0]))
         except MISTAKES as error:
-            problems.append(f"{files[0]}: {one_line(error)}")
+            problems.append(f"{told.files[0]}: {one_line(error)}")
 
 
-def _picture(
-    root: Path, splits: Mapping[tuple[str, str], str], source: str, name: str, files: Sequence[Path], record_of: Of
-) -> _Shown:
+def _picture(root: Path, told: Told, record: Record) -> _Shown:
     """A picture of which all that is said can be read."""
-    kinds = tuple(file.parent.name.rpartition("_")[0] for file in files)
-    inside = tuple(file_inside(root, file.relative_to(root).as_posix()) for file in files)
-    places = [f"Images/{kind}_{source}/{name}" for kind in kinds]
-    there = next((place for place in places if any((root / f"{place}{end}").is_file() for end in SUFFIXES)), places[0])
-    file, size = picture_inside(root, there, *SUFFIXES)
-    for one in inside:
-        record_of(one)
-    masks = file_inside(root, f"{KIT}/SegmentationObject/{name}.png")
-    has_masks = source == PASCAL and masks.is_file()
-    if has_masks:
-        with opened(masks) as found:
-            if found.size != size or found.mode not in ("P", "L"):
-                raise StoreError(f"expected objects' numbers in {masks.name}, of the picture's size; found other pixels")
-    split = next((splits[kind, name] for kind in (*kinds, "") if (kind, name) in splits), TRAIN)
-    own = masks if has_masks else None
-    return _Shown(split, file.relative_to(root / "Images").as_posix(), file, size, (*inside, own), kinds, own)
-
-
-def _splits(root: Path, kinds: set[str], problems: list[str]) -> dict[tuple[str, str], str]:
-    """The split of a picture by its name and a category, or "" for lists of all categories."""
-    found: dict[tuple[str, str], str] = {}
-    for folder in (f"{KIT}/ImageSets/Main", "Image_sets"):
-        named = list(lists(root, folder, problems))
-        stems = {stem for stem, _, _ in named}
-        for stem, _, rows in named:
-            kind = max((kind for kind in kinds if stem.startswith(f"{kind}_")), key=len, default="")
-            split = stem.removeprefix(f"{kind}_").removeprefix("imagenet_") if kind else stem
-            if split == "trainval" and {stem.removesuffix(split) + own for own in (TRAIN, VAL)} <= stems:
-                continue
-            if is_name(split) and (kind or split in (TRAIN, VAL, "test", "trainval")):
-                found |= {key: split for row in rows if (key := (kind, row.split()[0])) not in found}
-    return found
-
-
-def _objects(picture: _Shown, record_of: Of) -> list[Seen]:
-    """The objects of a picture, each of the record in the folder of its category, else of the first one; their ids are those
-    that all have, else they count from 1.
-    """
-    found: list[Seen] = []
-    for number, (kind, file) in enumerate(zip(picture.kinds, picture.said, strict=False)):
-        assert file is not None
-        others = set(picture.kinds) - {kind}
-        found += [o for o in record_of(file).objects if o.kind == kind or (number == 0 and o.kind not in others)]
-    ids = [o.id for o in found]
-    is_numbered = None not in ids and len(set(ids)) == len(ids)
-    found.sort(key=lambda o: (o.id or 0) if is_numbered else o.place)
-    return found if is_numbered else [replace(o, id=number) for number, o in enumerate(found, 1)]
+    there = picture_of(root, told, record)
+    if there is None:
+        raise ValueError(f"expected a picture; found no Images/{told.kinds[0]}_{told.source}/{told.name}")
+    file, size = there
+    masks = file_inside(root, f"{KIT}/SegmentationObject/{told.name}.png")
+    own = masks if told.source == PASCAL and masks.is_file() else None
+    if own:
+        check_map(own, size)
+    return _Shown(told.split, file.relative_to(root / "Images").as_posix(), file, size, (*told.files, own), told, own)
 
 
 def _sample(
     categories: Mapping[str, Category], cads: Mapping[str, Sequence[ForeignModel]], record_of: Of, picture: _Shown, index: int
 ) -> Sample:
-    assert picture.said[0] is not None
-    seen, masks = _objects(picture, record_of), None
-    if picture.masks:
-        with opened(picture.masks) as found:
-            masks = np.array(found)
-    lens = _lens(record_of(picture.said[0]).lens, seen, picture.size)
-    objects = [_annotation(o, categories[o.kind], cads.get(o.kind, ()), picture, lens, masks) for o in seen]
+    seen = objects_of(picture.told, record_of)
+    masks = _masks(picture.masks, seen) if picture.masks else [None] * len(seen)
+    lens = _lens(record_of(picture.told.files[0]).lens, seen, picture.size)
+    objects = [
+        _annotation(o, categories[o.kind], cads.get(o.kind, ()), picture, lens, mask)
+        for o, mask in zip(seen, masks, strict=True)
+    ]
     sample = replace(unposed(picture, index, objects, {"file_name": picture.name}), asked=("keypoints",), instant=index)
     camera = lens and Camera(lens, np.eye(3), np.zeros(3))
     return sample if camera is None else replace(sample, known_camera=camera, image_size=None)
@@ -189,8 +137,7 @@ def _lens(known: Float | None, seen: Sequence[Seen], size: tuple[int, int]) -> I
     """
     width, height = size
     if known is not None:
-        k = known.tolist()
-        return Intrinsics(width=width, height=height, fx=k[0][0], fy=k[1][1], cx=k[0][2], cy=k[1][2], skew=k[0][1])
+        return pinhole(known, size)
     fine = [o.view for o in seen if o.is_fine]
     lengths = [view["focal"] * view["viewport"] for view in fine]
     if not fine or max(lengths) - min(lengths) > SAME * max(lengths):
@@ -205,26 +152,30 @@ def _annotation(
     cads: Sequence[ForeignModel],
     picture: Listed,
     lens: Intrinsics | None,
-    masks: NDArray[Any] | None,
+    mask: str | None,
 ) -> ObjectAnnotation:
     """An object with its mask, model and pose, and as COCO would have it in `source`."""
     x0, y0, x1, y1 = o.box
     source: dict[str, Any] = {"bbox": [x0, y0, x1 - x0, y1 - y0], "area": (x1 - x0) * (y1 - y0), **o.flags}
     source |= {"cad_index": o.cad, "viewpoint": dict(o.view)} if o.cad or o.view else {}
     source |= {"anchors": {name: status for name, (_, status) in o.anchors.items()}} if o.anchors else {}
-    counts = None if masks is None else _mask(masks == o.place, o)
     info = cads[o.cad - 1].info if 0 < o.cad <= len(cads) else None
     known: dict[str, Any] = {"key": info.key if info else "", **_standing(o, info and info.box3d_object, lens)}
     assert o.id is not None
-    return foreign_object(o.id, category, picture.size, source, counts, o.box, box2d=o.box, more=_keypoints(o), **known)
+    return foreign_object(o.id, category, picture.size, source, mask, o.box, box2d=o.box, more=_keypoints(o), **known)
 
 
-def _mask(mask: NDArray[np.bool_], o: Seen) -> str | None:
-    """The run-length code of a mask; None for one of nothing, or that is another object's by its box."""
-    found = mask_box(mask)
-    if found is None or any(found[i] < o.box[i] - NEAR or found[i + 2] > o.box[i + 2] + NEAR for i in (0, 1)):
-        return None
-    return encode_rle(mask)
+def _masks(file: Path, seen: Sequence[Seen]) -> Iterator[str | None]:
+    """The run-length code of each object's mask; None for one of nothing, or that is another object's by its box."""
+    numbers = numbers_of(file)
+    found = boxes_of(numbers)
+    for o, number in zip(seen, numbered([(o.place, o.box) for o in seen], found), strict=True):
+        is_own = number > 0 and (overlap(o.box, found[number]) >= ALIKE or _is_inside(found[number], o.box))
+        yield encode_rle(numbers == number) if is_own else None
+
+
+def _is_inside(one: Box, other: Box) -> bool:
+    return all(one[i] >= other[i] - NEAR and one[i + 2] <= other[i + 2] + NEAR for i in (0, 1))
 
 
 def _keypoints(o: Seen) -> dict[str, Any]:
@@ -238,7 +189,7 @@ def _keypoints(o: Seen) -> dict[str, Any]:
 
 def _standing(o: Seen, box: Float | None, lens: Intrinsics | None) -> dict[str, Any]:
     """What is known of where an object is: its pose, or only a coarse view, or nothing."""
-    motion = o.motion if o.motion is not None else _motion(o.view, lens) if o.is_fine and lens is not None else None
+    motion = o.motion if o.motion is not None else _turned(o.view, lens) if o.is_fine and lens is not None else None
     if motion is not None:
         pose = rigid(motion[:, :3], motion[:, 3])
         return placed(np.full((8, 3), np.nan) if box is None else box, pose, np.eye(4), lens)
@@ -251,7 +202,7 @@ def _standing(o: Seen, box: Float | None, lens: Intrinsics | None) -> dict[str, 
     return {"view": view, "pose_category": pose_category(view.azimuth_deg, elevation)}
 
 
-def _motion(view: Mapping[str, float], lens: Intrinsics) -> Float:
+def _turned(view: Mapping[str, float], lens: Intrinsics) -> Float:
     """RT (3, 4) of a viewpoint: the camera that looks at the model from there, turned the shortest way so that px, py is where
     the model's origin is seen.
     """

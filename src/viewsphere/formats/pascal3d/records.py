@@ -29,11 +29,12 @@ COARSE = ("azimuth_coarse", "elevation_coarse")
 
 @dataclass(frozen=True)
 class Seen:
-    """An object of a record: its place there from 1 on; its half-open box; the number from 1 on of its CAD model, 0 if it has
-    none; what is said of its viewpoint, as far as it has one; flags; anchors, each with its place, None where it has none, and
-    its status; and, of viewsphere's own, its id and RT (3, 4), None elsewhere.
+    """An object of a record: that file, and its place there from 1 on; its half-open box; the number from 1 on of its CAD
+    model, 0 if it has none; what is said of its viewpoint, as far as it has one; flags; anchors, each with its place, None
+    where it has none, and its status; and, of viewsphere's own, its id and RT (3, 4), None elsewhere.
     """
 
+    file: Path
     place: int
     kind: str
     box: Box
@@ -94,7 +95,7 @@ def read_record(file: Path) -> Record:
     objects, problems = list[Seen](), list[str]()
     for place, one in enumerate(said, 1):
         try:
-            objects.append(_seen(place, one))
+            objects.append(_seen(file, place, one))
         except ValueError as error:
             problems.append(f"{file}: object {place}: {error}")
     name, lens = rows[0].get("filename"), _lens(rows[0]["K"]) if "K" in rows[0] else None
@@ -113,7 +114,7 @@ def _size(value: Any) -> tuple[int, int] | None:
     return int(width), int(height)
 
 
-def _seen(place: int, said: Mapping[str, Any]) -> Seen:
+def _seen(file: Path, place: int, said: Mapping[str, Any]) -> Seen:
     kind = said.get("class")
     if not isinstance(kind, str) or not kind or not kind.isprintable():
         raise ValueError(f"expected a class; found {kind!r:.60}")
@@ -124,6 +125,7 @@ def _seen(place: int, said: Mapping[str, Any]) -> Seen:
     flags = {name: value for name in FLAGS if (value := _whole(said, name, 1)) is not None}
     motion = said.get("RT")
     return Seen(
+        file=file,
         place=place,
         kind=kind,
         box=(x0 - 1, y0 - 1, x1, y1),
@@ -132,7 +134,7 @@ def _seen(place: int, said: Mapping[str, Any]) -> Seen:
         flags=flags,
         anchors=_anchors(said.get("anchors")),
         id=own or None,
-        motion=None if _is_nothing(motion) else _motion(motion),
+        motion=None if _is_nothing(motion) else _rigid(motion),
     )
 
 
@@ -191,7 +193,7 @@ def _lens(value: Any) -> Float:
     return k
 
 
-def _motion(value: Any) -> Float:
+def _rigid(value: Any) -> Float:
     found = _numbers(value, "RT", 12).reshape(3, 4, order="F")
     quaternion_from_matrix(found[:, :3])
     return found

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.formats._listed import MISTAKES, SUFFIXES, TRAIN, Listed, check_bytes, listed_dataset, lists, one_line, unposed
+from viewsphere.formats._maps import boxes_of, check_map, numbered, numbers_of, unannotated
 from viewsphere.formats._upright import shown_size
-from viewsphere.formats.voc.maps import boxes_of, check_map, numbered, numbers_of, unannotated
 from viewsphere.formats.voc.writing import BOX
 from viewsphere.geometry.mask import encode_rle, mask_polygons, rle_of_polygons
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
@@ -242,13 +242,12 @@ def _unannotated(picture: Listed, listed: Sequence[str], problems: list[str]) ->
 def _shown(categories: Mapping[str, Category], listed: Sequence[str], first: int, picture: Listed, index: int) -> Sample:
     xml, file, _ = picture.said
     found, ids = list(_objects(picture, listed, [])), numbers_of(file) if file else None
-    places = {o.place: o.corners(first if xml else 0) for o in found}
-    numbers = {} if ids is None else numbered(places, boxes_of(ids)) if xml else {place: place for place in places}
+    places = [(o.place, o.corners(first if xml else 0)) for o in found]
+    numbers = [0] * len(found) if ids is None else numbered(places, boxes_of(ids)) if xml else [place for place, _ in places]
     objects: list[ObjectAnnotation] = []
-    for o in found:
-        mask = None if ids is None or o.place not in numbers else ids == numbers[o.place]
-        category, box = categories[o.name], places[o.place]
-        objects.append(_annotation(len(objects) + 1, o, category, picture.size, box, first, mask))
+    for o, number, (_, box) in zip(found, numbers, places, strict=True):
+        mask = None if ids is None or not number else ids == number
+        objects.append(_annotation(len(objects) + 1, o, categories[o.name], picture.size, box, first, mask))
     return unposed(picture, index, objects, {"file_name": picture.name + picture.file.suffix})
 
 

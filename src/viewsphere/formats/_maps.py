@@ -1,4 +1,4 @@
-"""PASCAL VOC's maps of objects and of classes, as it and others write them."""
+"""PASCAL VOC's maps of objects and of classes, as it, PASCAL3D+ and others write them."""
 
 from __future__ import annotations
 
@@ -52,18 +52,18 @@ def boxes_of(numbers: Numbers) -> dict[int, Box]:
     return found
 
 
-def numbered(places: Mapping[int, Box], found: Mapping[int, Box]) -> dict[int, int]:
-    """The number in the map of each object, by its place in the annotation. VOC's are the places themselves; datumaro counts
-    those that have pixels: there the boxes tell.
+def numbered(said: Sequence[tuple[int, Box]], found: Mapping[int, Box]) -> list[int]:
+    """The number in the map of each object, 0 if none, by its place in the annotation and its box. VOC's are the places
+    themselves; datumaro counts those that have pixels: there the boxes tell.
     """
-    sure = {place: place for place, box in places.items() if place in found and _overlap(box, found[place]) >= ALIKE}
-    for place, box in places.items():
+    sure = {i: place for i, (place, box) in enumerate(said) if place in found and overlap(box, found[place]) >= ALIKE}
+    for i, (_, box) in enumerate(said):
         left = [number for number in found if number not in sure.values()]
-        best = max(left, key=lambda number: _overlap(box, found[number]), default=0)
-        if place not in sure and best and _overlap(box, found[best]) >= ALIKE:
-            sure[place] = best
-    unsure = {place: place for place in places if place not in sure and place in found and place not in sure.values()}
-    return {**sure, **unsure}
+        best = max(left, key=lambda number: overlap(box, found[number]), default=0)
+        if i not in sure and best and overlap(box, found[best]) >= ALIKE:
+            sure[i] = best
+    unsure = {i: place for i, (place, _) in enumerate(said) if place in found and place not in sure.values()}
+    return [sure.get(i, unsure.get(i, 0)) for i in range(len(said))]
 
 
 def unannotated(objects: Numbers, classes: Numbers, names: Sequence[str]) -> Iterator[tuple[int, str, Box]]:
@@ -77,7 +77,7 @@ def unannotated(objects: Numbers, classes: Numbers, names: Sequence[str]) -> Ite
         yield number, names[most - 1], box
 
 
-def _overlap(one: Box, other: Box) -> float:
+def overlap(one: Box, other: Box) -> float:
     """The boxes' intersection over union."""
     width, height = (min(one[i + 2], other[i + 2]) - max(one[i], other[i]) for i in (0, 1))
     inside = max(0.0, width) * max(0.0, height)
