@@ -141,7 +141,7 @@ TYPED = {
 
 @pytest.mark.parametrize("what", TYPED)
 def test_elements_of_other_types_are_refused(what):
-    with pytest.raises(ValueError, match="^found (an element|an array of size|numbers that|a text that)") as error:
+    with pytest.raises(ValueError, match=r"^found (an element|an array of size|numbers that|a text that)") as error:
         read_mat(of(*TYPED[what]), MOST_BYTES)
     assert type(error.value) is ValueError
 

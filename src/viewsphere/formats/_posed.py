@@ -24,8 +24,6 @@ from viewsphere.store.foreign import ForeignDataset, ForeignFrame, Loaded, refus
 from viewsphere.store.paths import file_inside
 
 RIGHT_ANGLES = 1e-3
-MISTAKES = (LookupError, TypeError, ValueError, AttributeError, OSError, OverflowError, SyntaxError, UserError)
-"""Errors of files of another structure than expected."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.formats._posed import MISTAKES, Posed, camera_of, check_picture, picture_inside, posed_dataset
+from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._posed import Posed, camera_of, check_picture, picture_inside, posed_dataset
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset
@@ -62,7 +63,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
             check_picture(size, lens)
             found.append(Posed(file, camera_of(lens, pose), split))
         except MISTAKES as error:
-            problems.append(f"{model.file}: image {image.name!r:.80}: {error}")
+            problems.append(f"{model.file}: image {image.name!r:.80}: {one_line(error)}")
     texts = [model.cameras, model.file, *(file for file in sorted(folder.glob("*.txt")) if file.stem not in OWN)]
     return posed_dataset(path, found, texts, problems, keep_going)
 
@@ -102,7 +103,7 @@ def read_model(path: Path) -> Model:
         lenses = {number: _lens(name, size, values) for number, name, size, values in read_cameras(cameras_file)}
         images = sorted(read_images(images_file), key=lambda image: image.name)
     except (*MISTAKES, struct.error) as error:
-        raise StoreError(f"{folder}: expected a model of COLMAP's; found: {error}") from None
+        raise StoreError(f"{folder}: expected a model of COLMAP's; found: {one_line(error)}") from None
     return Model(cameras_file, images_file, lenses, tuple(images), splits)
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.formats._again import cameras_again, pose_of
-from viewsphere.formats._posed import MISTAKES, camera_of, picture_inside
+from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._posed import camera_of, picture_inside
 from viewsphere.formats.nerfstudio.reading import lens_of, pose_said, said_frames, split_of, transforms_files
 from viewsphere.model.listed import ListedShot
 from viewsphere.store.again import Again, refuse_any
@@ -29,8 +30,7 @@ def again(path: Path) -> Again:
                 shot = _shot(file, said, lists)
                 shots.setdefault(shot.image or str(len(shots)), shot)
             except MISTAKES as error:
-                told = f"found no {error}" if isinstance(error, KeyError) else error
-                problems.append(f"{file}: frame number {number}: {told}")
+                problems.append(f"{file}: frame number {number}: {one_line(error)}")
     refuse_any(problems)
     return cameras_again(path, tuple(shots.values()), files[0].parent, FOLDERS, "nerfstudio", "+z")
 

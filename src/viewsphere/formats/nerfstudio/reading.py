@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.formats._posed import MISTAKES, Posed, camera_of, check_picture, picture_inside, posed_dataset
+from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._posed import Posed, camera_of, check_picture, picture_inside, posed_dataset
 from viewsphere.formats.nerfstudio.synthetic import SPLITS
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset
@@ -61,8 +62,7 @@ def _pictures(file: Path, problems: list[str]) -> Iterator[Posed]:
         try:
             yield _picture(file, said, lists)
         except MISTAKES as error:
-            told = f"found no {error}" if isinstance(error, KeyError) else error
-            problems.append(f"{file}: frame number {number}: {told}")
+            problems.append(f"{file}: frame number {number}: {one_line(error)}")
 
 
 def said_frames(file: Path) -> Iterator[tuple[int, Mapping[str, Any], Mapping[str, set[str]]]]:
