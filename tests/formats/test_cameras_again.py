@@ -237,6 +237,16 @@ def spoil(scene, what):
             said.write_text('{"frames": []}')
         case "text":
             said.write_text('{"frames": [')
+        case "lists":
+            said.write_text(json.dumps({"frames": [{"file_path": "a.png"}], "train_filenames": 5}))
+        case "nan":
+            (scene / "sparse/0/cameras.txt").write_text("1 PINHOLE 64 48 nan 60 32 24\n2 PINHOLE 64 48 60 60 32 24\n")
+            (scene / "sparse/0/images.txt").write_text("1 1 0 0 0 0 0 0 1 a.jpg\n\n")
+            images.unlink()
+        case "far":
+            (scene / "sparse/0/cameras.txt").write_text("1 PINHOLE 64 48 60 60 32 24\n")
+            (scene / "sparse/0/images.txt").write_text("1 1 0 0 0 1e300 0 0 1 a.jpg\n\n")
+            images.unlink()
         case "mesh":
             (scene.parent / "mesh.obj").write_text("v 0 0 0")
             (scene / "mesh.obj").symlink_to(scene.parent / "mesh.obj")
@@ -244,8 +254,11 @@ def spoil(scene, what):
 
 BROKEN = {
     "colmap": {"half": "expected a model of COLMAP's", "camera": r"found no camera 1 \(2 more like it\)",
-               "model": "expected one of SIMPLE_PINHOLE", "mesh": "a link that leads out of it"},
-    "nerfstudio": {"pose": "frame number 0: found no 'transform_matrix'", "mirror": "expected a rigid pose",
+               "model": "expected one of SIMPLE_PINHOLE", "mesh": "a link that leads out of it",
+               "nan": r"expected a model of COLMAP's; found: fx: expected a .*number.*; found nan$",
+               "far": r"image 'a.jpg': world_from_camera\[0\]\[3\]: expected a number .*; found -1e\+300"},
+    "nerfstudio": {"lists": r"transforms.json: expected train_filenames, a list of names; found 5",
+                   "pose": "frame number 0: found no 'transform_matrix'", "mirror": "expected a rigid pose",
                    "outside": r"expected relative paths without '\.\.'", "none": "expected pictures with cameras; found none",
                    "text": "expected JSON"},
 }  # fmt: skip
@@ -260,6 +273,29 @@ def test_broken_data_sets_are_told_in_a_line_and_leave_nothing(tmp_path, kind, w
     with pytest.raises(StoreError, match=BROKEN[kind][what]) as error:
         make_again(kind, scene, tmp_path / "again")
     assert "\n" not in str(error.value) and sorted(tmp_path.rglob("*")) == before
+
+
+FRAME = {"file_path": "images/a.png", "w": 64, "h": 48, "fl_x": 60.0, "transform_matrix": np.eye(4).tolist()}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"file_path": ""}, "expected a file_path; found ''"),
+        ({"file_path": None}, "expected a file_path; found None"),
+        ({"fl_x": None}, "expected fl_x, or camera_angle_x; found neither"),
+        ({"fl_x": None, "camera_angle_x": 0}, "expected fl_x, or camera_angle_x; found neither"),
+        ({"fl_x": "wide"}, "expected fl_x, a number; found 'wide'"),
+        ({"k1": [1]}, r"expected k1, a number; found \[1\]"),
+        ({"w": "x"}, "expected w, a number; found 'x'"),
+        ({"w": 20_000}, "camera: expected at most 16384 pixels a side; found 20000 x 48"),
+        ({"transform_matrix": [[1], [1, 2]]}, r"expected a transform_matrix of 4 x 4 numbers; found \[\[1\], \[1, 2\]\]"),
+    ],
+)
+def test_frames_of_other_values_are_told_in_words(tmp_path, changes, message):
+    (tmp_path / "transforms.json").write_text(json.dumps({"frames": [FRAME | changes]}))
+    with pytest.raises(StoreError, match=f"frame number 0: {message}$"):
+        make_again("nerfstudio", tmp_path, tmp_path / "again")
 
 
 def test_cameras_that_look_away_from_one_another_have_a_stand_in_ahead_of_the_first():

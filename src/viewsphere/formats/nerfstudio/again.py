@@ -9,7 +9,7 @@ from typing import Any
 from viewsphere.formats._again import cameras_again, pose_of
 from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats._posed import camera_of, picture_inside
-from viewsphere.formats.nerfstudio.reading import lens_of, pose_said, said_frames, split_of, transforms_files
+from viewsphere.formats.nerfstudio.reading import lens_of, name_of, pose_said, said_frames, split_of, transforms_files
 from viewsphere.model.listed import ListedShot
 from viewsphere.store.again import Again, refuse_any
 
@@ -36,10 +36,8 @@ def again(path: Path) -> Again:
 
 
 def _shot(file: Path, said: Mapping[str, Any], lists: Mapping[str, set[str]]) -> ListedShot:
-    name = str(said["file_path"])
-    if said.get("w") and said.get("h"):
-        size = int(said["w"]), int(said["h"])
-    else:
+    name, size = name_of(said), (0, 0)
+    if not (said.get("w") and said.get("h")):
         _, size = picture_inside(file.parent, name.removeprefix("./"), ".png", ".jpg")
     lens, pose = lens_of(said, size), pose_said(said)
     camera_of(lens, pose)
