@@ -289,6 +289,13 @@ def broken(tree, what):
             (scene / "scene_gt.json").write_text(
                 json.dumps({"0": [{"obj_id": "../5", "cam_R_m2c": [1, 0, 0, 0, 1, 0, 0, 0, 1], "cam_t_m2c": [0, 0, 1]}]})
             )
+        case _:
+            out_of_bounds(tree, what)
+
+
+def out_of_bounds(tree, what):
+    scene = tree / "train_pbr/000004"
+    match what:
         case "far":
             text = json.loads((scene / "scene_gt.json").read_text())
             text["3"][1]["cam_t_m2c"][0] = 1e300

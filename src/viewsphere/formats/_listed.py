@@ -45,7 +45,7 @@ Picture = TypeVar("Picture", bound=Listed)
 
 
 def one_line(error: object) -> str:
-    """An error's message without line breaks: of values out of bounds the first, with its field; bare ones of Python's framed."""
+    """An error's message without line breaks: of values out of bounds the first, with its field; Python's own framed."""
     match error:
         case ValidationError():
             place = error.errors(include_url=False)[0]["loc"]
