@@ -16,6 +16,7 @@ from proven import close
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.errors import StoreError
 from viewsphere.run.again import make_again
+from viewsphere.run.importing import import_dataset
 from viewsphere.run.stand_in import stand_in
 from viewsphere.sampling.plan import plan
 
@@ -273,6 +274,21 @@ def test_broken_data_sets_are_told_in_a_line_and_leave_nothing(tmp_path, kind, w
     with pytest.raises(StoreError, match=BROKEN[kind][what]) as error:
         make_again(kind, scene, tmp_path / "again")
     assert "\n" not in str(error.value) and sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(("kind", "file"), [("colmap", "sparse/0/cameras.txt"), ("nerfstudio", "transforms_train.json")])
+def test_worlds_in_a_folder_are_named(tmp_path, kind, file):
+    """As in what viewsphere itself exports: a folder for each world."""
+    for name in ("chair_000", "bicycle_000", "else"):
+        (tmp_path / name / file).parent.mkdir(parents=True)
+    for name in ("chair_000", "bicycle_000"):
+        (tmp_path / name / file).touch()
+    with pytest.raises(StoreError, match=r"; found worlds in bicycle_000, chair_000: give one of these$"):
+        make_again(kind, tmp_path, tmp_path / "again")
+    with pytest.raises(StoreError, match=r"; found worlds in bicycle_000, chair_000: give one of these$"):
+        import_dataset(kind, tmp_path, tmp_path / "in")
+    with pytest.raises(StoreError, match=r"; found none$"):
+        import_dataset(kind, tmp_path / "else", tmp_path / "in")
 
 
 FRAME = {"file_path": "images/a.png", "w": 64, "h": 48, "fl_x": 60.0, "transform_matrix": np.eye(4).tolist()}

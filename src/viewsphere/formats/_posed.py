@@ -21,7 +21,7 @@ from viewsphere.model.instant import viewpoint_of
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, Loaded, refuse_broken
-from viewsphere.store.paths import file_inside
+from viewsphere.store.paths import file_inside, is_name
 
 RIGHT_ANGLES = 1e-3
 
@@ -41,6 +41,14 @@ class Posed:
     time: float = 0.0
     depth: Path | None = None
     step: float = 0.001
+
+
+def without_world(path: Path, expected: str, *patterns: str) -> StoreError:
+    """What is to be raised where a folder lacks what is expected: the worlds in it, by their files' patterns, are named."""
+    found = sorted({file.relative_to(path).parts[0] for pattern in patterns for file in path.glob(f"*/{pattern}")})
+    names = ", ".join(name for name in found if is_name(name))
+    worlds = f"worlds in {names:.200}: give one of these" if names else "none"
+    return StoreError(f"{path}: expected {expected}; found {worlds}")
 
 
 def camera_of(lens: Intrinsics, pose: NDArray[np.float64]) -> Camera:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.formats._listed import MISTAKES, one_line
-from viewsphere.formats._posed import Posed, camera_of, check_picture, picture_inside, posed_dataset
+from viewsphere.formats._posed import Posed, camera_of, check_picture, picture_inside, posed_dataset, without_world
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset
@@ -93,7 +93,7 @@ def read_model(path: Path) -> Model:
     """The sparse model in a folder, its images in the order of their names; raises StoreError where there is none."""
     files = next(filter(None, map(_files, (path / "sparse" / "0", path / "sparse", path))), None)
     if files is None:
-        raise StoreError(f"{path}: expected sparse/0 with cameras and images as .txt or .bin; found none")
+        raise without_world(path, "sparse/0 with cameras and images as .txt or .bin", "sparse/0/cameras.*", "cameras.*")
     cameras_file, images_file = files
     folder = cameras_file.parent
     splits = {name: file.stem for file in sorted(folder.glob("*.txt")) if file.stem not in OWN for name in _lines(file)}

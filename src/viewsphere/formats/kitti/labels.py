@@ -138,11 +138,11 @@ def read_camera(file: Path, size: tuple[int, int]) -> Camera:
         raise ValueError(f"expected P2 of a pinhole, 12 numbers, in {file.name}; found {' '.join(words):.60}")
     k = found.reshape(3, 4)
     (fx, skew, cx, _), (_, fy, cy, _), _ = k.tolist()
-    lens = {"fx": fx, "fy": fy, "cx": cx + 0.5, "cy": cy + 0.5, "skew": skew}
+    lens = Intrinsics(width=size[0], height=size[1], fx=fx, fy=fy, cx=cx + 0.5, cy=cy + 0.5, skew=skew)
     shift = transform(inverse(np.ascontiguousarray(k[:, :3])), k[:, 3]) + 0.0
     if not (np.abs(shift) < FARTHEST).all():
         raise ValueError(f"expected P2 of a camera near the reference camera in {file.name}; found {' '.join(words):.60}")
-    return Camera(Intrinsics(width=size[0], height=size[1], **lens), LEVEL, shift)
+    return Camera(lens, LEVEL, shift)
 
 
 def _is_pinhole(projection: NDArray[np.float64]) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.formats._listed import MISTAKES, one_line
-from viewsphere.formats._posed import Posed, camera_of, check_picture, picture_inside, posed_dataset
+from viewsphere.formats._posed import Posed, camera_of, check_picture, picture_inside, posed_dataset, without_world
 from viewsphere.formats.nerfstudio.synthetic import SPLITS
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset
@@ -45,7 +45,7 @@ def transforms_files(folder: Path) -> list[Path]:
     whole = folder / "transforms.json"
     found = [whole] if whole.is_file() else sorted(folder.glob("transforms_*.json"), key=lambda file: _rank(_split(file)))
     if not found:
-        raise StoreError(f"{folder}: expected transforms.json, or transforms_train.json; found neither")
+        raise without_world(folder, "transforms.json, or transforms_train.json", "transforms*.json")
     return found
 
 
