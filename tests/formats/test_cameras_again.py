@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import time
 
 import numpy as np
 import pycolmap
@@ -16,6 +17,7 @@ from proven import close
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.errors import StoreError
 from viewsphere.run.again import make_again
+from viewsphere.run.again_recipe import _free
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.stand_in import stand_in
 from viewsphere.sampling.plan import plan
@@ -329,6 +331,34 @@ def test_cameras_that_look_away_from_one_another_have_a_stand_in_ahead_of_the_fi
     found, first = stand_in(outward), np.array(outward[0].world_from_camera)
     assert (np.array(found.origin) - first[:3, 3]) @ first[:3, 2] > 0
     assert all(np.linalg.norm(np.array(found.origin) - np.array(s.world_from_camera)[:3, 3]) >= found.length for s in outward)
+
+
+@pytest.mark.parametrize("place", [1e8, 1e-9])
+def test_a_camera_at_any_distance_has_a_stand_in_that_can_be_rendered(tmp_path, place):
+    """The second looks at the first's axis, so that what they look at is about as far away."""
+    poses = np.stack([np.eye(4)] * 2)
+    poses[:, :3, :3] *= [1, -1, -1]
+    poses[1, :3, :3] = Rotation.from_euler("y", 45, degrees=True).as_matrix()
+    poses[1, :3, 3] = place, 0, 0
+    frames = [FRAME | {"file_path": f"{i}.png", "transform_matrix": pose.tolist()} for i, pose in enumerate(poses)]
+    (tmp_path / "transforms.json").write_text(json.dumps({"frames": frames}))
+    made = make_again("nerfstudio", tmp_path, tmp_path / "again")
+    assert len(rendered(made, tmp_path / "out")) == 2
+
+
+def test_many_shots_of_one_name_are_numbered_in_time():
+    names, began = dict[str, int](), time.process_time()
+    found = [_free(name, names) for name in ["shot", "SHOT", "shot-2"] + ["Shot"] * 20_000]
+    assert found[:4] == ["shot", "SHOT-2", "shot-2-2", "Shot-3"] and found[-1] == "Shot-20002"
+    assert len({name.casefold() for name in found}) == len(found) and time.process_time() - began < 5
+
+
+@pytest.mark.parametrize("kind", ["colmap", "nerfstudio"])
+def test_recipes_keep_what_their_formats_read(tmp_path, kind):
+    (colmap_tree if kind == "colmap" else transforms)(tmp_path / "scene")
+    made = make_again(kind, tmp_path / "scene", tmp_path / "again")
+    assert Recipe.load(made.recipe).channels == ("rgb", "depth")
+    assert not any("no format uses" in note for note in generate(str(made.recipe), tmp_path / "out", workers=0).notes)
 
 
 def test_the_command_line_makes_a_recipe_that_can_be_planned_and_shown(tmp_path):
