@@ -24,6 +24,8 @@ from viewsphere.store.foreign import ForeignDataset, ForeignFrame, Loaded, refus
 from viewsphere.store.paths import file_inside, is_name
 
 RIGHT_ANGLES = 1e-3
+MOST = 1e9
+"""What all numbers of a pose are below."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def without_world(path: Path, expected: str, *patterns: str) -> StoreError:
 def camera_of(lens: Intrinsics, pose: NDArray[np.float64]) -> Camera:
     """The camera of a pose, world_from_camera (3 or 4, 4), OpenCV's axes; raises ValueError for one that is not rigid."""
     turn, center = np.array(pose[:3, :3], np.float64), np.array(pose[:3, 3], np.float64)
-    if not np.isfinite(pose).all() or np.abs(turn @ turn.T - np.eye(3)).max() > RIGHT_ANGLES or np.linalg.det(turn) < 0:
+    if not (np.abs(pose) < MOST).all() or np.abs(turn @ turn.T - np.eye(3)).max() > RIGHT_ANGLES or np.linalg.det(turn) < 0:
         raise ValueError("expected a rigid pose; found another")
     rotation = np.ascontiguousarray(turn.T)
     return Camera(lens, rotation, -transform(rotation, center))

@@ -82,8 +82,9 @@ def _symmetries(said: Any, where: str) -> Symmetries | None:
         made = Symmetries.model_validate(given)
     except ValidationError as error:
         raise StoreError(f"{where}: symmetries: {first_of(error)}") from None
-    except (TypeError, ValueError) as error:
-        raise StoreError(f"{where}: symmetries_discrete: expected lists of 16 numbers; found: {error}") from None
+    except (TypeError, ValueError):
+        found = facts["symmetries_discrete"]
+        raise StoreError(f"{where}: symmetries_discrete: expected lists of 16 numbers; found {found!r:.60}") from None
     return None if made == Symmetries() else made
 
 

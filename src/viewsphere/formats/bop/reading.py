@@ -187,7 +187,10 @@ def object_pose(gt: Mapping[str, Any]) -> NDArray[np.float64]:
 def _pose(said: Mapping[str, Any], which: str) -> NDArray[np.float64]:
     """The pose of these names, (4, 4), metres; raises ValueError where it has no rotation."""
     turn, shift = _matrix(said[f"cam_R_{which}"], 3), _matrix(said[f"cam_t_{which}"], 1)[0]
-    quaternion_from_matrix(turn)
+    try:
+        quaternion_from_matrix(turn)
+    except ValueError:
+        raise ValueError(f"found cam_R_{which} {said[f'cam_R_{which}']!r:.60} where a rotation is expected") from None
     return rigid(turn, shift / MM)
 
 
