@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import tracemalloc
 import zlib
 from contextlib import suppress
 from io import BytesIO
@@ -106,6 +107,73 @@ def nested(levels):
 def test_what_is_refused(data, message):
     with pytest.raises(ValueError, match=message):
         read_mat(data, MOST_BYTES)
+
+
+def element(kind, *values, code="I"):
+    data = struct.pack(f"<{len(values)}{code}", *values)
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def of(*parts):
+    """A file of one array of these elements."""
+    body = b"".join(parts)
+    return b"MATLAB 5.0".ljust(124) + b"\0\1IM" + struct.pack("<II", 14, len(body)) + body
+
+
+def flags(kind):
+    return element(6, kind, 0)
+
+
+ONE, A, INF = element(5, 1, 1, code="i"), element(1, 97, code="b"), float("inf")
+TYPED = {
+    "flags that are none": (element(6), ONE, A, element(9, 1.0, code="d")),
+    "flags of other numbers": (element(9, INF, code="d"), ONE, A, element(9, 1.0, code="d")),
+    "a size of other numbers": (flags(1), element(9, 1.5, 1, code="d"), A),
+    "a size of too many axes": (flags(6), element(5, *[1] * 33, code="i"), A, element(9, 1.0, code="d")),
+    "a size of one axis": (flags(6), element(5, 1, code="i"), A, element(9, 1.0, code="d")),
+    "a text of other numbers": (flags(4), ONE, A, element(9, 65.0, code="d")),
+    "a text beyond Unicode": (flags(4), ONE, A, element(18, 0x110000)),
+    "a text of half a pair": (flags(4), ONE, A, element(17, 0xD800, code="H")),
+    "a text that is no UTF-8": (flags(4), ONE, A, element(16, 0xFF, code="B")),
+    "names' length of other numbers": (flags(2), ONE, A, element(9, 0.5, code="d"), element(1, 97, code="b")),
+}
+
+
+@pytest.mark.parametrize("what", TYPED)
+def test_elements_of_other_types_are_refused(what):
+    with pytest.raises(ValueError, match=r"^found (an element|an array of size|numbers that|a text that)") as error:
+        read_mat(of(*TYPED[what]), MOST_BYTES)
+    assert type(error.value) is ValueError
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [(2, "latin \xe9".encode("latin-1")), (4, "\U0001f600".encode("utf-16-le")), (18, "\U0001f600 a".encode("utf-32-le"))],
+)
+def test_texts_of_units_of_each_size(kind, text):
+    units = len(text) // {2: 1, 4: 2, 18: 4}[kind]
+    stored = struct.pack("<II", kind, len(text)) + text + bytes(-len(text) % 8)
+    expected = text.decode({2: "latin-1", 4: "utf-16-le", 18: "utf-32-le"}[kind])
+    assert read_mat(of(flags(4), element(5, 1, units, code="i"), A, stored), MOST_BYTES) == {"a": expected}
+
+
+def peak(data):
+    """The bytes that reading takes at most, whether or not it ends in a message."""
+    tracemalloc.start()
+    with suppress(ValueError):
+        read_mat(data, MOST_BYTES)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return most
+
+
+def test_memory_is_a_few_times_what_the_file_unpacks_to():
+    count = MOST_BYTES // 2
+    text = struct.pack("<II", 2, count) + b"a" * count
+    fields = struct.pack("<II", 1, count) + bytes(count)
+    none = element(5, 0, 0, code="i")
+    assert peak(of(flags(4), element(5, 1, count, code="i"), A, text)) < 6 * count
+    assert peak(of(flags(2), none, A, element(5, 1, code="i"), fields)) < 6 * count
 
 
 def test_a_bomb_is_not_unpacked():

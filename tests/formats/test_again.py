@@ -289,18 +289,45 @@ def broken(tree, what):
             (scene / "scene_gt.json").write_text(
                 json.dumps({"0": [{"obj_id": "../5", "cam_R_m2c": [1, 0, 0, 0, 1, 0, 0, 0, 1], "cam_t_m2c": [0, 0, 1]}]})
             )
+        case _:
+            out_of_bounds(tree, what)
+
+
+def out_of_bounds(tree, what):
+    scene = tree / "train_pbr/000004"
+    match what:
+        case "far":
+            text = json.loads((scene / "scene_gt.json").read_text())
+            text["3"][1]["cam_t_m2c"][0] = 1e300
+            (scene / "scene_gt.json").write_text(json.dumps(text))
+        case "wide":
+            Image.new("RGB", (20_000, 4)).save(scene / "rgb/000003.jpg")
+        case "crowd":
+            text = json.loads((scene / "scene_gt.json").read_text())
+            (scene / "scene_gt.json").write_text(json.dumps(text | {"3": text["3"] * 4_000}))
+        case "long":
+            (tree / "train_pbr").rename(tree / ("a" * 150))
+        case "lens":
+            text = json.loads((scene / "scene_camera.json").read_text())
+            text["3"]["cam_K"][0] = -1
+            (scene / "scene_camera.json").write_text(json.dumps(text))
 
 
 BROKEN = {
     "model": r"expected models/obj_000005.ply, a model of image 0 of .*; found no such file",
     "model elsewhere": r"found a link that leads out of it",
     "poses": r"image 0: expected a lens, poses and a picture; found no 'cam_R_m2c'",
-    "pose": r"image 3: expected a lens, poses and a picture; .*expected a \(3, 3\) rotation",
+    "pose": r"image 3: expected a lens, poses and a picture; found cam_R_m2c \[0.0, .* where a rotation is expected$",
     "half": r"scene_gt.json: expected BOP's JSON; found",
     "picture": r"image 3: expected a lens, poses and a picture; found no picture",
     "symmetry": r"models_info.json: 1: symmetries_discrete: expected lists of 16 numbers",
     "mesh": r"expected masks, and models that can be read; found: .*obj_000005.ply",
     "number": r"found obj_id '../5'",
+    "far": r"image 3: world_from_object\[0\]\[3\]: expected a number less than .*; found 1e\+297",
+    "wide": r"image 3: camera: expected at most 16384 pixels a side; found 20000 x 4",
+    "crowd": r"image 3: objects: expected at most 10,000 \(limit MAX_LISTED_OBJECTS\); found 12,000",
+    "long": r"image 0: split: expected .* at most 100 characters.* \(1 more like it\)",
+    "lens": r"image 3: expected a lens, poses and a picture; fx: expected a number greater than 0; found -1",
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import time
 
 import numpy as np
 import pycolmap
@@ -16,6 +17,8 @@ from proven import close
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.errors import StoreError
 from viewsphere.run.again import make_again
+from viewsphere.run.again_recipe import _free
+from viewsphere.run.importing import import_dataset
 from viewsphere.run.stand_in import stand_in
 from viewsphere.sampling.plan import plan
 
@@ -237,6 +240,12 @@ def spoil(scene, what):
             said.write_text('{"frames": []}')
         case "text":
             said.write_text('{"frames": [')
+        case "lists":
+            said.write_text(json.dumps({"frames": [{"file_path": "a.png"}], "train_filenames": 5}))
+        case "nan":
+            (scene / "sparse/0/cameras.txt").write_text("1 PINHOLE 64 48 nan 60 32 24\n2 PINHOLE 64 48 60 60 32 24\n")
+            (scene / "sparse/0/images.txt").write_text("1 1 0 0 0 0 0 0 1 a.jpg\n\n")
+            images.unlink()
         case "mesh":
             (scene.parent / "mesh.obj").write_text("v 0 0 0")
             (scene / "mesh.obj").symlink_to(scene.parent / "mesh.obj")
@@ -244,8 +253,10 @@ def spoil(scene, what):
 
 BROKEN = {
     "colmap": {"half": "expected a model of COLMAP's", "camera": r"found no camera 1 \(2 more like it\)",
-               "model": "expected one of SIMPLE_PINHOLE", "mesh": "a link that leads out of it"},
-    "nerfstudio": {"pose": "frame number 0: found no 'transform_matrix'", "mirror": "expected a rigid pose",
+               "model": "expected one of SIMPLE_PINHOLE", "mesh": "a link that leads out of it",
+               "nan": r"expected a model of COLMAP's; found: fx: expected a .*number.*; found nan$"},
+    "nerfstudio": {"lists": r"transforms.json: expected train_filenames, a list of names; found 5",
+                   "pose": "frame number 0: found no 'transform_matrix'", "mirror": "expected a rigid pose",
                    "outside": r"expected relative paths without '\.\.'", "none": "expected pictures with cameras; found none",
                    "text": "expected JSON"},
 }  # fmt: skip
@@ -260,6 +271,77 @@ def test_broken_data_sets_are_told_in_a_line_and_leave_nothing(tmp_path, kind, w
     with pytest.raises(StoreError, match=BROKEN[kind][what]) as error:
         make_again(kind, scene, tmp_path / "again")
     assert "\n" not in str(error.value) and sorted(tmp_path.rglob("*")) == before
+
+
+CAMERA, IMAGE = "1 PINHOLE 64 48 60 60 32 24", "1 1 0 0 0 0 0 0 1 a.jpg"
+
+
+@pytest.mark.parametrize(
+    ("camera", "image", "message"),
+    [
+        ("1 PINHOLE", IMAGE, "found: expected CAMERA_ID MODEL WIDTH HEIGHT and numbers; found '1 PINHOLE'"),
+        (
+            "1 PINHOLE 64 x 60 60 32 24",
+            IMAGE,
+            "found: expected CAMERA_ID MODEL WIDTH HEIGHT and numbers; found '1 PINHOLE 64 x",
+        ),
+        (CAMERA, "1 1 0", "found: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; found '1 1 0'"),
+        (CAMERA, "1 1 0 0 0 x 0 0 1 a.jpg", "found: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; found '1 1 0 0 0 x"),
+        (CAMERA, "1 0 0 0 0 0 0 0 1 a.jpg", "image 'a.jpg': expected a rotation, and a place within 1e+09; found 0.0 0.0 "),
+        (
+            CAMERA,
+            "1 1e300 0 1e300 0 0 0 0 1 a.jpg",
+            "image 'a.jpg': expected a rotation, and a place within 1e+09; found 1e+300 ",
+        ),
+        (CAMERA, "1 nan 0 0 0 0 0 0 1 a.jpg", "image 'a.jpg': expected a rotation, and a place within 1e+09; found nan "),
+        (CAMERA, "1 1 0 0 0 1e308 0 0 1 a.jpg", "image 'a.jpg': expected a rotation, and a place within 1e+09; found 1.0 "),
+        (CAMERA.replace("64", "20000"), IMAGE, "image 'a.jpg': camera: expected at most 16384 pixels a side; found 20000 x 48"),
+    ],
+)
+def test_lines_of_colmap_are_told_in_words(tmp_path, camera, image, message):
+    (tmp_path / "cameras.txt").write_text(f"{camera}\n")
+    (tmp_path / "images.txt").write_text(f"{image}\n\n")
+    with pytest.raises(StoreError) as error:
+        make_again("colmap", tmp_path, tmp_path / "again")
+    assert message in str(error.value) and len(str(error.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(("kind", "file"), [("colmap", "sparse/0/cameras.txt"), ("nerfstudio", "transforms_train.json")])
+def test_worlds_in_a_folder_are_named(tmp_path, kind, file):
+    """As in what viewsphere itself exports: a folder for each world."""
+    for name in ("chair_000", "bicycle_000", "else"):
+        (tmp_path / name / file).parent.mkdir(parents=True)
+    for name in ("chair_000", "bicycle_000"):
+        (tmp_path / name / file).touch()
+    with pytest.raises(StoreError, match=r"; found worlds in bicycle_000, chair_000: give one of these$"):
+        make_again(kind, tmp_path, tmp_path / "again")
+    with pytest.raises(StoreError, match=r"; found worlds in bicycle_000, chair_000: give one of these$"):
+        import_dataset(kind, tmp_path, tmp_path / "in")
+    with pytest.raises(StoreError, match=r"; found none$"):
+        import_dataset(kind, tmp_path / "else", tmp_path / "in")
+
+
+FRAME = {"file_path": "images/a.png", "w": 64, "h": 48, "fl_x": 60.0, "transform_matrix": np.eye(4).tolist()}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"file_path": ""}, "expected a file_path; found ''"),
+        ({"file_path": None}, "expected a file_path; found None"),
+        ({"fl_x": None}, "expected fl_x, or camera_angle_x; found neither"),
+        ({"fl_x": None, "camera_angle_x": 0}, "expected fl_x, or camera_angle_x; found neither"),
+        ({"fl_x": "wide"}, "expected fl_x, a number; found 'wide'"),
+        ({"k1": [1]}, r"expected k1, a number; found \[1\]"),
+        ({"w": "x"}, "expected w, a number; found 'x'"),
+        ({"w": 20_000}, "camera: expected at most 16384 pixels a side; found 20000 x 48"),
+        ({"transform_matrix": [[1], [1, 2]]}, r"expected a transform_matrix of 4 x 4 numbers; found \[\[1\], \[1, 2\]\]"),
+    ],
+)
+def test_frames_of_other_values_are_told_in_words(tmp_path, changes, message):
+    (tmp_path / "transforms.json").write_text(json.dumps({"frames": [FRAME | changes]}))
+    with pytest.raises(StoreError, match=f"frame number 0: {message}$"):
+        make_again("nerfstudio", tmp_path, tmp_path / "again")
 
 
 def test_cameras_that_look_away_from_one_another_have_a_stand_in_ahead_of_the_first():
@@ -277,6 +359,34 @@ def test_cameras_that_look_away_from_one_another_have_a_stand_in_ahead_of_the_fi
     found, first = stand_in(outward), np.array(outward[0].world_from_camera)
     assert (np.array(found.origin) - first[:3, 3]) @ first[:3, 2] > 0
     assert all(np.linalg.norm(np.array(found.origin) - np.array(s.world_from_camera)[:3, 3]) >= found.length for s in outward)
+
+
+@pytest.mark.parametrize("place", [1e8, 1e-9])
+def test_a_camera_at_any_distance_has_a_stand_in_that_can_be_rendered(tmp_path, place):
+    """The second looks at the first's axis, so that what they look at is about as far away."""
+    poses = np.stack([np.eye(4)] * 2)
+    poses[:, :3, :3] *= [1, -1, -1]
+    poses[1, :3, :3] = Rotation.from_euler("y", 45, degrees=True).as_matrix()
+    poses[1, :3, 3] = place, 0, 0
+    frames = [FRAME | {"file_path": f"{i}.png", "transform_matrix": pose.tolist()} for i, pose in enumerate(poses)]
+    (tmp_path / "transforms.json").write_text(json.dumps({"frames": frames}))
+    made = make_again("nerfstudio", tmp_path, tmp_path / "again")
+    assert len(rendered(made, tmp_path / "out")) == 2
+
+
+def test_many_shots_of_one_name_are_numbered_in_time():
+    names, began = dict[str, int](), time.process_time()
+    found = [_free(name, names) for name in ["shot", "SHOT", "shot-2"] + ["Shot"] * 20_000]
+    assert found[:4] == ["shot", "SHOT-2", "shot-2-2", "Shot-3"] and found[-1] == "Shot-20002"
+    assert len({name.casefold() for name in found}) == len(found) and time.process_time() - began < 5
+
+
+@pytest.mark.parametrize("kind", ["colmap", "nerfstudio"])
+def test_recipes_keep_what_their_formats_read(tmp_path, kind):
+    (colmap_tree if kind == "colmap" else transforms)(tmp_path / "scene")
+    made = make_again(kind, tmp_path / "scene", tmp_path / "again")
+    assert Recipe.load(made.recipe).channels == ("rgb", "depth")
+    assert not any("no format uses" in note for note in generate(str(made.recipe), tmp_path / "out", workers=0).notes)
 
 
 def test_the_command_line_makes_a_recipe_that_can_be_planned_and_shown(tmp_path):

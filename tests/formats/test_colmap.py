@@ -230,7 +230,7 @@ def test_what_is_broken_is_told(poses, tmp_path):
             whole = file.read_bytes()
             file.unlink()
             file.write_bytes(whole[:50] if kind == "binary" else whole + b"1 2 3\n")
-            with pytest.raises(StoreError, match="expected a model of COLMAP's; found: "):
+            with pytest.raises(StoreError, match="expected a model of COLMAP's; found"):
                 import_dataset("colmap", world, tmp_path / "in")
             file.write_bytes(whole)
     with pytest.raises(StoreError, match=r"expected sparse/0 with cameras and images as \.txt or \.bin; found none"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -182,6 +183,18 @@ def test_labels_go_out_as_they_came(calibrated, tmp_path):
     whole(Dataset(tmp_path / "in"))
 
 
+def test_omni3d_takes_what_nobody_knows_as_minus_one(tmp_path):
+    import_dataset("kitti", data_set(tmp_path / "mine"), tmp_path / "in")
+    export(tmp_path / "in", ["omni3d"])
+    (file,) = (tmp_path / "in/omni3d").rglob("viewsphere_*.json")
+    said, objects = (
+        json.loads(file.read_text())["annotations"],
+        [o for sample in Dataset(tmp_path / "in") for o in sample.objects],
+    )
+    assert [one["visibility"] for one in said] == [-1] * len(objects) and {one["valid3D"] for one in said} == {True, False}
+    assert [one["valid3D"] for one in said] == [o.is_boxed for o in objects]
+
+
 def test_tracks_by_hand(tmp_path):
     import_dataset("kitti", tracked(tmp_path / "mine"), tmp_path / "in")
     dataset = whole(Dataset(tmp_path / "in"))
@@ -265,7 +278,7 @@ BAD = {
     f"{LINE} 1 2": "expected 15 values, or one more; found 17",
     LINE.replace("1.84", "nan"): "expected finite numbers below 1,000,000; found ",
     LINE.replace("1.84", "1e300"): "expected finite numbers below 1,000,000; found ",
-    LINE.replace("1.84", "x"): "could not convert string to float: 'x'",
+    LINE.replace("1.84", "x"): "expected a number; found 'x'",
     LINE.replace("0.00 0", "1.5 0"): "expected truncated -1, or 0 to 1; found 1.5",
     LINE.replace("0.00 0", "0 7"): "expected occluded -1 to 3; found 7",
     LINE.replace("71.24", "91.24"): "expected left <= right, top <= bottom; found 91.24 14.3 81.07 30.79",
@@ -295,6 +308,7 @@ def test_broken_tracks(tmp_path):
         line.replace("0 0 Van", "0 9999999 Van"): "expected numbers of a frame and a track; found 0 9999999",
         line.replace("0 0 Van 0", "0 1 Van 0.5"): "expected truncated -1 to 2; found 0.5",
         line.replace("0 0 Van", "-1 0 Van"): "expected numbers of a frame and a track; found -1 0",
+        line.replace("0 0 Van", f"{'9' * 5000} 0 Van"): "expected a number; found '" + "9" * 59,
         line.replace("0 0 Van", "8 0 Van"): "expected a picture of frame 8; found none",
     }
     file.write_text(TRACKS + "\n".join(bad))
@@ -310,7 +324,12 @@ def test_pictures_labels_and_calibrations_that_cannot_be_used(tmp_path, monkeypa
     source = data_set(tmp_path / "mine")
     base, calib = (
         source / "training",
-        {"no_p2": "P0: 1\n", "flat": CALIB.replace(P2, P2.replace("7.2", "-7.2", 1)), "nan": "P2:" + 12 * " nan"},
+        {
+            "no_p2": "P0: 1\n",
+            "flat": CALIB.replace(P2, P2.replace("7.2", "-7.2", 1)),
+            "nan": "P2:" + 12 * " nan",
+            "point": "P2: 1e-300 0 0 1e6 0 1e-300 0 1e6 0 0 1 0",
+        },
     )
     Image.new("RGB", SIZE).save(tmp_path / "secret.png")
     (base / "image_2/link.png").symlink_to(tmp_path / "secret.png")

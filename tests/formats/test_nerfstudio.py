@@ -256,7 +256,7 @@ def test_what_is_broken_is_told(poses, tmp_path):
     assert "frame number 1: " in of_frame(file_path="../../../etc/passwd")
     assert "expected a picture of 161 x 120 pixels; found 160 x 120" in of_frame(w=161)
     assert "expected a rigid pose; found another" in of_frame(transform_matrix=np.diag([2.0, 1, 1, 1]).tolist())
-    assert "expected a transform_matrix of 4 x 4; found (2, 2)" in of_frame(transform_matrix=[[1, 0], [0, 1]])
+    assert "expected a transform_matrix of 4 x 4 numbers; found [[1, 0], [0, 1]]" in of_frame(transform_matrix=[[1, 0], [0, 1]])
     assert "frame number 1: found no 'file_path'" in told(lambda data: data["frames"][1].pop("file_path"))
     assert "expected lenses without k4; found 0.5" in of_frame(k4=0.5)
     assert "expected a camera_model of OPENCV, " in told(lambda data: data.update(camera_model="EQUIRECTANGULAR"))
@@ -264,7 +264,7 @@ def test_what_is_broken_is_told(poses, tmp_path):
     file.write_text(json.dumps({**whole, "frames": [7, *whole["frames"]]}))
     found = import_dataset("nerfstudio", file, tmp_path / "in", keep_going=True)
     assert found.count == 4 and len(found.left_out) == 1
-    with pytest.raises(StoreError, match=r"expected transforms\.json, or transforms_train\.json; found neither"):
+    with pytest.raises(StoreError, match=r"expected transforms\.json, or transforms_train\.json; found none"):
         import_dataset("nerfstudio", tmp_path, tmp_path / "none")
 
 

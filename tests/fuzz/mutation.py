@@ -69,7 +69,7 @@ _WORD = re.compile(rb"[A-Za-z_][A-Za-z_0-9.:/-]*")
 
 def mutated(data: bytes, rng: Random, kind: str) -> bytes:
     """A damaged copy. `kind`: `bytes`, `text`, `json`, `sealed` (JSON with its digest), `glb` (JSON in a binary),
-    or `zip`; each is damaged as bytes, too."""
+    `zip`, or `mat`; each is damaged as bytes, too."""
     by_structure = STRUCTURED.get(kind)
     if by_structure is None or rng.random() < 0.25:
         return _times(data, rng, _bytes)
@@ -245,10 +245,20 @@ def _zip(data: bytes, rng: Random) -> bytes:
     return out.getvalue()
 
 
+def _mat(data: bytes, rng: Random) -> bytes:
+    """Of a MATLAB file that is not packed: a tag with another type of element, or bytes."""
+    tags = [at for at in range(128, len(data) - 8, 8) if 0 < struct.unpack_from("<I", data, at)[0] <= 18]
+    if not tags or rng.random() < 0.3:
+        return _bytes(data, rng)
+    at = rng.choice(tags)
+    return data[:at] + struct.pack("<I", rng.randrange(1, 19)) + data[at + 4 :]
+
+
 STRUCTURED: dict[str, Callable[[bytes, Random], bytes]] = {
     "text": lambda data, rng: _times(data, rng, _text),
     "json": _json,
     "sealed": _sealed,
     "glb": _glb,
     "zip": _zip,
+    "mat": lambda data, rng: _times(data, rng, _mat),
 }

@@ -109,9 +109,34 @@ class Folders:
 def _kind(file: Path) -> str:
     if file.name in {"plan.json", "manifest.json"}:
         return "sealed"
-    return {".json": "json", ".obj": "text", ".mtl": "text", ".csv": "text", ".md": "text", ".glb": "glb", ".npz": "zip"}.get(
-        file.suffix, "bytes"
-    )
+    return {
+        ".json": "json",
+        ".obj": "text",
+        ".mtl": "text",
+        ".csv": "text",
+        ".md": "text",
+        ".glb": "glb",
+        ".npz": "zip",
+        ".mat": "mat",
+    }.get(file.suffix, "bytes")
+
+
+# MATLAB's files
+
+
+def _mat(path: Path) -> None:
+    from viewsphere.codecs.mat import read_mat
+
+    with suppress(ValueError):
+        read_mat(path.read_bytes(), 1 << 20)
+
+
+@cache
+def mats() -> Pack:
+    from viewsphere.formats._viewpoint_mat import mat, structs
+
+    inner = structs([{"text": "d'été", "numbers": np.eye(3), "cell": np.array([["a", 1.5]], object)}] * 2)
+    return (Sample("record.mat", mat(record=inner), "mat"),)
 
 
 # Recipes
@@ -645,6 +670,7 @@ OF_PASCAL3D = ("pascal3d/Annotations/*/*",) * 3 + ("pascal3d/CAD/*.mat", "pascal
 OF_NATIVE = ("native/*.json", "native/*.json", "native/**/*.json", "native/Pose-*/**/*.*", "native/MODELS/**/*.*")
 
 TARGETS: dict[str, Files | Folders] = {
+    "mat": Files(_mat, mats),
     "recipe": Files(_plan, recipes),
     "obj": Files(_model, objs),
     "gltf": Files(_model, gltfs),

@@ -6,6 +6,7 @@ from campaign import SETTINGS, findings
 from targets import TARGETS
 
 QUICK = {
+    "mat": 300,
     "obj": 60,
     "gltf": 80,
     "models": 60,

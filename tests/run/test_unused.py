@@ -8,6 +8,7 @@ import pytest
 from command_line import viewsphere
 from small import ROOT, small_recipe
 from viewsphere import Dataset, Recipe, generate
+from viewsphere.recipe.formats import read_formats
 from viewsphere.run.unused import among
 
 CHANNELS = ["rgb", "depth", "instances", "normals"]
@@ -56,18 +57,21 @@ def test_a_format_that_cannot_be_written_here_is_no_error(tmp_path, monkeypatch)
         ({"depth": 60, "rgb": 37, "instances": 3}, ["coco"], ("depth", 0.6)),  # so small a one is not worth its name
         ({"normals": 40, "rgb": 10, "depth": 50}, ["coco", "csv"], ("depth, normals", 0.9)),
         ({"normals": 40, "rgb": 10, "depth": 50}, ["coco", "native"], None),
+        ({"rgb": 10, "depth": 90}, ["nerfstudio"], None),  # which reads depth, as it is asked for
+        ({"rgb": 10, "depth": 90}, [{"nerfstudio": {"kind": "nerf-synthetic"}}], ("depth", 0.9)),
         ({}, ["coco"], None),
     ],
 )
 def test_large_shares_are_told(sizes, formats, said):
-    found = among(Counter(sizes), formats)
+    found = among(Counter(sizes), read_formats(formats))
     assert (found and (", ".join(found.channels), found.share)) == said
 
 
 def test_one_channel_and_three_are_told_in_words():
-    assert str(among(Counter(depth=6, rgb=4), ["coco"])).startswith("depth is 60% of the frames' bytes and no format uses it ")
+    coco = read_formats("coco")
+    assert str(among(Counter(depth=6, rgb=4), coco)).startswith("depth is 60% of the frames' bytes and no format uses it ")
     three = Counter(depth=3, normals=2, parts=2, rgb=1)
-    assert str(among(three, ["coco"])).startswith("depth, normals and parts are 88% of ")
+    assert str(among(three, coco)).startswith("depth, normals and parts are 88% of ")
 
 
 def test_the_estimate_of_a_plan_tells_them(tmp_path):
@@ -89,4 +93,4 @@ SHIPPED = sorted([*(ROOT / "recipes").glob("*.yaml"), *STARTS.glob("*/recipe.yam
 def test_recipes_to_start_from_keep_nothing_large_for_nobody(file):
     recipe = Recipe.load(file)
     large = Counter(name for name in recipe.channels if name != "instances")
-    assert among(large, [entry.name for entry in recipe.formats]) is None or not recipe.formats
+    assert among(large, recipe.formats) is None or not recipe.formats

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,11 +20,18 @@ HEAD, TAG = 128, 8
 DTYPES = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8", 16: "u1", 17: "u2", 18: "u4",
 }  # fmt: skip
-MATRIX, COMPRESSED, UTF8 = 14, 15, 16
+MATRIX, COMPRESSED, UTF8, UTF16 = 14, 15, 16, 17
+FLAGS, SIZES, NAMES, TEXTS = (6,), (5,), (1, 2, UTF8), (1, 2, 4, UTF16, 18)
+"""Types of the elements that hold what an array is, its sizes and lengths, its names, and texts in units of 1, 2 or 4 bytes."""
+
+ENCODINGS = {1: "latin-1", 2: "utf-16-le", 4: "utf-32-le"}
 CELL, STRUCT, CHAR, FIRST_NUMBER, LAST_NUMBER = 1, 2, 4, 6, 15
 COMPLEX = 0x0800
 DEEPEST = 16
 """Arrays within one another: each takes several calls of Python's stack."""
+
+MOST_AXES = 32
+"""Of an array: numpy of all versions has as many."""
 
 Struct = list[dict[str, Any]]
 """A struct array, column by column."""
@@ -61,17 +68,17 @@ class _Reader:
         if not len(data):
             return "", np.zeros((0, 0))
         parts = self.elements(data)
-        flags, shape = self._next(parts), tuple(self._next(parts).tolist())
-        name = bytes(self._next(parts)).decode("latin-1")
-        kind = int(flags[0]) & 0xFF
-        if len(shape) < 2 or min(shape) < 0:
+        flags, sizes = int(self._next(parts, FLAGS, 2)[0]), self._next(parts, SIZES, 2)
+        name = bytes(self._next(parts, NAMES)).decode("latin-1")
+        kind, shape = flags & 0xFF, tuple(sizes[:MOST_AXES].tolist())
+        if sizes.size > MOST_AXES or min(shape) < 0:
             raise ValueError(f"found an array of size {shape!r:.60}")
         count = math.prod(shape)
         if kind == CELL:
             return name, self._arrays(parts, count, depth)
         if kind == STRUCT:
             return name, self._struct(parts, count, depth)
-        if int(flags[0]) & COMPLEX or not (kind == CHAR or FIRST_NUMBER <= kind <= LAST_NUMBER):
+        if flags & COMPLEX or not (kind == CHAR or FIRST_NUMBER <= kind <= LAST_NUMBER):
             raise ValueError(f"found an array of class {kind}, which is not read")
         return name, self._text(parts, shape) if kind == CHAR else _shaped(self._next(parts), shape)
 
@@ -80,13 +87,13 @@ class _Reader:
         if count > self.left:
             raise ValueError(f"expected at most {limits.MAX_MAT_ARRAYS:,} arrays (limit MAX_MAT_ARRAYS); found more")
 
-    def _next(self, parts: Iterator[tuple[int, memoryview]]) -> Any:
-        """The numbers of the next element."""
+    def _next(self, parts: Iterator[tuple[int, memoryview]], kinds: Container[int] = DTYPES, least: int = 0) -> Any:
+        """The numbers of the next element, of one of these types, and so many at least."""
         kind, data = next(parts, (0, memoryview(b"")))
-        if kind not in DTYPES:
-            raise ValueError("found a file that is cut off")
+        if kind not in kinds:
+            raise ValueError(f"found an element of type {kind} where another belongs, or a file that is cut off")
         dtype = np.dtype(self.order + DTYPES[kind])
-        if len(data) % dtype.itemsize:
+        if len(data) % dtype.itemsize or len(data) < least * dtype.itemsize:
             raise ValueError("found numbers that are cut off")
         return np.frombuffer(data, dtype)
 
@@ -102,10 +109,11 @@ class _Reader:
         return found
 
     def _struct(self, parts: Iterator[tuple[int, memoryview]], count: int, depth: int) -> Struct:
-        length, names = self._next(parts), bytes(self._next(parts))
+        length, names = self._next(parts, SIZES), bytes(self._next(parts, NAMES))
         if length.size != 1 or not 0 < length[0] <= len(names) + 1 or len(names) % int(length[0]):
             raise ValueError("found a struct without names of fields")
         step = int(length[0])
+        self._check(len(names) // step)
         fields = [names[i : i + step].split(b"\0")[0].decode("latin-1") for i in range(0, len(names), step)]
         if not fields:
             return []
@@ -116,11 +124,18 @@ class _Reader:
         """A text; of several rows, one after another."""
         kind, data = next(parts, (0, memoryview(b"")))
         if kind == UTF8:
-            return bytes(data).decode("utf-8")
-        codes = self._next(iter([(kind, data)]))
-        if kind == 17 and math.prod(shape) != codes.size:
-            return bytes(data).decode("utf-16-le" if self.order == "<" else "utf-16-be")
-        return "".join(map(chr, _shaped(codes, shape).ravel().tolist()))
+            return _decoded(bytes(data), "utf-8")
+        codes = self._next(iter([(kind, data)]), TEXTS)
+        if kind != UTF16 or codes.size == math.prod(shape):
+            codes = _shaped(codes, shape).ravel()
+        return _decoded(codes.astype(codes.dtype.newbyteorder("<")).tobytes(), ENCODINGS[codes.itemsize])
+
+
+def _decoded(data: bytes, encoding: str) -> str:
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        raise ValueError(f"found a text that is no {encoding.upper()}") from None
 
 
 def _shaped(numbers: Any, shape: tuple[int, ...]) -> Any:

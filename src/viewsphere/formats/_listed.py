@@ -9,17 +9,20 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+from pydantic import ValidationError
+
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats._upright import upright
 from viewsphere.limits import limits
+from viewsphere.model.mistakes import dotted, first_of
 from viewsphere.model.sample import Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, refuse_broken
 from viewsphere.store.paths import file_inside, is_name
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".bmp")
-MISTAKES = (OSError, ValueError, SyntaxError, UserError)
-"""Errors of pictures and of texts that are broken, missing or outside."""
+MISTAKES = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, OSError, SyntaxError, UserError)
+"""Errors of files that are broken, missing or outside, or of another structure than expected."""
 
 SPLITS = TRAIN, VAL, TEST = ("train", "val", "test")
 """In the order in which they are told, before others."""
@@ -42,8 +45,18 @@ Picture = TypeVar("Picture", bound=Listed)
 
 
 def one_line(error: object) -> str:
-    """An error's message without line breaks."""
-    return " ".join(str(error).split())
+    """An error's message without line breaks: of values out of bounds the first, with its field; Python's own framed."""
+    match error:
+        case ValidationError():
+            place = error.errors(include_url=False)[0]["loc"]
+            text = f"{dotted(place)}: {first_of(error)}" if place else first_of(error)
+        case KeyError():
+            text = f"found no {error}"
+        case LookupError() | TypeError() | AttributeError() | ArithmeticError():
+            text = f"found another structure than expected ({error})"
+        case _:
+            text = str(error)
+    return " ".join(text.split())
 
 
 def check_bytes(file: Path, count: int) -> None:

@@ -21,11 +21,11 @@ from viewsphere.model.instant import viewpoint_of
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, Loaded, refuse_broken
-from viewsphere.store.paths import file_inside
+from viewsphere.store.paths import file_inside, is_name
 
 RIGHT_ANGLES = 1e-3
-MISTAKES = (LookupError, TypeError, ValueError, AttributeError, OSError, OverflowError, SyntaxError, UserError)
-"""Errors of files of another structure than expected."""
+MOST = 1e9
+"""What all numbers of a pose are below."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,18 @@ class Posed:
     step: float = 0.001
 
 
+def without_world(path: Path, expected: str, *patterns: str) -> StoreError:
+    """What is to be raised where a folder lacks what is expected: the worlds in it, by their files' patterns, are named."""
+    found = sorted({file.relative_to(path).parts[0] for pattern in patterns for file in path.glob(f"*/{pattern}")})
+    names = ", ".join(name for name in found if is_name(name))
+    worlds = f"worlds in {names:.200}: give one of these" if names else "none"
+    return StoreError(f"{path}: expected {expected}; found {worlds}")
+
+
 def camera_of(lens: Intrinsics, pose: NDArray[np.float64]) -> Camera:
     """The camera of a pose, world_from_camera (3 or 4, 4), OpenCV's axes; raises ValueError for one that is not rigid."""
     turn, center = np.array(pose[:3, :3], np.float64), np.array(pose[:3, 3], np.float64)
-    if not np.isfinite(pose).all() or np.abs(turn @ turn.T - np.eye(3)).max() > RIGHT_ANGLES or np.linalg.det(turn) < 0:
+    if not (np.abs(pose) < MOST).all() or np.abs(turn @ turn.T - np.eye(3)).max() > RIGHT_ANGLES or np.linalg.det(turn) < 0:
         raise ValueError("expected a rigid pose; found another")
     rotation = np.ascontiguousarray(turn.T)
     return Camera(lens, rotation, -transform(rotation, center))

@@ -24,6 +24,7 @@ https://github.com/facebookresearch/omni3d/blob/main/DATA.md.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -104,12 +105,17 @@ def _annotation(sample: Sample, o: ObjectAnnotation) -> dict[str, Any]:
         "valid3D": is_known,
         "bbox2D_tight": UNKNOWN if o.box2d is None else list(o.box2d),
         **(_box(sample, o) if is_known else _NO_BOX),
-        "visibility": o.visibility if is_known else -1,
-        "truncation": o.truncation if is_known else -1,
+        "visibility": _share(o.visibility) if is_known else -1,
+        "truncation": _share(o.truncation) if is_known else -1,
         "segmentation_pts": o.area,
         "lidar_pts": -1,
         "depth_error": -1,
     }
+
+
+def _share(value: float) -> float:
+    """A share; -1 where nobody knows it."""
+    return -1 if math.isnan(value) else value
 
 
 def _box(sample: Sample, o: ObjectAnnotation) -> dict[str, Any]:

@@ -7,19 +7,21 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from viewsphere import plugins
 from viewsphere.geometry.rotation import rigid
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.model.scene import IDENTITY
 from viewsphere.recipe.file import dump
+from viewsphere.recipe.formats import Formats, read_formats
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.viewpoints import PoseList
+from viewsphere.run.scope import needs_of
 from viewsphere.run.stand_in import CATEGORY, SOURCE, StandIn, stand_in
 from viewsphere.sampling.models import numbered_specs
 from viewsphere.sampling.pose_files import PoseFile
@@ -27,6 +29,7 @@ from viewsphere.sampling.viewpoints import world_turn
 from viewsphere.store.again import Again, AgainModel, Drafted
 
 RECIPE, SHOTS, MODELS, SIDECARS = "recipe.yaml", "shots.jsonl", "models", "symmetries"
+CHANNELS = ("rgb", "depth", "instances")
 STAND_IN = "stand-in"
 """The key, among an `Again`'s models, of what stands where there are none."""
 
@@ -95,7 +98,7 @@ def _joined(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _shots(found: Again, substitute: StandIn | None) -> list[ListedShot]:
     """The shots with free names, and splits as recipes have them; with what stands in, where they have to be listed."""
-    splits, names = dict[str, str](), set[str]()
+    splits, names = dict[str, str](), dict[str, int]()
     shots: list[ListedShot] = []
     there: tuple[ListedObject, ...] = ()
     if substitute is not None and _are_listed(found):
@@ -121,11 +124,13 @@ def _split(name: str) -> str:
     return plain if re.match("[A-Za-z]", plain) and not is_reserved(plain) else f"split_{plain}"
 
 
-def _free(name: str, names: set[str]) -> str:
-    """The name, with a number behind it where it is taken."""
-    ways = chain((name,), (f"{name[:90]}-{i}" for i in count(2)))
-    free = next(way for way in ways if way.casefold() not in names)
-    names.add(free.casefold())
+def _free(name: str, names: dict[str, int]) -> str:
+    """The name, with a number behind it where it is taken; `names`: those that are, each with the next number to try."""
+    free, taken = name, name.casefold()
+    while free.casefold() in names:
+        free = f"{name[:90]}-{names[taken]}"
+        names[taken] += 1
+    names[free.casefold()] = 2
     return free
 
 
@@ -145,11 +150,17 @@ def _recipe(
         **listed,
         "camera": {"of_viewpoints": True},
         "scene": {"background": "#777777", "ground": "off"},
-        "channels": ["rgb", "depth", "instances"],
+        "channels": _channels(found.formats),
         **({"annotations": list(found.annotations)} if found.annotations else {}),
         "formats": list(found.formats),
         "splits": {"by": "frame", **_shares(Counter(shot.split or "" for shot in shots))},
     }
+
+
+def _channels(formats: Formats) -> list[str]:
+    """Pictures, and what else the formats read."""
+    needed = {name for entry in read_formats(formats) for name in needs_of(plugins.load("formats", entry.name), entry)}
+    return [name for name in CHANNELS if name == CHANNELS[0] or name in needed]
 
 
 def _shares(counts: Counter[str]) -> dict[str, float]:

@@ -18,7 +18,7 @@ from pathlib import Path
 from viewsphere.aside import temporary
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.recipe.formats import FormatEntry, options_of
+from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import write
 from viewsphere.run.opening import prepare, to_render
@@ -113,7 +113,7 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     model_bytes = disk_bytes([store.folder / "models"])
     outputs = [store.folder / "models", store.folder / "shots", *(store.root / entry.name for entry in planned.recipe.formats)]
     frame_bytes = (disk_bytes(outputs) - model_bytes) / frames
-    left = unused(store, options_of(planned.recipe.formats))
+    left = unused(store, planned.recipe.formats)
     return Rates(model, scene, frame, export / frames, model_bytes / made, frame_bytes, left)
 
 

@@ -137,7 +137,7 @@ def generate(
         warnings, notes = _warnings(planned, dataset), (*notes, _left_to_others(portion, left_over))
         seconds = time.monotonic() - begun
         return Summary(store.root, len(dataset), rendered, skipped, seconds, (), notes, warnings, left_over.missing)
-    left = unused(store, options_of((*wanted, *_others(wanted, store))))
+    left = unused(store, (*wanted, *_others(wanted, store)))
     notes += (f"note: {left}",) if left else ()
     if append and not rendered and share.is_all:
         notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)

@@ -11,6 +11,8 @@ from itertools import islice
 from viewsphere import plugins
 from viewsphere.errors import StoreError
 from viewsphere.model.channel import PICTURES
+from viewsphere.recipe.formats import FormatEntry
+from viewsphere.run.scope import needs_of
 from viewsphere.store import Store
 from viewsphere.store.manifest import Manifest
 
@@ -41,18 +43,18 @@ class Unused:
         )
 
 
-def unused(store: Store, formats: Iterable[str]) -> Unused | None:
+def unused(store: Store, formats: Iterable[FormatEntry]) -> Unused | None:
     """The channels of finished shots that none of these formats uses; None where these take little, or there is no format."""
-    names = tuple(formats)
-    return among(channel_bytes(store), names) if names else None
+    entries = tuple(formats)
+    return among(channel_bytes(store), entries) if entries else None
 
 
-def among(sizes: Counter[str], formats: Sequence[str]) -> Unused | None:
+def among(sizes: Counter[str], formats: Sequence[FormatEntry]) -> Unused | None:
     """The channels that none of these formats uses, of channels of so many bytes; None where these take little."""
     total = sizes.total()
     left = [name for name, size in sizes.most_common() if size >= WORTH_NAMING * total and not _is_used(name, formats)]
     share = sum(sizes[name] for name in left) / total if total else 0.0
-    return Unused(tuple(left), share, tuple(formats)) if share >= LARGE else None
+    return Unused(tuple(left), share, tuple(dict.fromkeys(entry.name for entry in formats))) if share >= LARGE else None
 
 
 def channel_bytes(store: Store) -> Counter[str]:
@@ -66,7 +68,7 @@ def channel_bytes(store: Store) -> Counter[str]:
     return sizes
 
 
-def _is_used(channel: str, formats: Iterable[str]) -> bool:
+def _is_used(channel: str, formats: Iterable[FormatEntry]) -> bool:
     """Whether it is a picture, or one of the formats needs it, or does not say what it needs: such a format takes all."""
-    needed = (getattr(plugins.load("formats", name), "CHANNELS", None) for name in formats)
-    return channel in PICTURES or any(names is None or channel in names for names in needed)
+    modules = ((plugins.load("formats", entry.name), entry) for entry in formats)
+    return channel in PICTURES or any(not hasattr(m, "CHANNELS") or channel in needs_of(m, entry) for m, entry in modules)

@@ -9,10 +9,11 @@ import numpy as np
 
 from viewsphere.errors import StoreError
 from viewsphere.formats._again import pose_of
+from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats.bop.cads import model_files, model_folder, symmetries_of
 from viewsphere.formats.bop.entries import MM
 from viewsphere.formats.bop.pixels import Shift, fit, shifted
-from viewsphere.formats.bop.reading import MISTAKES, Frame, categories, object_pose, scene_frames
+from viewsphere.formats.bop.reading import Frame, categories, object_pose, scene_frames
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.store.again import Again, AgainModel, refuse_any
@@ -38,6 +39,12 @@ def again(path: Path) -> Again:
         raise StoreError(f"{path}: expected a BOP data set (<split>/<scene>/scene_camera.json); found no such file")
     problems: list[str] = []
     frames = tuple(frame for file in files for frame in scene_frames(root, file.parent, problems))
+    shots: list[ListedShot] = []
+    for frame in frames:
+        try:
+            shots.append(_shot(root, frame))
+        except MISTAKES as error:
+            problems.append(f"{frame.scene}: image {frame.image}: {one_line(error)}")
     refuse_any(problems)
     if not frames:
         raise StoreError(f"{path}: expected images; found none")
@@ -45,16 +52,14 @@ def again(path: Path) -> Again:
     try:
         masks = fit(frames, models)
     except MISTAKES as error:
-        raise StoreError(
-            f"{path}: expected masks, and models that can be read; found: {' '.join(str(error).split())}"
-        ) from None
+        raise StoreError(f"{path}: expected masks, and models that can be read; found: {one_line(error)}") from None
     x, y = masks.shift
     if x or y:
         notes.append(SHIFTED.format(differs=masks.differs, differed=masks.differed, x=x, y=y))
     has_world = any(not np.array_equal(rigid(one.camera.R, one.camera.t), np.eye(4)) for one in frames)
     return Again(
         name=root.resolve().name,
-        shots=tuple(_shot(root, frame, masks.shift) for frame in frames),
+        shots=tuple(_shifted(shot, masks.shift) for shot in shots),
         models=models,
         formats=("bop",),
         annotations=("amodal",),
@@ -63,7 +68,7 @@ def again(path: Path) -> Again:
     )
 
 
-def _shot(root: Path, frame: Frame, shift: Shift) -> ListedShot:
+def _shot(root: Path, frame: Frame) -> ListedShot:
     world_from_camera = rigid(frame.camera.R.T, frame.camera.center)
     poses = ((str(one["obj_id"]), compose(world_from_camera, object_pose(one))) for one in frame.gt)
     return ListedShot(
@@ -71,9 +76,13 @@ def _shot(root: Path, frame: Frame, shift: Shift) -> ListedShot:
         split=frame.split,
         image=frame.rgb.relative_to(root).as_posix(),
         world_from_camera=pose_of(world_from_camera),
-        camera=shifted(frame.camera.intrinsics, shift),
+        camera=frame.camera.intrinsics,
         objects=tuple(ListedObject(model=number, world_from_object=pose_of(pose)) for number, pose in poses),
     )
+
+
+def _shifted(shot: ListedShot, shift: Shift) -> ListedShot:
+    return shot.model_copy(update={"camera": shot.camera and shifted(shot.camera, shift)})
 
 
 def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, AgainModel], list[str]]:

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from viewsphere.assets.cache import load_normalised
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats._cads import foreign_model
+from viewsphere.formats._listed import one_line
 from viewsphere.formats.bop.entries import MM
 from viewsphere.formats.bop.texts import load
 from viewsphere.model.mistakes import first_of
@@ -68,7 +69,7 @@ def foreign_models(root: Path, named: Mapping[int, tuple[Category, str]], proble
         try:
             found[number] = foreign_model(load_normalised(model_spec(file)), key, category, symmetries=symmetries.get(number))
         except UserError as error:
-            problems.append(f"{file}: expected a model; found: {' '.join(str(error).split())}")
+            problems.append(f"{file}: expected a model; found: {one_line(error)}")
     return found
 
 
@@ -81,8 +82,9 @@ def _symmetries(said: Any, where: str) -> Symmetries | None:
         made = Symmetries.model_validate(given)
     except ValidationError as error:
         raise StoreError(f"{where}: symmetries: {first_of(error)}") from None
-    except (TypeError, ValueError) as error:
-        raise StoreError(f"{where}: symmetries_discrete: expected lists of 16 numbers; found: {error}") from None
+    except (TypeError, ValueError):
+        found = facts["symmetries_discrete"]
+        raise StoreError(f"{where}: symmetries_discrete: expected lists of 16 numbers; found {found!r:.60}") from None
     return None if made == Symmetries() else made
 
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.codecs.size import opened
-from viewsphere.errors import StoreError, UserError
+from viewsphere.errors import StoreError
+from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats._placed import placed
 from viewsphere.formats.bop.cads import foreign_models, model_files
 from viewsphere.formats.bop.entries import MM, NO_BOX
@@ -38,9 +39,6 @@ MOST_OBJECTS = 10**6
 
 UNKNOWN = np.full((8, 3), np.nan)
 """The box of an object without a model."""
-
-MISTAKES = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, OSError, SyntaxError, UserError)
-"""Errors raised by JSON of another structure than expected, and by broken pictures."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
@@ -100,7 +98,7 @@ class Frame:
             with opened(file) as image:
                 mask = np.asarray(image.convert("L")) > 127
         except MISTAKES as error:
-            raise StoreError(f"{file}: expected a mask; found: {error}") from None
+            raise StoreError(f"{file}: expected a mask; found: {one_line(error)}") from None
         self.check(file, mask)
         return encode_rle(mask)
 
@@ -130,8 +128,7 @@ def scene_frames(root: Path, scene: Path, problems: list[str]) -> Iterator[Frame
                 raise ValueError("found no number of an image")
             yield _frame(scene, int(number), cameras[number], gts.get(number, []), infos.get(number, []))
         except MISTAKES as error:
-            problem = f"found no {error}" if isinstance(error, KeyError) else error
-            problems.append(f"{scene}: image {number:.20}: expected a lens, poses and a picture; {problem}")
+            problems.append(f"{scene}: image {number:.20}: expected a lens, poses and a picture; {one_line(error)}")
 
 
 def _frame(scene: Path, image: int, said: dict[str, Any], gt: list[Any], info: list[Any]) -> Frame:
@@ -143,8 +140,8 @@ def _frame(scene: Path, image: int, said: dict[str, Any], gt: list[Any], info: l
         raise ValueError(f"found a split {scene.parent.name!r}")
     with opened(rgb) as picture:
         width, height = picture.size
-    k = _matrix(said["cam_K"], 3)
-    lens = {"fx": k[0, 0], "fy": k[1, 1], "cx": k[0, 2] + 0.5, "cy": k[1, 2] + 0.5, "skew": k[0, 1]}
+    (fx, skew, cx), (_, fy, cy), _ = _matrix(said["cam_K"], 3).tolist()
+    lens = {"fx": fx, "fy": fy, "cx": cx + 0.5, "cy": cy + 0.5, "skew": skew}
     pose = _pose(said, "w2c") if "cam_R_w2c" in said else np.eye(4)
     depth, step = file_inside(scene, f"depth/{image:06d}.png"), float(said.get("depth_scale", 1.0)) / MM
     if not 0 < step < math.inf:
@@ -190,7 +187,10 @@ def object_pose(gt: Mapping[str, Any]) -> NDArray[np.float64]:
 def _pose(said: Mapping[str, Any], which: str) -> NDArray[np.float64]:
     """The pose of these names, (4, 4), metres; raises ValueError where it has no rotation."""
     turn, shift = _matrix(said[f"cam_R_{which}"], 3), _matrix(said[f"cam_t_{which}"], 1)[0]
-    quaternion_from_matrix(turn)
+    try:
+        quaternion_from_matrix(turn)
+    except ValueError:
+        raise ValueError(f"found cam_R_{which} {said[f'cam_R_{which}']!r:.60} where a rotation is expected") from None
     return rigid(turn, shift / MM)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewsphere.formats._again import cameras_again, nearest_up, pose_of
-from viewsphere.formats._posed import MISTAKES, camera_of
+from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._posed import camera_of
 from viewsphere.formats.colmap.reading import read_model
 from viewsphere.model.listed import ListedShot
 from viewsphere.store.again import Again, refuse_any
@@ -29,6 +30,6 @@ def again(path: Path) -> Again:
             camera_of(lens, pose)
             shots.append(ListedShot(split=split, image=image.name, world_from_camera=pose_of(pose), camera=lens))
         except MISTAKES as error:
-            problems.append(f"{model.file}: image {image.name!r:.80}: {error}")
+            problems.append(f"{model.file}: image {image.name!r:.80}: {one_line(error)}")
     refuse_any(problems)
     return cameras_again(path, tuple(shots), path, FOLDERS, "colmap", nearest_up(shots))

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.formats._posed import MISTAKES, Posed, camera_of, check_picture, picture_inside, posed_dataset
+from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._posed import MOST, Posed, camera_of, check_picture, picture_inside, posed_dataset, without_world
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset
@@ -62,7 +63,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
             check_picture(size, lens)
             found.append(Posed(file, camera_of(lens, pose), split))
         except MISTAKES as error:
-            problems.append(f"{model.file}: image {image.name!r:.80}: {error}")
+            problems.append(f"{model.file}: image {image.name!r:.80}: {one_line(error)}")
     texts = [model.cameras, model.file, *(file for file in sorted(folder.glob("*.txt")) if file.stem not in OWN)]
     return posed_dataset(path, found, texts, problems, keep_going)
 
@@ -84,6 +85,8 @@ class Model:
             raise ValueError(f"found no camera {image.camera}")
         if not is_name(split):
             raise ValueError(f"expected a split's name; found {split!r:.60}")
+        if not (np.abs(image.pose) < MOST).all() or max(map(abs, image.pose[:4])) < 1 / MOST:
+            raise ValueError(f"expected a rotation, and a place within {MOST:g}; found {' '.join(map(str, image.pose)):.60}")
         rotation, t = matrix_from_quaternion(image.pose[:4]), np.array(image.pose[4:])
         return self.lenses[image.camera], np.column_stack((rotation.T, -transform(rotation.T, t))), split
 
@@ -92,7 +95,7 @@ def read_model(path: Path) -> Model:
     """The sparse model in a folder, its images in the order of their names; raises StoreError where there is none."""
     files = next(filter(None, map(_files, (path / "sparse" / "0", path / "sparse", path))), None)
     if files is None:
-        raise StoreError(f"{path}: expected sparse/0 with cameras and images as .txt or .bin; found none")
+        raise without_world(path, "sparse/0 with cameras and images as .txt or .bin", "sparse/0/cameras.*", "cameras.*")
     cameras_file, images_file = files
     folder = cameras_file.parent
     splits = {name: file.stem for file in sorted(folder.glob("*.txt")) if file.stem not in OWN for name in _lines(file)}
@@ -101,8 +104,10 @@ def read_model(path: Path) -> Model:
         read_cameras, read_images = (_binary_cameras, _binary_images) if binary else (_text_cameras, _text_images)
         lenses = {number: _lens(name, size, values) for number, name, size, values in read_cameras(cameras_file)}
         images = sorted(read_images(images_file), key=lambda image: image.name)
-    except (*MISTAKES, struct.error) as error:
-        raise StoreError(f"{folder}: expected a model of COLMAP's; found: {error}") from None
+    except struct.error:
+        raise StoreError(f"{folder}: expected a model of COLMAP's; found a file that is cut off") from None
+    except MISTAKES as error:
+        raise StoreError(f"{folder}: expected a model of COLMAP's; found: {one_line(error)}") from None
     return Model(cameras_file, images_file, lenses, tuple(images), splits)
 
 
@@ -142,18 +147,24 @@ def _lines(file: Path) -> list[str]:
 
 def _text_cameras(file: Path) -> Iterator[tuple[int, str, tuple[int, int], list[float]]]:
     for line in filter(None, _lines(file)):
-        number, model, width, height, *values = line.split()
-        yield int(number), model, (int(width), int(height)), list(map(float, values))
+        words = line.split()
+        try:
+            number, width, height, *values = int(words[0]), int(words[2]), int(words[3]), *map(float, words[4:])
+        except (IndexError, ValueError):
+            raise ValueError(f"expected CAMERA_ID MODEL WIDTH HEIGHT and numbers; found {line!r:.60}") from None
+        yield number, words[1], (width, height), values
 
 
 def _text_images(file: Path) -> Iterator[_Image]:
     """Every image has two lines, of which the second, its points, may be empty."""
     lines = iter(_lines(file))
     for line in filter(None, lines):
-        _, *pose, camera, name = line.split(maxsplit=9)
-        if len(pose) != 7:
-            raise ValueError(f"expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; found {line!r:.60}")
-        yield _Image(tuple(map(float, pose)), int(camera), name)
+        words = line.split(maxsplit=9)
+        try:
+            image = _Image(tuple(map(float, words[1:8])), int(words[8]), words[9])
+        except (IndexError, ValueError):
+            raise ValueError(f"expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; found {line!r:.60}") from None
+        yield image
         next(lines, None)
 
 
@@ -171,6 +182,8 @@ def _binary_images(file: Path) -> Iterator[_Image]:
     data, at = file.read_bytes(), 8
     for _ in range(struct.unpack_from("<Q", data)[0]):
         _, *pose, camera = struct.unpack_from("<I7dI", data, at)
-        end = data.index(b"\0", at + 64)
+        end = data.find(b"\0", at + 64)
+        if end < 0:
+            raise ValueError("a name that is cut off")
         yield _Image(tuple(pose), camera, data[at + 64 : end].decode())
         at = end + 9 + 24 * struct.unpack_from("<Q", data, end + 1)[0]

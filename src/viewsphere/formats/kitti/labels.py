@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,10 @@ LEVEL = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 FARTHEST = 1e6
 """Pixels, or metres, beyond which no number of a label is."""
 
+SHORTEST = 1e-3
+"""Pixels, a focal length at least."""
+
+Number = TypeVar("Number", int, float)
 MOST_TRACKS = 10**6
 COLUMNS = 15
 DONT_CARE_TYPE = "DontCare"
@@ -84,10 +88,10 @@ def _parsed(words: Sequence[str], is_tracked: bool) -> tuple[int, Row]:
     begins = 2 if is_tracked else 0
     if len(words) - begins not in (COLUMNS, COLUMNS + 1):
         raise ValueError(f"expected {COLUMNS + begins} values, or one more; found {len(words)}")
-    frame, track = map(int, words[:2]) if is_tracked else (0, None)
+    frame, track = (_number(word, int) for word in words[:2]) if is_tracked else (0, None)
     if not 0 <= frame < MOST_TRACKS or (track is not None and not -1 <= track < MOST_TRACKS):
         raise ValueError(f"expected numbers of a frame and a track; found {words[0]:.20} {words[1]:.20}")
-    kind, values = words[begins], [float(word) for word in words[begins + 1 :]]
+    kind, values = words[begins], [_number(word, float) for word in words[begins + 1 :]]
     if not all(abs(value) < FARTHEST for value in values):
         raise ValueError(f"expected finite numbers below {FARTHEST:,.0f}; found {' '.join(words[begins + 1 :]):.60}")
     outside, hidden, alpha, x0, y0, x1, y1 = values[:7]
@@ -105,6 +109,13 @@ def _parsed(words: Sequence[str], is_tracked: bool) -> tuple[int, Row]:
     if track is not None:
         said["track_id"] = track
     return frame, Row(kind, track, (x0, y0, x1 + 1, y1 + 1), _solid(values[7:14]), said)
+
+
+def _number(word: str, kind: Callable[[str], Number]) -> Number:
+    try:
+        return kind(word)
+    except ValueError:
+        raise ValueError(f"expected a number; found {word!r:.60}") from None
 
 
 def _solid(values: Sequence[float]) -> tuple[float, ...] | None:
@@ -126,14 +137,15 @@ def read_camera(file: Path, size: tuple[int, int]) -> Camera:
     if found.shape != (12,) or not (np.abs(found) < FARTHEST**2).all() or not _is_pinhole(found.reshape(3, 4)):
         raise ValueError(f"expected P2 of a pinhole, 12 numbers, in {file.name}; found {' '.join(words):.60}")
     k = found.reshape(3, 4)
-    lens = {"fx": k[0, 0], "fy": k[1, 1], "cx": k[0, 2] + 0.5, "cy": k[1, 2] + 0.5, "skew": k[0, 1]}
+    (fx, skew, cx, _), (_, fy, cy, _), _ = k.tolist()
+    lens = Intrinsics(width=size[0], height=size[1], fx=fx, fy=fy, cx=cx + 0.5, cy=cy + 0.5, skew=skew)
     shift = transform(inverse(np.ascontiguousarray(k[:, :3])), k[:, 3]) + 0.0
     if not (np.abs(shift) < FARTHEST).all():
         raise ValueError(f"expected P2 of a camera near the reference camera in {file.name}; found {' '.join(words):.60}")
-    return Camera(Intrinsics(width=size[0], height=size[1], **lens), LEVEL, shift)
+    return Camera(lens, LEVEL, shift)
 
 
 def _is_pinhole(projection: NDArray[np.float64]) -> bool:
-    """Whether the left three columns are K."""
+    """Whether the left three columns are K of a lens that is no point."""
     k = projection[:, :3]
-    return bool(k[0, 0] > 0 and k[1, 1] > 0 and k[1, 0] == 0 and (k[2] == (0, 0, 1)).all() and not math.isinf(k[0, 2]))
+    return bool(min(k[0, 0], k[1, 1]) >= SHORTEST and k[1, 0] == 0 and (k[2] == (0, 0, 1)).all())

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
+from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.geometry.box import box_size
 from viewsphere.geometry.mask import encode_rle, mask_box, mask_polygons
 from viewsphere.labels import channels
@@ -32,8 +33,6 @@ from viewsphere.store.texts import parsed
 RIGHT_ANGLES = 1e-3
 LONGEST_NAME = 150
 LARGEST_POSE = 10_000_000
-MISTAKES = (LookupError, TypeError, ValueError, AttributeError, OSError, OverflowError)
-"""Errors raised by reading JSON of another structure than expected."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
@@ -139,13 +138,13 @@ def _vehicles(
         except StoreError as error:
             problems.append(f"{root}: vehicle {key}: {error}")
         except MISTAKES as error:
-            problems.append(f"{root}: vehicle {key}: expected its bbox3D_model, real_size and credit; found {error}")
+            problems.append(f"{root}: vehicle {key}: expected its bbox3D_model, real_size and credit; {one_line(error)}")
 
 
 def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) -> ModelInfo:
     box = _vertices(vehicle["bbox3D_model"], 3)
     if np.isnan(box).any():
-        raise ValueError("a box that lacks vertices")
+        raise ValueError("found a box that lacks vertices")
     animation = str(vehicle.get("animation", ""))
     glb = file.with_name(animation) if _is_name(animation) else file.with_suffix(".glb")
     real = vehicle.get("real_size") or {}
@@ -185,8 +184,7 @@ def _frames(root: Path, vehicles: dict[str, Any], poses: dict[str, Any], problem
             except UserError as error:
                 problems.append(f"{root}: pose {number}, {entries[0][0]}: {error}")
             except MISTAKES as error:
-                problem = f"found no {error}" if isinstance(error, KeyError) else error
-                problems.append(f"{root}: pose {number}, {entries[0][0]}: expected a frame that can be read; {problem}")
+                problems.append(f"{root}: pose {number}, {entries[0][0]}: expected a frame that can be read; {one_line(error)}")
 
 
 def _frame(

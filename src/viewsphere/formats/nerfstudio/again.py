@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.formats._again import cameras_again, pose_of
-from viewsphere.formats._posed import MISTAKES, camera_of, picture_inside
-from viewsphere.formats.nerfstudio.reading import lens_of, pose_said, said_frames, split_of, transforms_files
+from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._posed import camera_of, picture_inside
+from viewsphere.formats.nerfstudio.reading import lens_of, name_of, pose_said, said_frames, split_of, transforms_files
 from viewsphere.model.listed import ListedShot
 from viewsphere.store.again import Again, refuse_any
 
@@ -29,17 +30,14 @@ def again(path: Path) -> Again:
                 shot = _shot(file, said, lists)
                 shots.setdefault(shot.image or str(len(shots)), shot)
             except MISTAKES as error:
-                told = f"found no {error}" if isinstance(error, KeyError) else error
-                problems.append(f"{file}: frame number {number}: {told}")
+                problems.append(f"{file}: frame number {number}: {one_line(error)}")
     refuse_any(problems)
     return cameras_again(path, tuple(shots.values()), files[0].parent, FOLDERS, "nerfstudio", "+z")
 
 
 def _shot(file: Path, said: Mapping[str, Any], lists: Mapping[str, set[str]]) -> ListedShot:
-    name = str(said["file_path"])
-    if said.get("w") and said.get("h"):
-        size = int(said["w"]), int(said["h"])
-    else:
+    name, size = name_of(said), (0, 0)
+    if not (said.get("w") and said.get("h")):
         _, size = picture_inside(file.parent, name.removeprefix("./"), ".png", ".jpg")
     lens, pose = lens_of(said, size), pose_said(said)
     camera_of(lens, pose)

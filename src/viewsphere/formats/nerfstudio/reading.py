@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.formats._posed import MISTAKES, Posed, camera_of, check_picture, picture_inside, posed_dataset
+from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._posed import Posed, camera_of, check_picture, picture_inside, posed_dataset, without_world
 from viewsphere.formats.nerfstudio.synthetic import SPLITS
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset
@@ -44,7 +45,7 @@ def transforms_files(folder: Path) -> list[Path]:
     whole = folder / "transforms.json"
     found = [whole] if whole.is_file() else sorted(folder.glob("transforms_*.json"), key=lambda file: _rank(_split(file)))
     if not found:
-        raise StoreError(f"{folder}: expected transforms.json, or transforms_train.json; found neither")
+        raise without_world(folder, "transforms.json, or transforms_train.json", "transforms*.json")
     return found
 
 
@@ -61,8 +62,7 @@ def _pictures(file: Path, problems: list[str]) -> Iterator[Posed]:
         try:
             yield _picture(file, said, lists)
         except MISTAKES as error:
-            told = f"found no {error}" if isinstance(error, KeyError) else error
-            problems.append(f"{file}: frame number {number}: {told}")
+            problems.append(f"{file}: frame number {number}: {one_line(error)}")
 
 
 def said_frames(file: Path) -> Iterator[tuple[int, Mapping[str, Any], Mapping[str, set[str]]]]:
@@ -76,24 +76,39 @@ def said_frames(file: Path) -> Iterator[tuple[int, Mapping[str, Any], Mapping[st
     if not isinstance(data, dict) or not isinstance(cast(dict[str, Any], data).get("frames"), list):
         raise StoreError(f"{file}: expected a mapping with a list of frames; found another")
     whole = cast(dict[str, Any], data)
-    lists = {split: set(map(str, whole.get(f"{split}_filenames") or ())) for split in reversed(SPLITS)}
+    lists = {split: _names(file, whole, f"{split}_filenames") for split in reversed(SPLITS)}
     for number, frame in enumerate(cast(list[Any], whole["frames"])):
         yield number, {**whole, **frame} if isinstance(frame, dict) else {}, lists
 
 
+def _names(file: Path, whole: Mapping[str, Any], field: str) -> set[str]:
+    listed = whole.get(field) or []
+    if not isinstance(listed, list):
+        raise StoreError(f"{file}: expected {field}, a list of names; found {listed!r:.60}")
+    return set(map(str, cast(list[Any], listed)))
+
+
 def _picture(file: Path, said: Mapping[str, Any], lists: Mapping[str, set[str]]) -> Posed:
-    name = str(said["file_path"])
+    name = name_of(said)
     place, size = picture_inside(file.parent, name.removeprefix("./"), ".png", ".jpg")
     lens = lens_of(said, size)
     check_picture(size, lens)
     split, pose = split_of(file, name, lists), pose_said(said)
     mapped, step = said.get("depth_file_path"), 0.001
     if mapped is None and "integer_depth_scale" in said:
-        mapped, step = said.get("depth_path"), float(said["integer_depth_scale"])
+        mapped, step = said.get("depth_path"), _number(said, "integer_depth_scale", step)
     depth = None if mapped is None else file_inside(file.parent, str(mapped))
     if depth is not None and not (depth.is_file() and step > 0):
         raise ValueError(f"expected depth in steps of more than 0 metres; found {mapped}, {step:g}")
     return Posed(place, camera_of(lens, pose), split, depth=depth, step=step)
+
+
+def name_of(said: Mapping[str, Any]) -> str:
+    """The path of a frame's picture; raises ValueError where it has none."""
+    name = said["file_path"]
+    if not isinstance(name, str) or not PurePosixPath(name).parts:
+        raise ValueError(f"expected a file_path; found {name!r:.60}")
+    return name
 
 
 def split_of(file: Path, name: str, lists: Mapping[str, set[str]]) -> str:
@@ -107,21 +122,35 @@ def split_of(file: Path, name: str, lists: Mapping[str, set[str]]) -> str:
 
 def pose_said(said: Mapping[str, Any]) -> NDArray[np.float64]:
     """The pose of a frame, world_from_camera (3, 4), OpenCV's axes; raises ValueError for another matrix."""
-    pose = np.array(said["transform_matrix"], np.float64)
+    try:
+        pose = np.array(said["transform_matrix"], np.float64)
+    except (TypeError, ValueError):
+        pose = np.zeros(0)
     if pose.shape not in ((3, 4), (4, 4)):
-        raise ValueError(f"expected a transform_matrix of 4 x 4; found {pose.shape}")
+        raise ValueError(f"expected a transform_matrix of 4 x 4 numbers; found {said['transform_matrix']!r:.60}")
     return pose[:3] * (1.0, -1.0, -1.0, 1.0)
+
+
+def _number(said: Mapping[str, Any], name: str, other: float) -> float:
+    """What is said as a number, else the other one; raises ValueError for what is none."""
+    value = other if said.get(name) is None else said[name]
+    if not isinstance(value, (int, float)) or not abs(value) < math.inf:
+        raise ValueError(f"expected {name}, a number; found {value!r:.60}")
+    return float(value)
 
 
 def lens_of(said: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics:
     """The lens of a frame, whose picture has a size; raises ValueError for one that viewsphere does not have."""
-    width, height = int(said.get("w", size[0])), int(said.get("h", size[1]))
-    fx = said.get("fl_x") or width / 2 / math.tan(float(said["camera_angle_x"]) / 2)
-    cx, cy = said.get("cx", width / 2), said.get("cy", height / 2)
+    width, height = (int(_number(said, name, own)) for name, own in zip("wh", size, strict=True))
+    fx, angle = _number(said, "fl_x", 0.0), _number(said, "camera_angle_x", 0.0)
+    if not (fx or angle):
+        raise ValueError("expected fl_x, or camera_angle_x; found neither")
+    fx = fx or width / 2 / math.tan(angle / 2)
+    cx, cy = _number(said, "cx", width / 2), _number(said, "cy", height / 2)
     model = "OPENCV_FISHEYE" if said.get("is_fisheye") else said.get("camera_model", "OPENCV")
     if model not in MODELS:
         raise ValueError(f"expected a camera_model of {', '.join(MODELS)}; found {model!r:.60}")
-    k1, k2, k3, k4, p1, p2 = (float(said.get(name, 0.0)) for name in ("k1", "k2", "k3", "k4", "p1", "p2"))
+    k1, k2, k3, k4, p1, p2 = (_number(said, name, 0.0) for name in ("k1", "k2", "k3", "k4", "p1", "p2"))
     bent: Distortion | None = None
     if model == "OPENCV_FISHEYE":
         bent = Distortion(model="fisheye", coefficients=(k1, k2, k3, k4))
@@ -130,4 +159,4 @@ def lens_of(said: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics:
     elif any((k1, k2, k3, p1, p2)):
         bent = Distortion(model="brown_conrady", coefficients=(k1, k2, p1, p2, k3) if k3 else (k1, k2, p1, p2))
     size_of = {"width": width, "height": height}
-    return Intrinsics(**size_of, fx=fx, fy=said.get("fl_y") or fx, cx=cx, cy=cy, distortion=bent)
+    return Intrinsics(**size_of, fx=fx, fy=_number(said, "fl_y", 0.0) or fx, cx=cx, cy=cy, distortion=bent)

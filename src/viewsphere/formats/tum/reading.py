@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.formats._posed import MISTAKES, Posed, camera_of, picture_inside, posed_dataset
+from viewsphere.formats._listed import MISTAKES, one_line
+from viewsphere.formats._posed import Posed, camera_of, picture_inside, posed_dataset
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset
@@ -55,7 +56,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
             camera = camera_of(_lens(values, size), _pose(pose, values[1] < 0))
             found.append(Posed(rgb, camera, sequence=name, instant=len(found), time=seconds, depth=mapped, step=STEP))
         except MISTAKES as error:
-            problems.append(f"{path}: picture of {seconds:g} s: {error}")
+            problems.append(f"{path}: picture of {seconds:g} s: {one_line(error)}")
     timed = [replace(one, time=one.time - found[0].time) for one in found]
     return posed_dataset(path, timed, texts, problems, keep_going)
 
