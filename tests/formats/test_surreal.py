@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+import tracemalloc
 from dataclasses import replace
 from itertools import pairwise
 
@@ -286,6 +287,18 @@ def test_clips_have_at_most_a_hundred_pictures(long, tmp_path):
     assert [name.item() for name in other["bg"][0]] == ["hall.png"] * 2 and other["clipNo"].item() == 2
     last = io.loadmat(str(second).replace("info", "segm"))
     equal("surreal", "scipy: segm, Mixamo's names", last["segm_2"], long[-1].body_parts)
+
+
+def test_a_clip_s_pictures_are_not_in_memory_together(long):
+    tree = surreal.Surreal(long)
+    clip = tree._clip_of(long[0])
+    tracemalloc.start()
+    try:
+        writing._film(clip)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 50 * long[0].rgb.nbytes  # of 100; manifests, too, are in memory
 
 
 def test_a_check_of_the_whole_data_set(long, tmp_path):

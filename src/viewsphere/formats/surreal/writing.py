@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import PurePath
 from typing import Any
@@ -194,11 +195,12 @@ def film_encoder() -> Encoder:
 
 
 def _film(clip: Clip) -> bytes:
+    """The video of a clip; no picture stays in memory, as it would with a sample that has read it."""
     times = [sample.time for sample in clip.samples]
     steps: Sequence[float] = np.diff(times).tolist() or [1 / RATE]
     lasts = [*steps, min(steps)][: len(times)]
     with temporary("film") as aside:
-        pictures = (opaque(sample.picture) for sample in clip.samples)
+        pictures = (opaque(replace(sample, channels=copy(sample.channels)).picture) for sample in clip.samples)
         write_mp4(aside / "film.mp4", zip(pictures, lasts, strict=True), film_encoder())
         return (aside / "film.mp4").read_bytes()
 
