@@ -86,11 +86,11 @@ def arm() -> Rigged:
     )  # fmt: skip
 
 
-def person() -> Rigged:
+def person(body=BODY) -> Rigged:
     """A standing figure; around each joint the weights go over from one bone to the next."""
-    names = list(BODY)
+    names = list(body)
     vertices, triangles, bones, weights = [], [], [], []
-    for number, (above, start, end, radius) in enumerate(BODY.values()):
+    for number, (above, start, end, radius) in enumerate(body.values()):
         own, faces = tube(start, end, radius * np.array([0.6, 0.95, 1, 1, 0.9, 0.55]))
         triangles.append(faces + sum(map(len, vertices)))
         along = np.subtract(end, start)
@@ -101,8 +101,8 @@ def person() -> Rigged:
         weights.append(np.column_stack([first, 1 - first]))
     return Rigged(
         *map(np.vstack, (vertices, triangles, bones, weights)), names,
-        np.float64([start for _, start, _, _ in BODY.values()]),
-        [above and names.index(above) for above, *_ in BODY.values()],
+        np.float64([start for _, start, _, _ in body.values()]),
+        [above and names.index(above) for above, *_ in body.values()],
     )  # fmt: skip
 
 

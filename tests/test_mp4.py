@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from viewsphere.codecs.mp4 import CODECS, GRACE_S, Encoder, encoder, rate, write_mp4
 from viewsphere.errors import MissingExtraError, UserError
-from viewsphere.preview.mp4 import CODECS, GRACE_S, Encoder, encoder, rate, write_mp4
 
 ffmpeg = pytest.importorskip("imageio_ffmpeg")
 posix = pytest.mark.skipif(os.name != "posix", reason="programs of this test are shell scripts")
@@ -148,7 +148,7 @@ def _lives(folder: Path) -> bool:
     ],
 )
 def test_a_program_that_fails_is_told_of_and_is_over(tmp_path, monkeypatch, script, found):
-    monkeypatch.setattr("viewsphere.preview.mp4.GRACE_S", GRACE_S / 10)
+    monkeypatch.setattr("viewsphere.codecs.mp4.GRACE_S", GRACE_S / 10)
     with pytest.raises(UserError, match=rf"found {found}: mend that, or write .webp$"):
         write_mp4(tmp_path / "v.mp4", [(np.zeros((480, 640, 3), np.uint8), 0.04)] * 3, _program(tmp_path, script))
     assert not _lives(tmp_path)

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from viewsphere.codecs.mp4 import Shown, encoder, write_mp4
 from viewsphere.errors import StoreError, UserError
 from viewsphere.labels import is_shown
 from viewsphere.model.sample import Sample
 from viewsphere.preview.frame import INK, PAPER, Picture, check_drawn, draw_instant, extents
-from viewsphere.preview.mp4 import Shown, encoder, write_mp4
 from viewsphere.preview.tiles import CAPTION, MARGIN, film_caption, fitting, with_key
 from viewsphere.store.films import Earlier, Film, film_named, films_of
 from viewsphere.store.moving import move

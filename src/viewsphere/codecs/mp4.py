@@ -18,10 +18,12 @@ from itertools import chain
 from pathlib import Path
 from typing import IO
 
-from viewsphere.errors import MissingExtraError, UserError
-from viewsphere.preview.frame import Picture
+import numpy as np
+from numpy.typing import NDArray
 
-Shown = tuple[Picture, float]
+from viewsphere.errors import MissingExtraError, UserError
+
+Shown = tuple[NDArray[np.uint8], float]
 """A picture, and the seconds for which it is shown."""
 
 CODECS = {"libx264": ("-crf", "18"), "libopenh264": ("-b:v", "20M"), "libsvtav1": ("-crf", "24")}
@@ -44,13 +46,17 @@ GRACE_S = 5.0
 
 @dataclass(frozen=True)
 class Encoder:
-    """The program ffmpeg, and the name of its encoder."""
+    """The program ffmpeg, and the name of its encoder. Errors begin with `asked`, which wants an MP4, and end with what
+    could be done `instead`.
+    """
 
     program: str
     codec: str
+    asked: str = "--video"
+    instead: str = ", or write .webp"
 
 
-def encoder() -> Encoder:
+def encoder(asked: str = Encoder.asked, instead: str = Encoder.instead) -> Encoder:
     """The ffmpeg of the package imageio-ffmpeg (or that IMAGEIO_FFMPEG_EXE names), and the first of `CODECS` that it has.
 
     Raises MissingExtraError without the package, an ffmpeg that starts, or any of these encoders.
@@ -59,20 +65,21 @@ def encoder() -> Encoder:
         from imageio_ffmpeg import get_ffmpeg_exe
     except ImportError:
         raise MissingExtraError(
-            "--video: expected the package imageio-ffmpeg for .mp4, found none: pip install 'viewsphere[video]', or write .webp"
+            f"{asked}: expected the package imageio-ffmpeg for .mp4, found none: pip install 'viewsphere[video]'{instead}"
         ) from None
     try:
         program = get_ffmpeg_exe()
         listed = subprocess.run([program, "-hide_banner", "-encoders"], capture_output=True, check=True, timeout=ANSWER_S)
     except (OSError, RuntimeError, subprocess.SubprocessError) as error:
         raise MissingExtraError(
-            f"--video: expected an ffmpeg that starts; found: {error}: let IMAGEIO_FFMPEG_EXE name another, or write .webp"
+            f"{asked}: expected an ffmpeg that starts; found: {error}: let IMAGEIO_FFMPEG_EXE name another{instead}"
         ) from None
     names = set(listed.stdout.decode(errors="replace").split())
     codec = next((name for name in CODECS if name in names), None)
     if codec is None:
-        raise MissingExtraError(f"--video: expected an encoder of {', '.join(CODECS)} in {program}; found none: write .webp")
-    return Encoder(program, codec)
+        known = ", ".join(CODECS)
+        raise MissingExtraError(f"{asked}: expected an encoder of {known} in {program}; found none: take another{instead}")
+    return Encoder(program, codec, asked, instead)
 
 
 def write_mp4(file: Path, shown: Iterable[Shown], by: Encoder) -> None:
@@ -89,7 +96,7 @@ def write_mp4(file: Path, shown: Iterable[Shown], by: Encoder) -> None:
             process.wait(None if taken else GRACE_S)
         if process.returncode != 0 or not taken:
             found = _end(process.returncode, said)
-            raise UserError(f"--video: expected ffmpeg to write the video; found {found}: mend that, or write .webp")
+            raise UserError(f"{by.asked}: expected ffmpeg to write the video; found {found}: mend that{by.instead}")
 
 
 def rate(seconds: float) -> Fraction:
