@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from viewsphere.errors import RecipeError, UserError
 from viewsphere.model.mistakes import one_of
 from viewsphere.run.again_recipe import RECIPE, draft
 from viewsphere.sampling.plan import plan
+from viewsphere.store import new_folder
 from viewsphere.store.again import Again
 
 
@@ -57,9 +57,7 @@ def _check_folder(folder: Path) -> None:
 
 
 def _make(found: Again, of: str, folder: Path) -> None:
-    folder.absolute().parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.absolute().parent) as place:
-        made = Path(place) / "made"
+    with new_folder(folder) as made:
         try:
             for name, data in draft(found, of, made):
                 (made / name).parent.mkdir(parents=True, exist_ok=True)
@@ -67,6 +65,3 @@ def _make(found: Again, of: str, folder: Path) -> None:
             plan(str(made / RECIPE))
         except RecipeError as error:
             raise RecipeError(str(error).replace(str(made), str(folder))) from None
-        if folder.exists():
-            folder.rmdir()
-        made.rename(folder)
