@@ -335,6 +335,7 @@ FRAME = {"file_path": "images/a.png", "w": 64, "h": 48, "fl_x": 60.0, "transform
         ({"k1": [1]}, r"expected k1, a number; found \[1\]"),
         ({"w": "x"}, "expected w, a number; found 'x'"),
         ({"w": 20_000}, "camera: expected at most 16384 pixels a side; found 20000 x 48"),
+        ({"transform_matrix": (np.eye(4) * 1e300).tolist()}, "expected a rigid pose; found another"),
         ({"transform_matrix": [[1], [1, 2]]}, r"expected a transform_matrix of 4 x 4 numbers; found \[\[1\], \[1, 2\]\]"),
     ],
 )
