@@ -31,6 +31,10 @@ TESTED = {
     "MAX_FETCHED_BYTES": "test_fetched",
     "MAX_MODELS": "test_models",
     "MAX_VOXELS": "test_voxels",
+    "MAX_LISTED_OBJECTS": "test_listed_sampler",
+    "MAX_ANNOTATION_BYTES": "test_kitti_reading",
+    "MAX_IMPORTED_OBJECTS": "test_kitti_reading",
+    "MAX_MAT_ARRAYS": "test_mat",
     **dict.fromkeys(
         (
             "MAX_FILE_BYTES", "MAX_FILES", "MAX_TRIANGLES", "MAX_VERTICES", "MAX_PICTURE_PIXELS",
