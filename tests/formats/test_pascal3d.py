@@ -197,8 +197,8 @@ def refused(tmp_path, **changes):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"model": {"category": "post box"}}, r"expected names of categories that match .*; found 'post box'"),
-        ({"model": {"category": "Briefkästen"}}, r"expected names of categories that match .*; found 'Briefkästen'"),
+        ({"model": {"category": "post box"}}, r"expected names of categories of letters .*; found 'post box'"),
+        ({"model": {"category": "Briefkästen"}}, r"expected names of categories of letters .*; found 'Briefkästen'"),
         (
             {"camera": {"size": [80, 60], "K": [[90, 0, 40], [0, 80, 30], [0, 0, 1]]}},
             r"expected square pixels; found fx 90, fy 80, skew 0 of camera",

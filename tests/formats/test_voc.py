@@ -166,7 +166,7 @@ def test_names_and_empty_pictures(hostile):
     [
         ({"categories": tuple(Category(i, f"c{i}", "") for i in range(1, 256))}, "expected at most 254 categories; found 255"),
         ({"most_objects": 300}, "expected at most 254 objects in a picture; found 300"),
-        ({"categories": (Category(1, "a:b", ""),)}, "expected names of categories that match .*; found 'a:b'"),
+        ({"categories": (Category(1, "a:b", ""),)}, "expected names of categories of one line, without : .*; found 'a:b'"),
     ],
 )
 def test_refusals(stills, changes, message):

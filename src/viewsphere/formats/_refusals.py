@@ -97,11 +97,13 @@ def most_categories(scope: Scope, most: int) -> Iterator[str]:
         yield f"expected at most {most:,} categories; found {len(scope.categories):,}"
 
 
-def plain_names(scope: Scope, allowed: str = r"[^\s]+") -> Iterator[str]:
-    """Of a format that ends names at spaces, or knows fewer characters: names of categories have to match `allowed` whole."""
+def plain_names(scope: Scope, allowed: str = r"\S+", told: str = "without spaces") -> Iterator[str]:
+    """Of a format that ends names at spaces, or knows fewer characters: categories' names have to match `allowed`, `told` in
+    words, whole.
+    """
     for category in scope.categories:
         if not re.fullmatch(allowed, category.name):
-            yield f"expected names of categories that match {allowed}; found {category.name!r}"
+            yield f"expected names of categories {told}; found {category.name!r}"
 
 
 def no_skew(scope: Scope) -> Iterator[str]:

@@ -66,7 +66,7 @@ def no_viewpoints(scope: Scope) -> Iterator[str]:
     for name, lens in lenses(scope):
         if found := _oblong(lens):
             yield f"expected square pixels; found {found} of {name}"
-    yield from plain_names(scope, NAMES)
+    yield from plain_names(scope, NAMES, "of letters a to z, digits and _, a letter first")
 
 
 def _oblong(lens: Intrinsics) -> str:

@@ -56,7 +56,7 @@ class Options(Frozen):
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Still pictures; names that take more than a line."""
     yield from sequences(scope)
-    yield from plain_names(scope, r"\S([^\r\n]*\S)?")
+    yield from plain_names(scope, r"\S([^\r\n]*\S)?", "of one line, without spaces at its ends")
 
 
 class Mot(Tree):

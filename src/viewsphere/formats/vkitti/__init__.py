@@ -92,7 +92,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
     yield from refusals.no_skew(scope)
     yield from refusals.most_objects(scope, MOST)
     yield from refusals.most_categories(scope, MOST)
-    yield from refusals.plain_names(scope, r"[^\s:]+")
+    yield from refusals.plain_names(scope, r"[^\s:]+", "without spaces and :")
 
 
 class VKitti(Tree):

@@ -58,7 +58,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
     """Numbers of 8 bits, and names that fill a line."""
     yield from most_categories(scope, MOST)
     yield from most_objects(scope, MOST)
-    yield from plain_names(scope, NAMES)
+    yield from plain_names(scope, NAMES, "of one line, without : and without # in front")
 
 
 preparer, writer, verify = functions(Voc)
