@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -48,8 +47,10 @@ def told(label, against, error, unit=""):
 
 
 def version_of(against):
-    """The version of the first program that `against`, up to its colon, names; empty where none has one."""
-    for word in re.split(r"[ ,]+", against.partition(":")[0]):
+    """The version of the one program that `against` names before its colon; empty where none or several have one."""
+    found = []
+    for words in against.partition(":")[0].split(", "):
+        name = words.partition(" ")[0]
         with suppress(PackageNotFoundError, ValueError):
-            return version(DISTRIBUTIONS.get(word, word))
-    return ""
+            found.append(version(DISTRIBUTIONS.get(name, name)))
+    return found[0] if len(found) == 1 else ""
