@@ -92,9 +92,7 @@ def test_torchvision_trains_a_detector(dataset, tree):
     """A step of a detector of as many classes as there are categories: ids with gaps are past its last output."""
     datasets = torchvision_datasets()
     torch = pytest.importorskip("torch")
-    try:
-        torch.ops.torchvision.nms(torch.zeros(1, 4), torch.zeros(1), 0.5)
-    except (NotImplementedError, RuntimeError):
+    if not hasattr(torch.ops.torchvision, "roi_align"):
         pytest.skip("needs a torchvision that is built for this torch")
     from torchvision.models.detection import fasterrcnn_mobilenet_v3_large_320_fpn
     from torchvision.transforms.functional import to_tensor
