@@ -191,3 +191,11 @@ def test_yolo_and_voc_speak_of_what_is_shown(tmp_path):
         (sample,) = Dataset(tmp_path / f"{kind}-ds")
         np.testing.assert_array_equal(sample.rgb, shown)
         assert sample.objects[0].box2d == (10, 12, 30, 18)
+
+
+def test_names_of_points_that_come_twice_are_no_names(tmp_path):
+    data = split(tmp_path / "real", "train", LICENCES, {"keypoints": ["nose", "nose", "paw"]})
+    import_dataset("coco", tmp_path / "real", tmp_path / "out")
+    now = exported(tmp_path / "out")
+    assert "keypoints" not in now["categories"][0]
+    assert now["annotations"][0]["keypoints"] == data["annotations"][0]["keypoints"]

@@ -56,15 +56,17 @@ def model_spec(file: Path) -> ModelSpec:
     return ModelSpec(key="model", source=str(file), category="object", category_id=1, **axes)
 
 
-def foreign_models(root: Path, named: Mapping[int, tuple[Category, str]], problems: list[str]) -> dict[int, ForeignModel]:
-    """The models of objects, by their numbers; the problems of others are appended."""
+def foreign_models(
+    root: Path, files: Mapping[int, Path], named: Mapping[int, tuple[Category, str]], problems: list[str]
+) -> dict[int, ForeignModel]:
+    """The models of objects, by their numbers, of these files; the problems of others are appended."""
     found: dict[int, ForeignModel] = {}
     try:
         symmetries = {number: one.moved(METRES) for number, one in symmetries_of(root).items()}
     except StoreError as error:
         problems.append(str(error))
         symmetries = {}
-    for number, file in model_files(root).items():
+    for number, file in files.items():
         category, key = named[number]
         try:
             found[number] = foreign_model(load_normalised(model_spec(file)), key, category, symmetries=symmetries.get(number))

@@ -54,8 +54,9 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     if not files:
         raise StoreError(f"{path}: expected a BOP data set (<split>/<scene>/scene_camera.json); found no such file")
     frames = tuple(frame for file in files for frame in scene_frames(path, file.parent, problems))
-    named = categories(path, sorted({*model_files(path), *(gt["obj_id"] for frame in frames for gt in frame.gt)}))
-    models = foreign_models(path, named, problems)
+    cads = model_files(path)
+    named = categories(path, sorted({*cads, *(gt["obj_id"] for frame in frames for gt in frame.gt)}))
+    models = foreign_models(path, cads, named, problems)
     if not keep_going:
         refuse_broken(problems)
     if not frames:

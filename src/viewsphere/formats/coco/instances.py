@@ -14,7 +14,7 @@ from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.entries import CAPTIONS, Entry
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.points import category_points, has_label, point_names
-from viewsphere.formats.coco.said import Licences, imported_info, imported_info_of_parts
+from viewsphere.formats.coco.said import Licences, imported_categories, imported_info, imported_info_of_parts
 from viewsphere.store import Dataset
 from viewsphere.store.credits import credited
 
@@ -80,12 +80,15 @@ def _written(file: Path, head: bytes) -> Generator[Callable[[bytes, Iterable[byt
 def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
     info = {"description": dataset.name, "version": "1.0", "contributor": f"viewsphere {dataset.plan.version}"}
     licenses, credits = _terms(dataset)
-    names, sources = point_names(dataset), imported_info_of_parts(dataset)
+    names, sources, imported = point_names(dataset), imported_info_of_parts(dataset), imported_categories(dataset)
     return {
         "info": {**info, **({"sources": sources} if sources else {}), **({"credits": credits} if credits else {})},
         "licenses": licenses,
         "categories": [
-            {"id": ids[c.id], "name": c.name, "supercategory": c.supercategory, **category_points(dataset, c, names)}
+            {
+                **{"id": ids[c.id], "name": c.name, "supercategory": c.supercategory},
+                **category_points(dataset, c, names, imported.get(c.name.casefold(), {})),
+            }
             for c in dataset.categories
         ],
         "models": vehicles(dataset.models),

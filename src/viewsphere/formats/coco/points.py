@@ -50,13 +50,12 @@ def point_names(dataset: Dataset) -> Names:
     return names
 
 
-def category_points(dataset: Dataset, category: Category, names: Names) -> dict[str, Any]:
+def category_points(dataset: Dataset, category: Category, names: Names, imported: Mapping[str, Any]) -> dict[str, Any]:
     """A category's fields `keypoints` and `skeleton`, names, and lines between them, which count from 1; and all others that it
-    was imported with.
+    was `imported` with.
     """
-    imported = imported_categories(dataset).get(category.name.casefold(), {})
     if category.id not in names:
-        return imported
+        return dict(imported)
     own = {name: number for number, name in enumerate(names[category.id], 1)}
     lines = [list(line) for line in imported.get("skeleton", ())]
     for known in _known(dataset, category.id) if has_label(dataset, KEYPOINTS) else ():

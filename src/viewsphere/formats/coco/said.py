@@ -60,9 +60,9 @@ class Licences:
 
     def add(self, licence: Mapping[str, Any]) -> int:
         """The id of a licence, which is listed if it was not: its own, or the next one where another has it."""
-        key, taken = _key(licence), {one["id"] for one in self.listed}
+        key = _key(licence)
         if key not in self._ids:
-            own = licence.get("id")
+            own, taken = licence.get("id"), {one["id"] for one in self.listed}
             number = own if isinstance(own, int) and own not in taken else max(taken, default=0) + 1
             self._ids[key] = number
             self.listed.append({**licence, "id": number})
@@ -112,11 +112,13 @@ def _told(dataset: Dataset) -> Iterator[Said]:
 
 
 def _is_sound(key: str, value: Any) -> bool:
-    """Whether a category's names of points and its lines are such; of other keys nothing is known."""
-    if key not in ("keypoints", "skeleton") or not isinstance(value, list):
-        return key not in ("keypoints", "skeleton")
-    values = cast(list[Any], value)
-    return all(isinstance(one, str) for one in values) if key == "keypoints" else all(map(_is_line, values))
+    """Whether a category's names of points, each once, and its lines are such; of other keys nothing is known."""
+    if key not in ("keypoints", "skeleton"):
+        return True
+    values = cast(list[Any], value if isinstance(value, list) else [None])
+    if key == "skeleton":
+        return all(map(_is_line, values))
+    return all(isinstance(one, str) for one in values) and len(set(values)) == len(values)
 
 
 def _is_line(value: Any) -> bool:
