@@ -35,7 +35,7 @@ from viewsphere.surroundings.ground import ground_stamps
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.shot_views import ShotViews
 from viewsphere.truth.visibility import with_ground
-from viewsphere.zoo import build_zoo_model
+from viewsphere.zoo import build_zoo_model, rooms_of
 
 if TYPE_CHECKING:
     from viewsphere.engines import Engine, Stage  # which takes a third of a worker's start
@@ -182,6 +182,7 @@ class Stages:
         if own is None:
             return
         model = transform(own.world_from_object, self.box(own.model, own.step)).mean(axis=0)
+        _check_rooms(things, model, cameras)
         for thing in things:
             box = transform(thing.world_from_object, self.box(thing.model, thing.step))
             for i in np.flatnonzero(inside_box(box, cameras)):
@@ -255,6 +256,19 @@ def _stamps(shot: Shot) -> tuple[Stamp, ...]:
     """Of the files that the surfaces of a shot show."""
     ground = () if shot.scene.ground is None else ground_stamps(shot.scene.ground)
     return ground + repaint_stamps(repaint for thing in shot.things for repaint in thing.repaints)
+
+
+def _check_rooms(things: Sequence[Thing], model: Float, cameras: Float) -> None:
+    """Raise RecipeError for the first of the cameras (N, 3) that is in no room, where the model's middle (3,) is in one."""
+    rooms = [transform(thing.world_from_object, box) for thing in things if thing.scenery for box in rooms_of(thing.model)]
+    if not any(inside_box(room, model[None])[0] for room in rooms):
+        return
+    for i in np.flatnonzero(~np.any([inside_box(room, cameras) for room in rooms], axis=0)):
+        raise RecipeError(
+            f"viewpoints: expected the camera in a room of the place, as the model is; found it beyond the walls at "
+            f"({', '.join(f'{v:.3g}' for v in cameras[i])}): go nearer; with min_visibility, frames that are drawn at random are "
+            "drawn again"
+        )
 
 
 def _size(mesh: Mesh) -> int:

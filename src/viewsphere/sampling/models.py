@@ -26,12 +26,16 @@ from viewsphere.plugins import families
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.seeds import generator
+from viewsphere.sampling.seeds import generator, share
 from viewsphere.sampling.tables import Cells, table_rows
 from viewsphere.store import Category
+from viewsphere.zoo import things
 
 MODEL_SUFFIXES = frozenset({".obj", ".glb", ".gltf", ".ply", ".stl", ".off", ".dae", ".3mf"})
 """Endings that folders and patterns are searched for; others are found by patterns that end in them, as `cars/*.fbx` does."""
+
+ANY = "any"
+"""Stands for every family of the zoo whose members are things."""
 
 LONGEST_KEY = 150
 """Bytes; names of files and of folders that are being written add up to some hundred more."""
@@ -117,7 +121,7 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
 
     def add(i: int) -> None:
         entry = recipe.models[i]
-        for source in entry.source:
+        for source in chain.from_iterable(map(_meant, entry.source)):
             name = _category(entry, source)
             category = result.setdefault(name, Category(len(result) + 1, name, entry.supercategory))
             if category.supercategory != entry.supercategory:
@@ -133,7 +137,7 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
 def _families(recipe: Recipe, index: int) -> tuple[str, ...]:
     """The zoo families of an entry, none for one of files; raises RecipeError for one that is not there."""
     for family in recipe.models[index].families:
-        if family not in families():
+        if family not in (ANY, *families()):
             raise RecipeError(f"models[{index}].source: zoo: {one_of(family, families())}")
     return recipe.models[index].families
 
@@ -179,11 +183,25 @@ def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
     entry = recipe.models[index]
     for family in _families(recipe, index):
         for number in range(_count(recipe, index)):
-            yield _Found(index, f"{entry.name or family}_{number:03d}", ZOO + family)
+            yield _Found(index, f"{entry.name or family}_{number:03d}", ZOO + _drawn_family(recipe, family, number))
     if not entry.families:
         prefix = f"{entry.name}_" if entry.name else ""
         for file in _files(recipe, index):
             yield _Found(index, _short(_free(prefix + _as_key(file.stem))), file.as_posix())
+
+
+def _meant(source: str) -> tuple[str, ...]:
+    """All families that a source may mean, each as a source; the source itself where it means one."""
+    return tuple(ZOO + family for family in things()) if source == ZOO + ANY else (source,)
+
+
+def _drawn_family(recipe: Recipe, family: str, number: int) -> str:
+    """The family of a model: of `any` each in turn before one comes again, every round in an order of its own."""
+    if family != ANY:
+        return family
+    known = things()
+    turn, place = divmod(number, len(known))
+    return sorted(known, key=lambda name: share(recipe.lasting_seed, "family", str(turn), name))[place]
 
 
 def _as_key(text: str) -> str:

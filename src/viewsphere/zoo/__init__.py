@@ -1,21 +1,37 @@
 """Procedural models that ship with the tool, in metres, front -Y, up +Z, standing on z = 0.
 
 A family is one module of this package, named as its file: `NAME(...)` builds a Mesh from parameters and `NAME_random(rng)`
-draws the parameters. `KEYPOINTS` of a family are its named points by its parts, and `SKELETON` lines between them. Sub-packages
-hold the parts that families are built from.
+draws the parameters. `HOME` says where its members are found, `KEYPOINTS` are its named points by its parts, and `SKELETON`
+lines between them. Sub-packages hold the parts that families are built from.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 from viewsphere import plugins
 
 if TYPE_CHECKING:
     import numpy as np
+    from numpy.typing import NDArray
 
     from viewsphere.assets.mesh import Mesh
     from viewsphere.model.model_spec import ModelSpec
+
+Home = Literal["table", "floor", "street", "garden", "water", "place"]
+"""Where a family is found; `place`: it is a place's ground or building, not a thing in it."""
+
+HOMES: tuple[Home, ...] = get_args(Home)
+
+
+def home(family: str) -> Home:
+    """Where a family is found; raises UserError for an unknown family, with the nearest known one."""
+    return plugins.family(family).HOME
+
+
+def things() -> tuple[str, ...]:
+    """Names of the families that are things, not parts of places, sorted; all families are imported."""
+    return tuple(family for family in families() if home(family) != "place")
 
 
 def families() -> tuple[str, ...]:
@@ -36,6 +52,20 @@ def build_zoo_model(spec: ModelSpec) -> Mesh:
     import numpy as np
 
     return build(spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed))
+
+
+def rooms_of(spec: ModelSpec) -> tuple[NDArray[np.float64], ...]:
+    """The air of the rooms in a member of the zoo, each a box (8, 3) in its own axes, metres; none where it has no rooms.
+
+    A family with rooms has a function `rooms` that gives them by its parameters.
+    """
+    import numpy as np
+
+    family = spec.source.removeprefix("zoo:")
+    module = plugins.family(family) if family != spec.source else None
+    if not hasattr(module, "rooms"):
+        return ()
+    return module.rooms(module.draw(np.random.default_rng(spec.seed)))
 
 
 def real_size(mesh: Mesh) -> tuple[float, float, float]:

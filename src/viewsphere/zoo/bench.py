@@ -12,6 +12,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, linear
 from viewsphere.zoo.shapes.solids import Solid, join, moved, rounded_box, tube, turned
 
+HOME = "street"
+
 KEYPOINTS = {
     **sided("seat_front", "seat", (1, -1, 1)),
     **sided("seat_rear", "seat", (1, 1, 1)),

@@ -24,6 +24,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.rods import between, shifted, unit
 from viewsphere.zoo.shapes.solids import Float, moved, turned
 
+HOME = "street"
+
 KEYPOINTS = {
     "wheel_front": At("wheel_front_hub"),
     "wheel_rear": At("wheel_rear_hub"),

@@ -19,6 +19,8 @@ from viewsphere.zoo.shipyard.motor import MotorBoat, motor_boat
 from viewsphere.zoo.shipyard.rowing import RowingBoat, rowing_boat
 from viewsphere.zoo.shipyard.sailing import SailingBoat, sailing_boat
 
+HOME = "water"
+
 KEYPOINTS = {
     "bow": At("hull", (0, -1, 1)),
     **sided("beam", "hull", (1, 0, 1)),

@@ -17,6 +17,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.shapes.solids import both_sides
 
+HOME = "street"
+
 KEYPOINTS = {
     **sided("wheel_front", "wheel_front_{}_rim", (1, 0, 0)),
     **sided("wheel_rear", "wheel_rear_{}_rim", (1, 0, 0)),

@@ -16,6 +16,8 @@ from viewsphere.zoo.joinery.windsor import Shell, Windsor
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.solids import moved
 
+HOME = "floor"
+
 KEYPOINTS = {
     **sided("seat_front", "seat_pad|seat_cushion|seat|seat_slat", (1, -1, 1)),
     **sided("seat_rear", "seat_pad|seat_cushion|seat|seat_slat", (1, 1, 1)),

@@ -15,6 +15,8 @@ from viewsphere.zoo.townscape import textures
 from viewsphere.zoo.townscape.surfaces import cuboid, finished, waves
 from viewsphere.zoo.townscape.textures import textured
 
+HOME = "place"
+
 LENGTH = 11.0
 """Length of every driveway and path, metres."""
 

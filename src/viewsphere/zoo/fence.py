@@ -13,6 +13,8 @@ from viewsphere.zoo.shapes.paint import Color, coated, linear
 from viewsphere.zoo.shapes.solids import Solid, join, lathe, moved
 from viewsphere.zoo.townscape.surfaces import cuboid, prism
 
+HOME = "garden"
+
 LENGTH = 2.0
 """Length of one piece from post to post, metres."""
 

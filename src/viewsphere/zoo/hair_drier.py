@@ -27,6 +27,8 @@ from viewsphere.zoo.shapes.solids import (
     turned,
 )
 
+HOME = "table"
+
 KEYPOINTS = {
     "nozzle": At("nozzle", (0, -1, 0)),
     "inlet": At("grille", (0, 1, 0)),

@@ -14,6 +14,8 @@ from viewsphere.zoo.townscape import foliage, textures
 from viewsphere.zoo.townscape.surfaces import finished, waves
 from viewsphere.zoo.townscape.textures import textured
 
+HOME = "garden"
+
 LENGTH = 2.0
 """Length of one piece, metres; leaves reach a little further."""
 

@@ -14,6 +14,8 @@ from viewsphere.zoo.shapes.paint import Color, coated, lamp, metal
 from viewsphere.zoo.shapes.solids import join, lathe, loft, moved, rounded_box, tube, turned
 from viewsphere.zoo.townscape.surfaces import cuboid
 
+HOME = "street"
+
 KEYPOINTS = {
     "foot": At("base|column", (0, 0, -1)),
     "lamp": At("lens|lamp"),

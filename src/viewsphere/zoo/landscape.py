@@ -10,6 +10,8 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.zoo.townscape import country
 from viewsphere.zoo.townscape.surfaces import finished, mapped
 
+HOME = "place"
+
 
 @dataclass(frozen=True)
 class Landscape:

@@ -13,6 +13,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, linear
 from viewsphere.zoo.shapes.solids import grid, join, lathe, moved, rounded_box
 
+HOME = "street"
+
 KEYPOINTS = {
     "slot": At("slot", (0, -1, 0)),
     "door": At("door", (0, -1, 0)),

@@ -14,6 +14,8 @@ from viewsphere.zoo.shapes.paint import Color, linear, metal
 from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, moved
 from viewsphere.zoo.townscape.surfaces import cuboid, prism
 
+HOME = "street"
+
 KEYPOINTS = {
     "plate": At("plate", (0, -1, 0)),
     "foot": At("pole", (0, 0, -1)),

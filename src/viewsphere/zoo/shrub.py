@@ -13,6 +13,8 @@ from viewsphere.zoo.shapes.solids import Float, Solid, join, moved
 from viewsphere.zoo.townscape import foliage
 from viewsphere.zoo.townscape.surfaces import finished, waves
 
+HOME = "garden"
+
 
 @dataclass(frozen=True)
 class Shrub:

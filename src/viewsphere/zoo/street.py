@@ -15,6 +15,8 @@ from viewsphere.zoo.townscape.paving import GUTTER
 from viewsphere.zoo.townscape.plan import HALF_LENGTH, PLOT
 from viewsphere.zoo.townscape.surfaces import finished
 
+HOME = "place"
+
 Paving = Literal["slabs", "bricks", "asphalt"]
 
 

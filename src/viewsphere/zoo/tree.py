@@ -14,6 +14,8 @@ from viewsphere.zoo.shapes.solids import Float, Solid, join, moved, tube
 from viewsphere.zoo.townscape import foliage
 from viewsphere.zoo.townscape.surfaces import Tint, finished, waves
 
+HOME = "garden"
+
 Habit = Literal["round", "column", "conifer", "birch"]
 
 

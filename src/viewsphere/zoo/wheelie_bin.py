@@ -12,6 +12,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, linear
 from viewsphere.zoo.shapes.solids import Solid, both_sides, join, lathe, loft, moved, rounded_box, superellipse, tube, turned
 
+HOME = "street"
+
 KEYPOINTS = {
     **sided("wheel", "wheel", (1, 0, 0)),
     **sided("handle", "handle", (1, 1, 0)),

@@ -44,8 +44,12 @@ class Joinery:
     bars: Bars
 
 
-def facade(width: float, height: float, openings: list[Opening], gable: float = 0.0, seam: float = 0.0) -> Solid:
-    """The wall with its reveals, a gable of this height on top; no triangle crosses the level line at `seam`."""
+def facade(
+    width: float, height: float, openings: list[Opening], gable: float = 0.0, seam: float = 0.0, reveal: float = REVEAL
+) -> Solid:
+    """The wall with its reveals, as deep as `reveal`, a gable of this height on top; no triangle crosses the level line at
+    `seam`.
+    """
     spans = [(o.x - o.width / 2, o.x + o.width / 2, o.z, o.z + o.height) for o in openings]
     x = np.unique(np.round([-width / 2, width / 2, *(v for s in spans for v in s[:2])], 6))
     z = np.unique(np.round([0.0, height, seam, *(v for s in spans for v in s[2:])], 6))
@@ -56,7 +60,7 @@ def facade(width: float, height: float, openings: list[Opening], gable: float = 
     i, k = np.nonzero(wall)
     corner = [(x[i + p], z[k + q]) for p, q in ((0, 0), (1, 0), (1, 1), (0, 1))]
     quads = np.stack([np.stack([u, 0 * u, v], axis=1) for u, v in corner], axis=1)
-    reveals = [_reveal(*s) for s in spans]
+    reveals = [_reveal(*s, reveal) for s in spans] if reveal else []
     solid = _quads(np.concatenate([quads, *reveals]))
     if gable <= 0:
         return solid
@@ -71,11 +75,11 @@ def _quads(quads: Float) -> Solid:
     return Solid(quads.reshape(-1, 3), np.concatenate([np.add(start, (0, 1, 2)), np.add(start, (0, 2, 3))]))
 
 
-def _reveal(a: float, b: float, low: float, high: float) -> Float:
+def _reveal(a: float, b: float, low: float, high: float, deep: float) -> Float:
     """The four sides of an opening, facing into it."""
     ring = [(a, low), (b, low), (b, high), (a, high)]
     sides = [(ring[k], ring[(k + 1) % 4]) for k in range(4)]
-    return np.array([[(p[0], 0, p[1]), (q[0], 0, q[1]), (q[0], REVEAL, q[1]), (p[0], REVEAL, p[1])] for p, q in sides])
+    return np.array([[(p[0], 0, p[1]), (q[0], 0, q[1]), (q[0], deep, q[1]), (p[0], deep, p[1])] for p, q in sides])
 
 
 def filled(opening: Opening, j: Joinery, rng: np.random.Generator) -> list[Piece]:
