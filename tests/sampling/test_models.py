@@ -5,6 +5,7 @@ import pytest
 from viewsphere.errors import RecipeError
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.models import categories, count_models, model_specs
+from viewsphere.zoo import things
 
 
 @pytest.fixture
@@ -111,6 +112,22 @@ def test_the_zoo_is_drawn_by_key(build):
         "hair_drier_000",
         "hair_drier_001",
     ]
+
+
+def test_any_means_every_family_whose_members_are_things(build):
+    known = things()
+    assert {"car", "chair"} < {*known} and not {"house", "street", "landscape", "interior"} & {*known}
+    few, many = (model_specs(build([{"source": "zoo:any", "count": n}])) for n in (5, 3 * len(known) + 2))
+    assert many[:5] == few and [s.key for s in few] == [f"any_{i:03d}" for i in range(5)]
+    for turn in range(3):
+        each = many[turn * len(known) : (turn + 1) * len(known)]
+        assert sorted(s.source for s in each) == [f"zoo:{name}" for name in known]
+    assert [s.source for s in many[: len(known)]] != [s.source for s in many[len(known) : 2 * len(known)]]
+    assert all(s.category == s.source.removeprefix("zoo:").replace("_", " ") for s in many)
+    assert [c.name for c in categories(build([{"source": "zoo:any"}]))] == [name.replace("_", " ") for name in known]
+    named = build([{"source": "zoo:any", "count": 4, "category": "thing", "name": "clutter"}])
+    assert [c.name for c in categories(named)] == ["thing"] and keys(named)[0] == "clutter_000"
+    assert count_models(build([{"source": ["zoo:any", "zoo:car"], "count": 4}])) == 8
 
 
 def test_categories_count_from_one_in_order_of_appearance(build):

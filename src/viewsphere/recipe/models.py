@@ -99,8 +99,8 @@ class ModelEntry(Brief):
         OrShort({"type": "string"}),
     ] = Field(
         min_length=1,
-        description="a file, a pattern such as cars/*.obj, a folder, or zoo:<family>; or a list of them. "
-        "Paths are relative to the recipe",
+        description="a file, a pattern such as cars/*.obj, a folder, or zoo:<family>; or a list of them. zoo:any draws among "
+        "all families of things. Paths are relative to the recipe",
     )
     category: str = Field(
         default="",

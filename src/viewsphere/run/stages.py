@@ -266,8 +266,8 @@ def _check_rooms(things: Sequence[Thing], model: Float, cameras: Float) -> None:
     for i in np.flatnonzero(~np.any([inside_box(room, cameras) for room in rooms], axis=0)):
         raise RecipeError(
             f"viewpoints: expected the camera in a room of the place, as the model is; found it beyond the walls at "
-            f"({', '.join(f'{v:.3g}' for v in cameras[i])}): go nearer; with min_visibility, frames that are drawn at random are "
-            "drawn again"
+            f"({', '.join(f'{v:.3g}' for v in cameras[i])}): go nearer; with min_visibility, frames that are drawn at random "
+            "are drawn again"
         )
 
 

@@ -19,8 +19,6 @@ from viewsphere.zoo.townscape.surfaces import finished
 
 HOME = "place"
 
-HOME = "place"
-
 SLAB = 0.25
 """Thickness of the floor and of the ceiling, metres."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,15 @@ from viewsphere.zoo.shapes.resting import Surface
 
 DRAWS = 400
 """Members of a family that are drawn until one is as it is wanted."""
+
+SEATED = 0.7
+"""Metres around a table that who sits there needs, towards other furniture."""
+
+SPOTS = 30
+"""Spots that are tried for a small thing on a surface."""
+
+FACING = ("book", "laptop", "monitor", "television")
+"""Small things that people turn to themselves."""
 
 STEP = 0.05
 """Metres between spots that are tried along a wall."""
@@ -65,12 +75,14 @@ class Stand:
 
 
 def extent(parameters: Any) -> tuple[float, float, float]:
-    """Width, depth and height of a family's member, metres, as far as its parameters say; else those of a chair."""
-    return (
-        float(getattr(parameters, "width", 0.6)),
-        float(getattr(parameters, "depth", 0.62)),
-        float(getattr(parameters, "height", 0.95)),
-    )
+    """Width, depth and height of a family's member, metres, by its parameters: its `extent`, or the measures that it has."""
+    own: tuple[float, float, float] | None = getattr(parameters, "extent", None)
+    return own or (parameters.width, parameters.depth, parameters.height)
+
+
+def across(turn_deg: float) -> Side:
+    """The side of the room that one looks at whose back is to the wall, turned so."""
+    return SIDES[(round(-turn_deg / 90) + 2) % 4]
 
 
 def overlap(a: Rectangle, b: Rectangle, gap: float = 0.0) -> bool:
@@ -146,6 +158,24 @@ class Furnishing:
             askew = float(self.rng.normal(0, 4))
             self._try(Stand(family, seed, p, x, y, table.turn_deg + turn + askew), around=table)
 
+    def in_the_middle(self, family: str, fits: Fits = lambda p: True) -> Stand | None:
+        """As near to the room's middle as there is room for it and for who sits around it."""
+        found = self.design(family, fits)
+        if found is None:
+            return None
+        seed, p = found
+        (x0, y0), (x1, y1) = self.room.low, self.room.high
+        turn = 90.0 if (x1 - x0 < y1 - y0) == (extent(p)[0] > extent(p)[1]) else 0.0
+        x, y = (x0 + x1) / 2, (y0 + y1) / 2
+        offsets = sorted(product(np.arange(-1.5, 1.6, 0.15), repeat=2), key=lambda d: math.hypot(*d))
+        for dx, dy in offsets:
+            made = Stand(family, seed, p, x + float(dx), y + float(dy), turn)
+            a, b, c, d = made.rectangle
+            others = [s for s in self.stands if s.z == 0 and s.size[2] > 0.06]
+            if self._is_free(made) and not any(overlap((a, b, c, d), s.rectangle, SEATED) for s in others):
+                return self._add(made)
+        return None
+
     def on(self, other: Stand, name: str, family: str, fits: Fits = lambda p: True, turn: float = 0.0) -> Stand | None:
         """On the middle of a surface of what stands there, whose name begins so."""
         surface = next((s for s in other.surfaces() if s.name.startswith(name)), None)
@@ -158,6 +188,38 @@ class Furnishing:
         made = Stand(family, seed, p, x, y, (other.turn_deg + turn) % 360, other.z + surface.height)
         self.stands.append(made)
         return made
+
+    def scattered(self, other: Stand, name: str, families: Sequence[str], count: int, gap: float = 0.02) -> None:
+        """So many small things of these families on a surface of what stands there, turned at random, clear of one another and
+        of what is on it; fewer where there is no room.
+        """
+        for surface in other.surfaces():
+            if surface.name.startswith(name):
+                for _ in range(count):
+                    self._scatter(other, surface, families[int(self.rng.integers(len(families)))], gap)
+
+    def _scatter(self, other: Stand, surface: Surface, family: str, gap: float) -> None:
+        found = self.design(family, lambda p: extent(p)[2] < surface.clearance)
+        if found is None:
+            return
+        seed, p = found
+        reach = math.hypot(*extent(p)[:2]) / 2 if family not in FACING else max(extent(p)[:2]) / 2
+        x0, y0, x1, y1 = surface.rectangle
+        if x1 - x0 < 2 * reach or y1 - y0 < min(2 * reach, extent(p)[1]):
+            return
+        for _ in range(SPOTS):
+            u, v = (
+                self.rng.uniform(x0 + reach, x1 - reach),
+                self.rng.uniform(y0 + min(reach, (y1 - y0) / 2), y1 - min(reach, (y1 - y0) / 2)),
+            )
+            turn = self.rng.normal(0, 12) if family in FACING else self.rng.uniform(0, 360)
+            made = Stand(
+                family, seed, p, *other.at(float(u), -float(v)), (other.turn_deg + float(turn)) % 360, other.z + surface.height
+            )
+            near = [s for s in self.stands if s.z > 0 and abs(s.z - made.z) < 0.3]
+            if not any(overlap(made.rectangle, s.rectangle, gap) for s in near):
+                self.stands.append(made)
+                return
 
     def under(self, middle: tuple[float, float], turn: float, family: str, fits: Fits = lambda p: True) -> Stand | None:
         """On the floor under other furniture, as a rug lies; None where it would not lie flat in the room."""
@@ -219,7 +281,7 @@ class Furnishing:
         return own[0] > x0 + 0.005 and own[1] > y0 + 0.005 and own[2] < x1 - 0.005 and own[3] < y1 - 0.005
 
     def _is_free(self, made: Stand, around: Stand | None = None) -> bool:
-        """Whether a member has room: in the room, off the doors, windows and all that stands there but what it stands around."""
+        """Whether there is room for a member, off doors, windows and what stands there, but for what it stands `around`."""
         own = made.rectangle
         if not self._inside(own) or any(overlap(own, other) for other in self._doors() + self._windows(made.size[2])):
             return False

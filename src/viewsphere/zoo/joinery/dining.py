@@ -84,6 +84,11 @@ class Dining:
         """The direction of the posts at this height."""
         return 0.0, float(self.post(z + 0.01) - self.post(z - 0.01)) / 0.02, 1.0
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        return self.width + 0.07, self.depth + 0.19, self.height + 0.05
+
 
 def pieces(p: Dining) -> list[Piece]:
     """All pieces; feet on z = 0, left and right alike."""

@@ -57,6 +57,11 @@ class Office:
         hollow = 0.55 if self.back == "mesh" else 0.3
         return leaning(self.seat_depth / 2 - 0.005, self.seat_height + 0.03, self.lean, hollow, 0.022, self.span + 0.03)
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        return self.seat_width + 0.2, self.seat_depth + 0.23, self.height + 0.15
+
 
 def pieces(p: Office) -> list[Piece]:
     """All pieces; castors on z = 0."""

@@ -40,6 +40,11 @@ class Windsor:
     stretchers: bool = True
     wood: Color = WOODS["cherry"]
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        return self.width + 0.03, self.depth + 0.15, self.height + 0.01
+
 
 @dataclass(frozen=True)
 class Shell:
@@ -55,6 +60,11 @@ class Shell:
     color: Color = PLASTICS[0]
     wood: Color = WOODS["beech"]
     cover: Cover | None = None
+
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        return self.width + 0.03, self.depth + 0.11, self.height + 0.01
 
 
 def windsor_pieces(p: Windsor) -> list[Piece]:
