@@ -11,7 +11,7 @@ import numpy as np
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.part_points import sided
 from viewsphere.zoo.furnishing.casework import Leg, Pull, block, four, front, handles, pull
-from viewsphere.zoo.furnishing.coats import BLACK_STEEL, GLASS, WHITE_STEEL, Timber, Wood, drawn_wood, grain
+from viewsphere.zoo.furnishing.coats import BLACK_STEEL, GLASS, WHITE_STEEL, Timber, Wood, drawn_wood, furnished, grain
 from viewsphere.zoo.furnishing.underframes import pedestal, sleds, trestles, tripod
 from viewsphere.zoo.joinery.coats import BRASS, CHROME
 from viewsphere.zoo.joinery.slabs import level, polygon, slab
@@ -19,7 +19,6 @@ from viewsphere.zoo.shapes.assembly import Piece
 from viewsphere.zoo.shapes.resting import Surface, shrunk
 from viewsphere.zoo.shapes.rods import circle
 from viewsphere.zoo.shapes.solids import Float, Solid, join, superellipse
-from viewsphere.zoo.townscape.surfaces import finished
 
 KEYPOINTS = {
     **sided("top_front", "top", (1, -1, 1)),
@@ -108,7 +107,7 @@ def table(parameters: Table | None = None) -> Mesh:
         thick = 0.018
         outline = circle(x, 40) * (1, y / x) if p.top != "rectangle" else polygon([(-x, -y), (x, -y), (x, y), (-x, y)], 0.01, 9)
         pieces.append(Piece("shelf", wood.along, slab(outline, level(p.shelf - thick), level(p.shelf), 0.004, 1, 1)))
-    return finished([*pieces, *_drawers(p, wood), *_riser(p, wood)], images)
+    return furnished([*pieces, *_drawers(p, wood), *_riser(p, wood)], images)
 
 
 def _outline(p: Table) -> Float:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.zoo.joinery.coats import WOODS, drawn_color
+from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, linear
 from viewsphere.zoo.townscape.textures import Float, noise, painted
 
@@ -46,6 +48,27 @@ class Timber:
 
     along: Material
     upright: Material
+
+
+def furnished(pieces: Sequence[Piece], images: Sequence[Image], crease_deg: float = 40.0) -> Mesh:
+    """The pieces as one Mesh whose uv are metres, seen from the side that a triangle faces most: from above (x, -y), from the
+    front (x, -z), from the side (y, -z).
+    """
+    mesh = assemble(pieces, crease_deg)
+    a, b, c = mesh.vertices.astype(np.float64)[mesh.triangles].transpose(1, 0, 2)
+    facing = np.abs(np.cross(b - a, c - a)).argmax(axis=1)
+    key, index = np.unique(mesh.triangles * 3 + facing[:, None], return_inverse=True)
+    vertex, axis = np.divmod(key, 3)
+    points = mesh.vertices[vertex]
+    uv = np.where((axis == 0)[:, None], points[:, [1, 2]], np.where((axis == 1)[:, None], points[:, [0, 2]], points[:, [0, 1]]))
+    return replace(
+        mesh,
+        vertices=points,
+        normals=mesh.normals[vertex],
+        triangles=index.reshape(-1, 3).astype(np.int32),
+        uv0=uv * np.array((1, -1), np.float32),
+        images=tuple(images),
+    )
 
 
 def grain(rng: np.random.Generator, wood: Wood, planks: int = 0, size: int = 512) -> Image:
