@@ -22,6 +22,8 @@ NAMED = {
     "lamp_post": {"lamp", "foot"},
     "post_box": {"slot", "door", "top"},
     "road_sign": {"plate", "foot"},
+    "sofa": {"seat_front_left", "back_top_right", "armrest_front_left", "foot_rear_right"},
+    "table": {"top_front_left", "top_rear_right"},
     "wheelie_bin": {"wheel_left", "handle_right"},
 }
 """Points that every member of a family has."""

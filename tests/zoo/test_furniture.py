@@ -1,0 +1,119 @@
+"""Furniture: sizes, parts, sound triangles, what stands on it, determinism, variety."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewsphere import plugins, zoo
+from viewsphere.zoo.sofa import Sofa, sofa
+from viewsphere.zoo.sofa import surfaces as surfaces_of_sofa
+from viewsphere.zoo.table import Table, table
+from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
+
+SIZES = {
+    "sofa": ((1.3, 3.1), (0.7, 0.98), (0.82, 1.72)),
+    "table": ((0.4, 2.2), (0.37, 1.07), (0.33, 1.3)),
+}
+"""Width, height and length that draws may have, metres."""
+
+PARTS = {
+    "sofa": {"base", "seat_cushion", "back", "armrest", "leg"},
+    "table": {"top"},
+}
+"""Parts of every member."""
+
+SOFT = ("bed", "sofa")
+STANDS = tuple(name for name in SIZES if hasattr(plugins.family(name), "surfaces"))
+SEEDS = range(6)
+
+
+def parameters(family: str, seed: int):
+    return plugins.family(family).draw(np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("family", SIZES)
+def test_draws_are_sound_of_real_size_and_differ(family: str) -> None:
+    meshes = [drawn(family, seed) for seed in SEEDS]
+    for mesh in meshes:
+        assert_sound(mesh, 10_000, least=200)
+        np.testing.assert_allclose(mesh.bounds.sum(axis=0)[:2] / 2, 0, atol=0.36)
+        assert float(mesh.bounds[0, 2]) == pytest.approx(0, abs=2e-3)
+        assert set(mesh.parts) >= PARTS[family]
+        for value, (low, high) in zip(zoo.real_size(mesh), SIZES[family], strict=True):
+            assert low - 1e-3 <= value <= high + 1e-3
+        assert all(m.base_color_texture is None or m.base_color_texture.image < len(mesh.images) for m in mesh.materials)
+        assert not mesh.images or (mesh.uv0 is not None and np.isfinite(mesh.uv0).all())
+    shapes = {tuple(np.round(zoo.real_size(m), 2)) for m in meshes}
+    looks = {tuple(round(i.pixels.mean() / 4) for i in m.images) + m.materials for m in meshes}
+    assert len(shapes) == len(looks) == len(meshes)
+
+
+@pytest.mark.parametrize("family", SIZES)
+def test_one_seed_gives_one_mesh(family: str) -> None:
+    a, b = drawn(family, 1), zoo.build(family, np.random.default_rng(1))
+    for name in ("vertices", "triangles", "normals", "uv0", "colors", "triangle_part", "triangle_material"):
+        x, y = getattr(a, name), getattr(b, name)
+        assert (x is None and y is None) or x.tobytes() == y.tobytes()
+    assert a.materials == b.materials
+    assert [i.pixels.tobytes() for i in a.images] == [i.pixels.tobytes() for i in b.images]
+
+
+@pytest.mark.parametrize("family", SIZES)
+def test_furniture_shows_its_outside(family: str) -> None:
+    for seed in range(3):
+        assert outward_share(drawn(family, seed)) > 0.995
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("family", STANDS)
+def test_what_falls_from_above_lands_on_a_surface(family: str, seed: int) -> None:
+    """Rays straight down, from below whatever is above a surface, meet the mesh at its height, all over its rectangle."""
+    pytest.importorskip("embreex")
+    from trimesh import Trimesh
+    from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+    mesh = drawn(family, seed)
+    caster = RayMeshIntersector(Trimesh(mesh.vertices, mesh.triangles, process=False))
+    found = plugins.family(family).surfaces(parameters(family, seed))
+    assert found and len({s.name for s in found}) == len(found)
+    for surface in found:
+        x0, y0, x1, y1 = surface.rectangle
+        assert x1 - x0 > 0.05 and y1 - y0 > 0.05 and surface.clearance > 0.05
+        x, y = np.meshgrid(np.linspace(x0, x1, 9), np.linspace(y0, y1, 9))
+        lift = min(surface.clearance, 3.0) - 0.004
+        origins = np.stack([x.ravel(), y.ravel(), np.full(x.size, surface.height + lift)], axis=1)
+        first = caster.intersects_first(origins, np.tile((0.0, 0.0, -1.0), (x.size, 1)))
+        assert (first >= 0).all(), surface
+        corners = mesh.vertices[mesh.triangles[first]].astype(np.float64)
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        z = corners[:, 0, 2] - ((origins - corners[:, 0])[:, :2] * normal[:, :2]).sum(axis=1) / normal[:, 2]
+        np.testing.assert_allclose(z, surface.height, atol=0.03 if family in SOFT else 1e-3, err_msg=str(surface))
+
+
+def test_a_table_has_what_was_asked_for() -> None:
+    plain = table(Table(width=1.4, depth=0.8, height=0.74))
+    np.testing.assert_allclose(zoo.real_size(plain), (1.4, 0.74, 0.8), atol=1e-5)
+    assert {"leg", "apron"} <= set(plain.parts) and "drawer" not in plain.parts
+    desk = Table(style="desk", drawers=2, riser=0.2, depth=0.7)
+    assert {"drawer", "handle", "case", "riser", "panel"} <= set(table(desk).parts)
+    assert part_vertices(table(desk), "drawer")[:, 1].max() < 0
+    round_ = table(replace(Table(), top="round", frame="pedestal", width=1.1, depth=1.1))
+    assert {"column", "foot"} <= set(round_.parts)
+
+
+def test_a_sofa_has_what_was_asked_for() -> None:
+    plain = sofa(Sofa(scattered=0))
+    assert not {"pillow", "throw", "chaise", "button"} & set(plain.parts)
+    assert part_vertices(plain, "back")[:, 1].min() > 0.05 > part_vertices(plain, "seat_cushion")[:, 1].mean()
+    assert np.ptp(part_vertices(plain, "seat_cushion")[:, 0]) == pytest.approx(3 * 0.64, abs=0.02)
+    rich = Sofa(scattered=3, throw=True, chaise="left", back="tufted")
+    assert {"pillow", "throw", "chaise", "button"} <= set(sofa(rich).parts)
+    assert [s.name for s in surfaces_of_sofa(rich)] == ["seat_1", "seat_2", "seat_3", "chaise"]
+    assert (
+        part_vertices(sofa(rich), "chaise")[:, 0].min()
+        > 0
+        > part_vertices(sofa(replace(rich, chaise="right")), "chaise")[:, 0].max()
+    )
