@@ -83,6 +83,11 @@ class Sofa:
         return self.seats * self.seat_width / 2
 
     @property
+    def width(self) -> float:
+        """Between the outsides of its arms."""
+        return 2 * (self.inner + self.arm) + 0.04
+
+    @property
     def back_front(self) -> float:
         """y of the face that the back cushions lean on, at the seat."""
         return self.depth / 2 - 0.17

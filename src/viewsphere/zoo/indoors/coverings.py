@@ -116,8 +116,8 @@ def _grained(
 
 
 def _tiles(rng: np.random.Generator, color: Color) -> Image:
-    joint = tuple(0.75 * c for c in color)
-    return textures.bricks(rng, "floor_tiles", color, joint, (4, 4), (0.012, 0.012), 0.02, 0.0)
+    red, green, blue = (0.75 * c for c in color)
+    return textures.bricks(rng, "floor_tiles", color, (red, green, blue), (4, 4), (0.012, 0.012), 0.02, 0.0)
 
 
 def _carpet(rng: np.random.Generator, color: Color, size: int = 256) -> Image:

@@ -45,11 +45,9 @@ def single(rng: np.random.Generator, kind: Kind | None = None) -> tuple[Room, ..
     kind = kind or tuple(SIZES)[int(rng.integers(len(SIZES)))]
     x, y = (float(rng.uniform(*span)) for span in SIZES[kind])
     room = _covered(rng, Room(kind, (-x / 2, -y / 2), (x / 2, y / 2)))
-    light, *others = (SIDES[int(k)] for k in rng.permutation(4))
-    openings = [_window(rng, room, light)]
-    if rng.random() < 0.4:
-        openings.append(_window(rng, room, others[0]))
-    side = others[1]
+    sides: list[Side] = [SIDES[int(k)] for k in rng.permutation(4)]
+    openings = [_window(rng, room, side) for side in sides[: 2 if rng.random() < 0.4 else 1]]
+    side = sides[2]
     end = float(rng.choice((-1.0, 1.0))) * (room.length(side) / 2 - DOOR[0] / 2 - float(rng.uniform(0.12, 0.35)))
     openings.append(Opening(side, end, *DOOR, opens="entrance", hinge=1 if end > 0 else -1))
     return (replace(room, openings=tuple(openings)),)
@@ -57,7 +55,8 @@ def single(rng: np.random.Generator, kind: Kind | None = None) -> tuple[Room, ..
 
 def flat(rng: np.random.Generator) -> tuple[Room, ...]:
     """A hall along x; living room and kitchen behind it, bedroom, office and perhaps another bedroom before it."""
-    front: list[Kind] = ["bedroom", "office", "bedroom"][: int(rng.integers(2, 4))]
+    front: list[Kind] = ["bedroom", "office", "bedroom"]
+    front = front[: int(rng.integers(2, 4))]
     rear: list[Kind] = ["living_room", "kitchen"]
     widths = [float(rng.uniform(3.2, 4.2)) for _ in front]
     total = sum(widths) + INNER * (len(front) - 1)
@@ -104,13 +103,14 @@ def _window(rng: np.random.Generator, room: Room, side: Side) -> Opening:
 
 def _covered(rng: np.random.Generator, room: Room) -> Room:
     """The room with a floor and walls as its kind has them."""
-    kinds: Sequence[FloorKind] = {
+    found: dict[Kind, Sequence[FloorKind]] = {
         "living_room": ("planks", "parquet", "carpet"),
         "bedroom": ("carpet", "planks", "parquet"),
         "kitchen": ("tiles", "planks"),
         "office": ("carpet", "planks", "tiles"),
         "hall": ("planks", "tiles"),
-    }[room.kind]
+    }
+    kinds = found[room.kind]
     kind = kinds[int(rng.integers(len(kinds)))]
     colors = {"planks": WOODS, "parquet": WOODS, "carpet": CARPETS, "tiles": TILES}[kind]
     paint = PAINTS[int(rng.integers(len(PAINTS)))]

@@ -100,6 +100,8 @@ class Furnishing:
 
     def design(self, family: str, fits: Fits = lambda p: True) -> tuple[int, Any] | None:
         """A seed of the family and the parameters that it draws, which are as they are wanted; None where none is found."""
+        if family not in plugins.families():
+            return None
         draw = plugins.family(family).draw
         for _ in range(DRAWS):
             seed = int(self.rng.integers(1 << 31))
@@ -247,14 +249,8 @@ class Furnishing:
 
     def _sides(self, sides: Iterable[Side]) -> list[Side]:
         """The sides in a random order, those where nothing opens first."""
-        chosen = [*sides]
-        chance = self.rng.random(len(chosen))
-        return [
-            s
-            for _, s in sorted(
-                zip(((len(self.room.of(s)), c) for s, c in zip(chosen, chance, strict=True)), chosen, strict=True)
-            )
-        ]
+        chance: dict[Side, float] = {side: float(self.rng.random()) for side in sides}
+        return sorted(chance, key=lambda side: (len(self.room.of(side)), chance[side]))
 
     def _along(self, family: str, seed: int, p: Any, side: Side, gap: float) -> Iterator[Stand]:
         """All spots along a wall."""
@@ -289,13 +285,13 @@ class Furnishing:
         return not any(overlap(own, other.rectangle, 0.02) for other in others)
 
     def _doors(self) -> list[Rectangle]:
-        return [self._before(side, o.span, SWING) for side in SIDES for o in self.room.of(side) if o.opens != "window"]
+        return [self._before(o.side, o.span, SWING) for o in self.room.openings if o.opens != "window"]
 
     def _windows(self, height: float) -> list[Rectangle]:
         """What has to stay free before windows, of things so high."""
-        found = [(side, o) for side in SIDES for o in self.room.of(side) if o.opens == "window"]
-        low = [self._before(side, (o.span[0] - 0.35, o.span[1] + 0.35), DRAPE - 0.01) for side, o in found]
-        return low + [self._before(side, o.span, SIGHT) for side, o in found if height > o.foot + 0.15]
+        found = [o for o in self.room.openings if o.opens == "window"]
+        low = [self._before(o.side, (o.span[0] - 0.35, o.span[1] + 0.35), DRAPE - 0.01) for o in found]
+        return low + [self._before(o.side, o.span, SIGHT) for o in found if height > o.foot + 0.15]
 
     def _before(self, side: Side, span: tuple[float, float], deep: float) -> Rectangle:
         """The floor before a part of a wall."""

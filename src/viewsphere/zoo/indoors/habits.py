@@ -52,7 +52,8 @@ def _bedroom(f: Furnishing) -> None:
 
 def _living_room(f: Furnishing) -> None:
     """A sofa that looks at the television over a low table on a rug; an armchair, a lamp, shelves and plants."""
-    sofa = f.against("sofa", _style(width=0.6 * max(f.room.size)), middle=True)
+    widest = 0.6 * max(f.room.size)
+    sofa = f.against("sofa", lambda p: p.chaise == "none" and p.width < widest, middle=True)
     if sofa is not None:
         f.under(sofa.at(0.0, sofa.size[1] / 2 + 0.7), sofa.turn_deg, "rug", _style(width=3.2, depth=2.4))
         low = f.before(sofa, "table", _style("coffee"), gap=0.38, turn=0.0)

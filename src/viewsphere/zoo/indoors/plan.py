@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from viewsphere.zoo.indoors.coverings import PAINT, PLANKS, Floor, Wall
 
 Kind = Literal["living_room", "bedroom", "kitchen", "office", "hall"]
 Side = Literal["rear", "right", "front", "left"]
-SIDES: tuple[Side, ...] = ("rear", "right", "front", "left")
+SIDES: tuple[Side, ...] = get_args(Side)
 """Walls in the order of the turns -0, -90, -180, -270 degrees that bring the rear one (+Y) there; right is +X."""
 
 INNER, OUTER = 0.12, 0.32

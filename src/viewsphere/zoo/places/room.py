@@ -1,18 +1,18 @@
-"""A furnished room."""
+"""A furnished room: a living room, a bedroom, a kitchen or an office."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from viewsphere import plugins
-from viewsphere.zoo.places import Place, PlacePiece, standing
+from viewsphere.zoo.indoors.places import around_free_floor
+from viewsphere.zoo.places import Place
+
+
+def room(seed: int = 0) -> Place:
+    """The room of this seed; its floor is z = 0, the origin in the middle of what is free of the floor."""
+    return around_free_floor(np.random.default_rng(seed), lambda interior: len(interior.rooms) == 1)
 
 
 def room_random(rng: np.random.Generator) -> Place:
-    draw = plugins.family("interior").draw
-    while True:
-        seed = int(rng.integers(1 << 31))
-        p = draw(np.random.default_rng(seed))
-        if len(p.rooms) == 1:
-            break
-    return Place((PlacePiece("interior_1", "interior", seed, "interior", standing(0, 0)),), free=(-1, -1, 1, 1))
+    """A room with all parameters drawn."""
+    return room(int(rng.integers(1 << 31)))
