@@ -8,18 +8,21 @@ import numpy as np
 import pytest
 
 from viewsphere import plugins, zoo
+from viewsphere.zoo.bed import Bed, bed
 from viewsphere.zoo.sofa import Sofa, sofa
 from viewsphere.zoo.sofa import surfaces as surfaces_of_sofa
 from viewsphere.zoo.table import Table, table
 from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
 
 SIZES = {
+    "bed": ((0.95, 2.7), (0.85, 2.1), (1.9, 2.6)),
     "sofa": ((1.3, 3.1), (0.7, 0.98), (0.82, 1.72)),
     "table": ((0.4, 2.2), (0.37, 1.07), (0.33, 1.3)),
 }
 """Width, height and length that draws may have, metres."""
 
 PARTS = {
+    "bed": {"leg", "rail", "headboard", "mattress", "duvet", "pillow"},
     "sofa": {"base", "seat_cushion", "back", "armrest", "leg"},
     "table": {"top"},
 }
@@ -117,3 +120,15 @@ def test_a_sofa_has_what_was_asked_for() -> None:
         > 0
         > part_vertices(sofa(replace(rich, chaise="right")), "chaise")[:, 0].max()
     )
+
+
+@pytest.mark.parametrize("head", ["panel", "slats", "arched", "upholstered", "channels", "bars"])
+def test_a_bed_has_what_was_asked_for(head: str) -> None:
+    mesh = bed(Bed(head=head, head_height=1.1, width=1.4, length=2.0, throw=True, cushions=2, foot="matching"))
+    assert {"throw", "cushion", "footboard", "duvet_fold"} <= set(mesh.parts)
+    np.testing.assert_allclose(np.ptp(part_vertices(mesh, "mattress"), axis=0)[:2], (1.4, 1.98), atol=1e-4)
+    headboard, footboard = part_vertices(mesh, "headboard"), part_vertices(mesh, "footboard")
+    assert headboard[:, 2].max() == pytest.approx(1.1, abs=0.03) and headboard[:, 1].min() > 0.95
+    assert footboard[:, 2].max() < headboard[:, 2].max() and footboard[:, 1].max() < -0.95
+    bare = bed(Bed(head=head, foot="none", folded=0, pillows=1))
+    assert not {"throw", "cushion", "footboard", "duvet_fold", "post"} & set(bare.parts)

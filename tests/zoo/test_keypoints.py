@@ -12,6 +12,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.zoo import build_zoo_model
 
 NAMED = {
+    "bed": {"mattress_foot_left", "mattress_head_right", "headboard_top_left", "leg_foot_right"},
     "bench": {"seat_front_left", "seat_rear_right"},
     "bicycle": {"wheel_front", "wheel_rear", "saddle", "grip_left", "pedal_right"},
     "boat": {"bow", "stern_left"},

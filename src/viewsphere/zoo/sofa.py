@@ -73,7 +73,7 @@ class Sofa:
     throw: bool = False
     leather: bool = False
     cover: Cloth = field(default_factory=Cloth)
-    accents: tuple[Cloth, Cloth] = (Cloth((0.75, 0.55, 0.2)), Cloth((0.2, 0.3, 0.42), pattern="stripes"))
+    accents: tuple[Cloth, Cloth] = field(default_factory=lambda: (Cloth((0.75, 0.55, 0.2)), Cloth(pattern="stripes")))
     wood: Wood = field(default_factory=Wood)
     seed: int = 0
 
@@ -177,10 +177,10 @@ def _rolled(radius: float, low: float, top: float, length: float) -> Solid:
     roll = np.stack([-0.35 * radius + radius * 0.8 * np.cos(a), top - 0.8 * radius + 0.8 * radius * np.sin(a)], axis=1)
     xz = np.vstack([[(wall, low)], roll[:0:-1][::-1], [(-wall, low)]])[::-1]
     ends = np.array([-length / 2, length / 2])
-    scale = np.array([0.9, 1.0, 1.0, 0.9])
+    scale = np.array([0.9, 1.0, 1.0, 0.9])[:, None, None]
     y = np.array([ends[0], ends[0] + 0.025, ends[1] - 0.025, ends[1]])
     heart = np.array([0.0, (low + top) / 2])
-    plan = heart + (xz - heart) * scale[:, None, None]
+    plan = heart + (xz - heart) * scale
     return loft(np.dstack([plan[..., 0], np.broadcast_to(y[:, None], plan.shape[:2]), plan[..., 1]]))
 
 
