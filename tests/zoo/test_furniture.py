@@ -9,6 +9,8 @@ import pytest
 
 from viewsphere import plugins, zoo
 from viewsphere.zoo.bed import Bed, bed
+from viewsphere.zoo.shelf import Shelf, shelf
+from viewsphere.zoo.shelf import surfaces as surfaces_of_shelf
 from viewsphere.zoo.sofa import Sofa, sofa
 from viewsphere.zoo.sofa import surfaces as surfaces_of_sofa
 from viewsphere.zoo.table import Table, table
@@ -16,6 +18,7 @@ from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
 
 SIZES = {
     "bed": ((0.95, 2.7), (0.85, 2.1), (1.9, 2.6)),
+    "shelf": ((0.54, 2.2), (0.7, 2.15), (0.27, 0.47)),
     "sofa": ((1.3, 3.1), (0.7, 0.98), (0.82, 1.72)),
     "table": ((0.4, 2.2), (0.37, 1.07), (0.33, 1.3)),
 }
@@ -23,6 +26,7 @@ SIZES = {
 
 PARTS = {
     "bed": {"leg", "rail", "headboard", "mattress", "duvet", "pillow"},
+    "shelf": {"upright", "board"},
     "sofa": {"base", "seat_cushion", "back", "armrest", "leg"},
     "table": {"top"},
 }
@@ -132,3 +136,16 @@ def test_a_bed_has_what_was_asked_for(head: str) -> None:
     assert footboard[:, 2].max() < headboard[:, 2].max() and footboard[:, 1].max() < -0.95
     bare = bed(Bed(head=head, foot="none", folded=0, pillows=1))
     assert not {"throw", "cushion", "footboard", "duvet_fold", "post"} & set(bare.parts)
+
+
+@pytest.mark.parametrize("style", ["bookcase", "cubes", "ladder", "rack"])
+def test_a_shelf_has_its_boards_and_tells_which_are_free(style: str) -> None:
+    columns = 1 if style in ("ladder", "rack") else 2
+    empty = Shelf(style=style, filled=0.0, depth=0.44, boards=5, columns=columns)
+    assert not {"book", "box", "vase"} & set(shelf(empty).parts)
+    heights = sorted({round(s.height, 6) for s in surfaces_of_shelf(empty)})
+    np.testing.assert_allclose(heights, empty.tops, atol=1e-6)
+    full = replace(empty, filled=1.0)
+    assert {s.name for s in surfaces_of_shelf(full)} <= {"top"}
+    assert {"book", "box", "vase"} & set(shelf(full).parts)
+    assert zoo.real_size(shelf(empty))[:2] == pytest.approx((0.9, 1.9), abs=0.01)

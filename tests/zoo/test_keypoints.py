@@ -23,6 +23,7 @@ NAMED = {
     "lamp_post": {"lamp", "foot"},
     "post_box": {"slot", "door", "top"},
     "road_sign": {"plate", "foot"},
+    "shelf": {"top_front_left", "foot_rear_right"},
     "sofa": {"seat_front_left", "back_top_right", "armrest_front_left", "foot_rear_right"},
     "table": {"top_front_left", "top_rear_right"},
     "wheelie_bin": {"wheel_left", "handle_right"},
