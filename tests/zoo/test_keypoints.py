@@ -20,6 +20,7 @@ NAMED = {
     "chair": set(),
     "hair_drier": {"nozzle", "inlet", "handle", "switch"},
     "house": {"door", "roof", "eaves_front_left"},
+    "lamp": {"foot", "bulb", "shade", "shade_top"},
     "lamp_post": {"lamp", "foot"},
     "post_box": {"slot", "door", "top"},
     "road_sign": {"plate", "foot"},
