@@ -12,6 +12,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.zoo import build_zoo_model
 
 NAMED = {
+    "bed": {"mattress_foot_left", "mattress_head_right", "headboard_top_left", "leg_foot_right"},
     "bench": {"seat_front_left", "seat_rear_right"},
     "bicycle": {"wheel_front", "wheel_rear", "saddle", "grip_left", "pedal_right"},
     "boat": {"bow", "stern_left"},
@@ -19,9 +20,11 @@ NAMED = {
     "chair": set(),
     "hair_drier": {"nozzle", "inlet", "handle", "switch"},
     "house": {"door", "roof", "eaves_front_left"},
+    "lamp": {"foot", "bulb", "shade", "shade_top"},
     "lamp_post": {"lamp", "foot"},
     "post_box": {"slot", "door", "top"},
     "road_sign": {"plate", "foot"},
+    "shelf": {"top_front_left", "foot_rear_right"},
     "sofa": {"seat_front_left", "back_top_right", "armrest_front_left", "foot_rear_right"},
     "table": {"top_front_left", "top_rear_right"},
     "wheelie_bin": {"wheel_left", "handle_right"},

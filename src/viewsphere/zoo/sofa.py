@@ -16,7 +16,7 @@ from viewsphere.zoo.joinery.coats import BRASS, drawn_cover
 from viewsphere.zoo.joinery.slabs import box_outline
 from viewsphere.zoo.shapes.assembly import Piece
 from viewsphere.zoo.shapes.resting import Surface
-from viewsphere.zoo.shapes.solids import Solid, both_sides, join, lathe, loft, moved, turned
+from viewsphere.zoo.shapes.solids import Float, Solid, both_sides, join, lathe, loft, moved, turned
 
 KEYPOINTS = {
     **sided("seat_front", "seat_cushion", (1, -1, 1)),
@@ -73,7 +73,7 @@ class Sofa:
     throw: bool = False
     leather: bool = False
     cover: Cloth = field(default_factory=Cloth)
-    accents: tuple[Cloth, Cloth] = (Cloth((0.75, 0.55, 0.2)), Cloth((0.2, 0.3, 0.42), pattern="stripes"))
+    accents: tuple[Cloth, Cloth] = field(default_factory=lambda: (Cloth((0.75, 0.55, 0.2)), Cloth(pattern="stripes")))
     wood: Wood = field(default_factory=Wood)
     seed: int = 0
 
@@ -180,13 +180,14 @@ def _rolled(radius: float, low: float, top: float, length: float) -> Solid:
     wall = 0.6 * radius
     a = np.linspace(-0.25, 1.25, 14) * np.pi
     roll = np.stack([-0.35 * radius + radius * 0.8 * np.cos(a), top - 0.8 * radius + 0.8 * radius * np.sin(a)], axis=1)
-    xz = np.vstack([[(wall, low)], roll[:0:-1][::-1], [(-wall, low)]])[::-1]
+    xz: Float = np.vstack([[(wall, low)], roll[:0:-1][::-1], [(-wall, low)]])[::-1]
     ends = np.array([-length / 2, length / 2])
-    scale = np.array([0.9, 1.0, 1.0, 0.9])
+    scale = np.array([0.9, 1.0, 1.0, 0.9], np.float64)[:, None, None]
     y = np.array([ends[0], ends[0] + 0.025, ends[1] - 0.025, ends[1]])
-    heart = np.array([0.0, (low + top) / 2])
-    plan = heart + (xz - heart) * scale[:, None, None]
-    return loft(np.dstack([plan[..., 0], np.broadcast_to(y[:, None], plan.shape[:2]), plan[..., 1]]))
+    heart = np.array([0.0, (low + top) / 2], np.float64)
+    plan = heart + (xz - heart) * scale
+    depth = y[:, None] + np.zeros(len(xz))
+    return loft(np.stack([plan[..., 0], depth, plan[..., 1]], axis=-1))
 
 
 def _armrests(p: Sofa, coats: _Coats) -> list[Piece]:

@@ -11,10 +11,10 @@ from viewsphere.zoo.shapes.sheets import sheet
 from viewsphere.zoo.shapes.solids import Float, Solid, fan, flipped, grid, join, moved, rounded_box, turned
 
 
-def padded(low: ArrayLike, high: ArrayLike, rounding: float = 0.04) -> Solid:
+def padded(low: ArrayLike, high: ArrayLike, rounding: float = 0.04, steps: int = 3) -> Solid:
     """An upholstered box between two corners."""
     a, b = np.asarray(low, np.float64), np.asarray(high, np.float64)
-    return moved(rounded_box(b - a, rounding, 3), (a + b) / 2)
+    return moved(rounded_box(b - a, rounding, steps), (a + b) / 2)
 
 
 def cushion(size: tuple[float, float, float], crown: float, rounding: float = 0.04) -> Solid:
@@ -30,7 +30,7 @@ def upright(solid: Solid, at: ArrayLike, lean_deg: float) -> Solid:
     return moved(turned(solid, 0, np.pi / 2 - np.radians(lean_deg)), at)
 
 
-def pillow(width: float, height: float, thickness: float, pinch: float = 0.07, count: int = 13) -> Solid:
+def pillow(width: float, height: float, thickness: float, pinch: float = 0.07, count: int = 12) -> Solid:
     """A stuffed pillow about the origin: pointed corners, sides drawn in by `pinch` of its width, thickness along z."""
     s = np.sin(np.linspace(-np.pi / 2, np.pi / 2, count))
     u, v = np.meshgrid(s, s, indexing="ij")
