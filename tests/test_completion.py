@@ -50,7 +50,7 @@ def offered(*words, cwd=None):
     [
         (("rend",), ["render"]),
         (("inspect", "z"), ZOO),
-        (("inspect", "zoo", ":", "ca"), ["car"]),
+        (("inspect", "zoo", ":", "ca"), [name for name in plugins.families() if name.startswith("ca")]),
         (("inspect", "zoo", ":"), [name.removeprefix("zoo:") for name in ZOO]),
         (("inspect", "a.obj", "--up", "+"), ["+x", "+y", "+z"]),
         (("render", "a.yaml", "-f", ""), [*plugins.names("formats")]),
@@ -109,7 +109,7 @@ def test_bash_itself(tmp_path):
     script = """
         eval "$(_VIEWSPHERE_COMPLETE=source_bash viewsphere)"
         complete -p viewsphere
-        COMP_WORDS=(viewsphere inspect zoo : bo) COMP_CWORD=4
+        COMP_WORDS=(viewsphere inspect zoo : boa) COMP_CWORD=4
         _viewsphere_completion viewsphere
         printf '%s\\n' "${COMPREPLY[@]}"
     """

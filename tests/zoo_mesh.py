@@ -66,3 +66,28 @@ def outward_share(mesh: Mesh) -> float:
         seen += len(hit)
         outside += int((area[hit] @ d > 0).sum())
     return outside / seen
+
+
+def assert_family(family: str, sizes: tuple[tuple[float, float], ...], most: int, draws: int = 5, least: int = 200) -> None:
+    """Draws are sound, stand on the ground, have real sizes and pictures, differ; one seed gives one mesh."""
+    meshes = [drawn(family, seed) for seed in range(draws)]
+    for mesh in meshes:
+        assert_sound(mesh, most, least)
+        assert abs(float(mesh.vertices[:, 2].min())) < 1e-3
+        for value, (low, high) in zip(zoo.real_size(mesh), sizes, strict=True):
+            assert low - 1e-3 <= value <= high + 1e-3, zoo.real_size(mesh)
+        if mesh.images:
+            assert mesh.uv0 is not None and np.isfinite(mesh.uv0).all()
+        for image in mesh.images:
+            assert max(image.pixels.shape) <= 640 and (image.pixels[..., 3] == 255).all()
+            assert image.pixels[..., :3].std() > 2
+    looks = [_look(mesh) for mesh in meshes]
+    assert len(set(looks)) == draws
+    assert len({np.round(mesh.bounds, 3).tobytes() for mesh in meshes}) >= draws - 1
+    assert _look(zoo.build(family, np.random.default_rng(1))) == looks[1]
+
+
+def _look(mesh: Mesh) -> bytes:
+    arrays = (mesh.vertices, mesh.triangles, mesh.normals, mesh.uv0, mesh.colors, mesh.triangle_part, mesh.triangle_material)
+    pictures = b"".join(image.pixels.tobytes() for image in mesh.images)
+    return b"".join(b"" if a is None else a.tobytes() for a in arrays) + pictures + repr(mesh.materials).encode()

@@ -1,0 +1,1 @@
+"""What the things of a household are built and printed with: vessels, prints, screens, leaves."""

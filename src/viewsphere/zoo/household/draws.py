@@ -1,0 +1,30 @@
+"""What random members of families are drawn with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+
+T = TypeVar("T")
+
+
+def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
+    """One of the options, all alike."""
+    return options[int(rng.integers(len(options)))]
+
+
+def uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number between two, all alike."""
+    return float(rng.uniform(low, high))
+
+
+def chance(rng: np.random.Generator, share: float) -> bool:
+    """Whether something happens that does in this share of all draws."""
+    return bool(rng.random() < share)
+
+
+def seed(rng: np.random.Generator) -> int:
+    """Where a generator of a model's details starts."""
+    return int(rng.integers(1 << 31))
