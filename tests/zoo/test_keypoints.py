@@ -15,6 +15,7 @@ NAMED = {
     "bench": {"seat_front_left", "seat_rear_right"},
     "bicycle": {"wheel_front", "wheel_rear", "saddle", "grip_left", "pedal_right"},
     "boat": {"bow", "stern_left"},
+    "bus": {"wheel_front_left", "taillight_right", "roof_rear_left", "door", "windshield"},
     "car": {"wheel_front_left", "wheel_rear_right", "headlight_left", "taillight_right"},
     "chair": set(),
     "hair_drier": {"nozzle", "inlet", "handle", "switch"},
@@ -22,6 +23,7 @@ NAMED = {
     "lamp_post": {"lamp", "foot"},
     "post_box": {"slot", "door", "top"},
     "road_sign": {"plate", "foot"},
+    "truck": {"wheel_front_left", "mirror_right", "load_rear_left", "headlight_right"},
     "wheelie_bin": {"wheel_left", "handle_right"},
 }
 """Points that every member of a family has."""
