@@ -19,6 +19,7 @@ NAMED = {
     "bottle": {"top", "base"},
     "bowl": {"rim", "base"},
     "can": {"top", "base"},
+    "bus": {"wheel_front_left", "taillight_right", "roof_rear_left", "door", "windshield"},
     "car": {"wheel_front_left", "wheel_rear_right", "headlight_left", "taillight_right"},
     "chair": set(),
     "hair_drier": {"nozzle", "inlet", "handle", "switch"},
@@ -32,6 +33,7 @@ NAMED = {
     "shelf": {"top_front_left", "foot_rear_right"},
     "sofa": {"seat_front_left", "back_top_right", "armrest_front_left", "foot_rear_right"},
     "table": {"top_front_left", "top_rear_right"},
+    "truck": {"wheel_front_left", "mirror_right", "load_rear_left", "headlight_right"},
     "wheelie_bin": {"wheel_left", "handle_right"},
 }
 """Points that every member of a family has."""

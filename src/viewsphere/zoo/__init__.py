@@ -61,8 +61,9 @@ def rooms_of(spec: ModelSpec) -> tuple[NDArray[np.float64], ...]:
     """
     import numpy as np
 
-    family = spec.source.removeprefix("zoo:")
-    module = plugins.family(family) if family != spec.source else None
+    if not spec.source.startswith("zoo:"):
+        return ()
+    module = plugins.family(spec.source.removeprefix("zoo:"))
     if not hasattr(module, "rooms"):
         return ()
     return module.rooms(module.draw(np.random.default_rng(spec.seed)))

@@ -124,7 +124,7 @@ def _shell(p: Car, shape: Shape, c: Coats) -> list[Piece]:
     hull = shape.hull
     pickup = p.body == "pickup"
     names = ("bumper_front", "sill" if pickup else "bumper_rear")
-    pieces = structure.hull_pieces(shape, hull, c, names)
+    pieces = structure.hull_pieces(hull, shape.track, c, names)
     pieces.append(Piece("body", c.paint, both_sides(hull.deck_to(shape.deck_inner()))))
     pieces += structure.arch_trims(hull, c, p.flare)
     if pickup:

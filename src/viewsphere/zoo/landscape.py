@@ -37,7 +37,7 @@ def landscape(parameters: Landscape | None = None) -> Mesh:
     ground, trees, homes, tint = np.random.default_rng(p.seed).spawn(4)
     relief = country.Relief(p.hills, p.reach, tuple(ground.uniform(0, 2 * np.pi, 6).tolist()))
     pieces = [*country.ground(relief), *country.woods(relief, p.woods, trees), *country.houses(relief, p.houses, homes)]
-    mesh = finished(pieces, country.images(tint), country.tints(tint), crease_deg=60)
+    mesh = finished(pieces, country.images(tint), country.tints(relief, tint), crease_deg=60)
     return mapped(mesh, "thicket", country.around)
 
 

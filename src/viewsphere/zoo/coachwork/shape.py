@@ -75,6 +75,11 @@ class Shape:
         """Height of a fraction of the car's height."""
         return fraction * self.height
 
+    @property
+    def track(self) -> float:
+        """x of the inner walls of the wheel houses."""
+        return self.width / 2 - self.wheel.width - 0.09
+
     @cached_property
     def arches(self) -> tuple[Arch, Arch]:
         """Front and rear wheel opening."""

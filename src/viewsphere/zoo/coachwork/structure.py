@@ -14,15 +14,14 @@ from viewsphere.zoo.shapes.assembly import Piece
 from viewsphere.zoo.shapes.solids import both_sides, flipped, grid, mirrored, moved, rounded_box
 
 
-def hull_pieces(shape: Shape, hull: Hull, coats: Coats, bumpers: tuple[str, str]) -> list[Piece]:
-    """Walls, bumpers and sills, underside with wheel houses; bumpers names the lower front and rear."""
+def hull_pieces(hull: Hull, track: float, coats: Coats, bumpers: tuple[str, str]) -> list[Piece]:
+    """Walls, bumpers and sills, underside with wheel houses, their inner walls at x = track; bumpers names the lower ends."""
     wall = hull.wall()
     y = wall[:, 0, 1]
     arches = hull.arches
     first = int(np.searchsorted(y, arches[0].y - arches[0].radius * 1.035))
     last = int(np.searchsorted(y, arches[-1].y + arches[-1].radius * 1.035)) - 1
     lower = slice(0, LOWER + 1)
-    track = shape.width / 2 - shape.wheel.width - 0.09
     return [
         Piece("body", coats.paint, both_sides(grid(wall[:, LOWER:]))),
         Piece(bumpers[0], coats.cladding, both_sides(grid(wall[: first + 1, lower]))),
@@ -108,7 +107,7 @@ def bed_pieces(shape: Shape, coats: Coats) -> list[Piece]:
         rounded_box((shape.width - 0.25, 0.12, high - low), 0.01, 1), (0, hull.outline.front - 0.01, (low + high) / 2)
     )
     return [
-        *hull_pieces(shape, hull, coats, ("cargo_bed", "bumper_rear")),
+        *hull_pieces(hull, shape.track, coats, ("cargo_bed", "bumper_rear")),
         Piece("underbody", coats.under, bridge),
         Piece("cargo_bed", coats.paint, both_sides(hull.deck_to(inner, 1))),
         Piece("cargo_bed", coats.rubber, both_sides(grid(walls))),

@@ -59,9 +59,10 @@ def panel(
     count: int = 8,
     depth: float = 0.012,
     rings: int = 3,
+    corner: int = 3,
 ) -> Solid:
     """A rounded plate that follows the surface, `height` above it, with a skirt down to `depth` below."""
-    square = rounded_square(rounding, count)
+    square = rounded_square(rounding, count, corner)
     inward = np.linspace(1, 0, rings + 1)
     center = square.mean(axis=0)
     uv = in_quad(corners, center + (square - center) * inward[:, None, None])

@@ -36,16 +36,26 @@ AIR = srgb.linear((0.66, 0.74, 0.82))
 
 @dataclass(frozen=True)
 class Relief:
-    """The lie of the land: flat at the street, rising to a ridge of this height at this distance; six random phases."""
+    """The lie of the land: flat at the street or town in its middle, rising to a ridge of this height at this distance.
+
+    phases: six random ones; half: half the width and length of what lies in its middle; road: whether a road leads on to both
+    ends of Y.
+    """
 
     hills: float
     reach: float
     phases: tuple[float, ...]
+    half: tuple[float, float] = (HALF_WIDTH, HALF_LENGTH)
+    road: bool = True
+
+    def away(self, points: Float) -> Float:
+        """Distance (N,) of points from what lies in the middle, metres."""
+        return np.hypot(np.maximum(np.abs(points[:, 0]) - self.half[0], 0), np.maximum(np.abs(points[:, 1]) - self.half[1], 0))
 
     def height(self, x: Float, y: Float) -> Float:
         """z over plan points; level across the road."""
         across = np.sign(x) * np.maximum(np.abs(x) - 9.0, 0)
-        away = np.hypot(np.maximum(np.abs(x) - HALF_WIDTH, 0), np.maximum(np.abs(y) - HALF_LENGTH, 0))
+        away = np.hypot(np.maximum(np.abs(x) - self.half[0], 0), np.maximum(np.abs(y) - self.half[1], 0))
         share = np.clip((away - 15) / (self.reach - 15), 0, 1)
         a, b, c, d, e, f = self.phases
         roll = np.sin(across / 71 + a) * np.sin(y / 83 + b) + 0.6 * np.sin(across / 37 + c + 0.8 * np.sin(y / 55 + d))
@@ -63,35 +73,33 @@ def _lines(inner: list[float], reach: float) -> Float:
 
 def ground(relief: Relief) -> list[Piece]:
     """The land with the street's rectangle left out; its grid shares the rectangle's corners and the road's edges."""
-    x = _lines([ROAD, 4.5, 9.0, 19.0, HALF_WIDTH], relief.reach)
-    y = _lines([0.0, 35.0, 70.0, HALF_LENGTH], relief.reach)
+    wide, long = relief.half
+    near = [ROAD, 4.5, 9.0, 19.0] if relief.road else [0.35 * wide, 0.7 * wide]
+    x = _lines([*near, wide], relief.reach)
+    y = _lines([0.0, 0.35 * long, 0.7 * long, long], relief.reach)
     gx, gy = np.meshgrid(x, y, indexing="ij")
     z = relief.height(gx, gy)
-    lane = np.abs(gx) <= KERB
-    away = np.clip((np.abs(gy) - HALF_LENGTH) / 8, 0, 1)
-    z = np.where(lane, np.where(np.abs(gy) <= HALF_LENGTH + 1e-9, 0.0, z + 0.12 * away), z)
+    lane = (np.abs(gx) <= KERB) & relief.road
+    away = np.clip((np.abs(gy) - long) / 8, 0, 1)
+    z = np.where(lane, np.where(np.abs(gy) <= long + 1e-9, 0.0, z + 0.12 * away), z)
     surface = grid(np.stack([gx, gy, z], axis=-1))
     cells = surface.vertices[surface.triangles].mean(axis=1).reshape(2, -1, 3).mean(axis=0)
     middle = np.tile(cells, (2, 1))
-    road = np.abs(middle[:, 0]) < ROAD
-    inside = (np.abs(middle[:, 0]) < HALF_WIDTH) & (np.abs(middle[:, 1]) < HALF_LENGTH)
-    far = _away(middle) > FAR
+    road = (np.abs(middle[:, 0]) < ROAD) & relief.road
+    inside = (np.abs(middle[:, 0]) < wide) & (np.abs(middle[:, 1]) < long)
+    far = relief.away(middle) > FAR
     choice = (("road", ASPHALT, road & ~inside), ("meadow", GRASS, ~(road | inside | far)), ("hill", HILL, far & ~road))
-    return [Piece(part, material, Solid(surface.vertices, surface.triangles[own])) for part, material, own in choice]
+    pieces = [Piece(part, material, Solid(surface.vertices, surface.triangles[own])) for part, material, own in choice]
+    return [piece for piece in pieces if len(piece.solid.triangles)]
 
 
 def _scattered(relief: Relief, rng: np.random.Generator, near: float, far: float) -> Float:
     """A point (3,) on the land between two distances from the street's rectangle, clear of the road."""
     while True:
-        x, y = rng.uniform(-1, 1, 2) * (HALF_WIDTH + far, HALF_LENGTH + far)
-        away = np.hypot(max(abs(x) - HALF_WIDTH, 0), max(abs(y) - HALF_LENGTH, 0))
+        x, y = rng.uniform(-1, 1, 2) * (relief.half[0] + far, relief.half[1] + far)
+        away = float(relief.away(np.array([[x, y]]))[0])
         if near < away < far and abs(x) > 14:
             return np.array([x, y, float(relief.height(np.array(x), np.array(y)))])
-
-
-def _away(points: Float) -> Float:
-    """Distance (N,) of points from the street's rectangle, metres."""
-    return np.hypot(np.maximum(np.abs(points[:, 0]) - HALF_WIDTH, 0), np.maximum(np.abs(points[:, 1]) - HALF_LENGTH, 0))
 
 
 def woods(relief: Relief, count: int, rng: np.random.Generator) -> list[Piece]:
@@ -99,8 +107,8 @@ def woods(relief: Relief, count: int, rng: np.random.Generator) -> list[Piece]:
     near: list[Solid] = []
     far: list[Solid] = []
     for side in (-1, 1):
-        for y in np.arange(-98.0, 100.0, 5.5):
-            x = side * float(rng.uniform(37, 41))
+        for y in np.arange(2.0 - relief.half[1], relief.half[1], 5.5):
+            x = side * (relief.half[0] + float(rng.uniform(7, 11)))
             near.append(_crown(relief, x, float(y + rng.normal(0, 1.2)), float(rng.uniform(2.2, 3.6)), rng))
     for k in range(count):
         share = (k + 0.5) / count
@@ -109,7 +117,7 @@ def woods(relief: Relief, count: int, rng: np.random.Generator) -> list[Piece]:
         direction = rng.uniform(0, np.pi)
         for step in range(int(rng.integers(3, 7))):
             at = np.array([x + 6.5 * step * np.cos(direction), y + 6.5 * step * np.sin(direction)]) + rng.normal(0, 2, 2)
-            away = float(_away(at[None])[0])
+            away = float(relief.away(at[None])[0])
             if abs(at[0]) > 13 and away > 7:
                 crown = _crown(relief, float(at[0]), float(at[1]), float(rng.uniform(2.6, 5.0)) * (1 + share), rng)
                 (near if away < NEAR else far).append(crown)
@@ -166,19 +174,19 @@ def images(rng: np.random.Generator) -> list[Image]:
     return [turf(), textures.asphalt(rng, (0.4, 0.39, 0.38), 256), textures.leafage(rng, (0.3, 0.39, 0.17))]
 
 
-def tints(rng: np.random.Generator) -> dict[str, Tint]:
+def tints(relief: Relief, rng: np.random.Generator) -> dict[str, Tint]:
     """Fields on the hills, woods in several greens; both fade into the air with distance."""
     near, fields, leaves = rng.spawn(3)
     mean = 0.88 * srgb.linear(turf().pixels[..., :3] / 255.0).mean(axis=(0, 1))
 
     def hazy(color: Float, p: Float) -> Float:
-        share = 1 - np.exp(-np.maximum(_away(p) - FAR, 0) / 900)
+        share = 1 - np.exp(-np.maximum(relief.away(p) - FAR, 0) / 900)
         return color + (AIR - color) * share[:, None]
 
     def hill(p: Float) -> Float:
         dry = np.clip(0.5 + 0.9 * waves(fields, p[:, :2], 90.0), 0, 1)[:, None]
         color = mean * (1 - 0.45 * dry) + np.array([0.2, 0.17, 0.06]) * 0.45 * dry
-        edge = np.clip((_away(p) - FAR) / 60, 0, 1)[:, None]
+        edge = np.clip((relief.away(p) - FAR) / 60, 0, 1)[:, None]
         return hazy(mean * (1 - edge) + color * edge, p)
 
     def wood(p: Float) -> Float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from viewsphere.zoo.shapes.assembly import Piece
@@ -41,13 +43,18 @@ def lines(dash: tuple[float, float], zebra: float, edge_lines: bool) -> list[Pie
 
 def fittings(covers: tuple[float, ...], crossings: tuple[tuple[float, ...], tuple[float, ...]]) -> list[Piece]:
     """Manhole covers in the lanes, and drains in the gutters away from dropped kerbs."""
-    manholes = [moved(_cover(), ((1.45, -1.55)[i % 2], y, 0)) for i, y in enumerate(covers)]
+    lids = manholes([((1.45, -1.55)[i % 2], y) for i, y in enumerate(covers)])
     drains: list[Solid] = []
     for side, at in zip((1, -1), crossings, strict=True):
         for y in np.arange(-85.0, 86.0, 24.0) + 5 * side:
             if all(abs(y - c) > CROSSING + 1 for c in at):
                 drains.append(moved(_drain(), (side * (GUTTER + ROAD) / 2, y, 0)))
-    return [Piece("manhole", IRON, join(*manholes)), Piece("drain", IRON, join(*drains))]
+    return [lids, Piece("drain", IRON, join(*drains))]
+
+
+def manholes(at: Sequence[tuple[float, float]]) -> Piece:
+    """Iron covers at these points (x, y) of a road."""
+    return Piece("manhole", IRON, join(*(moved(_cover(), (x, y, 0)) for x, y in at)))
 
 
 def _cover() -> Solid:
