@@ -1,10 +1,10 @@
-"""A small town: blocks of shops with flats above, houses with gardens and a park, junctions, parked cars, the country beyond."""
+"""A small town: shops with flats above, houses with gardens, a park, junctions, parked cars, and the country beyond."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +19,15 @@ from viewsphere.zoo.townscape.plan import STEP
 
 DESIGNS = {"car": 9, "tree": 6, "shop": 12, "house": 6, "bench": 2, "wheelie_bin": 2, "shrub": 3}
 """How many members of a family a town has, of which it places many; of all others there is one."""
+
+KINDS: dict[str, Callable[[Any], bool]] = {
+    "": lambda p: True,
+    "plain": lambda house: house.garage == 0 and house.footprint[1] < 12,
+    "low": lambda hedge: hedge.height < 1.3,
+    "small": lambda tree: tree.crown < 4.2 and tree.height < 7,
+    "backed": lambda bench: bench.backrest,
+}
+"""Which members of a family are of a kind."""
 
 PARKED = 0.55
 """Share of the spaces to park in that are taken."""
@@ -64,10 +73,10 @@ class _Town:
     designs: dict[tuple[str, str], list[tuple[int, Any]]] = field(default_factory=dict[tuple[str, str], list[tuple[int, Any]]])
     count: Counter[str] = field(default_factory=Counter[str])
 
-    def drawn(self, family: str, kind: str = "", fits: Callable[[Any], bool] = lambda p: True) -> tuple[int, Any]:
-        """One of the town's members of a family: its seed and parameters; `kind` tells those apart that `fits` accepts."""
+    def drawn(self, family: str, kind: str = "") -> tuple[int, Any]:
+        """One of the town's members of a family, or of a kind of it: its seed and parameters."""
         if (family, kind) not in self.designs:
-            draw, found = plugins.family(family).draw, list[tuple[int, Any]]()
+            draw, found, fits = plugins.family(family).draw, list[tuple[int, Any]](), KINDS[kind]
             while len(found) < DESIGNS.get(family, 1):
                 seed = int(self.rng.integers(1 << 31))
                 if fits(parameters := draw(np.random.default_rng(seed))):
@@ -146,14 +155,14 @@ def _houses(t: _Town, block: Block) -> None:
     """Houses in gardens on the two long sides, hedges along the pavement with gaps before the doors."""
     for side in frontages(block)[1::2]:
         for along in _spread(side.length, 19.0, 3.0):
-            seed, p = t.drawn("house", "plain", lambda h: h.garage == 0 and h.footprint[1] < 12)
+            seed, p = t.drawn("house", "plain")
             t.put("house", seed, *side.at(along, PAVED + 6.0 + p.footprint[1] / 2), side.turn_deg, STEP - 0.02)
             door = along + p.door_x
             t.stand("tree", side, along + float(t.rng.choice((-7.0, 7.0))), PAVED + 3.0, float(t.rng.uniform(0, 360)))
             t.stand("shrub", side, along + 0.35 * p.width * np.sign(along - door + 0.1), PAVED + 5.0)
             for step in np.arange(along - 8.0, along + 8.0, 2.0):
                 if abs(step + 1.0 - door) > 1.8:
-                    t.stand("hedge", side, float(step + 1.0), PAVED + 0.4, kind="low", fits=lambda h: h.height < 1.3)
+                    t.stand("hedge", side, float(step + 1.0), PAVED + 0.4, kind="low")
 
 
 def _park(t: _Town, block: Block) -> None:
@@ -165,7 +174,7 @@ def _park(t: _Town, block: Block) -> None:
             if t.rng.random() < 0.4:
                 t.stand("shrub", side, along + 3.0, PAVED + 1.2, float(t.rng.uniform(0, 360)))
         for along in _spread(side.length, 16.0, 14.0):
-            t.stand("bench", side, along, PAVED + 9.5, 180.0, "backed", fits=lambda b: b.backrest)
+            t.stand("bench", side, along, PAVED + 9.5, 180.0, "backed")
     x, y = block.middle
     t.put("fountain", t.drawn("fountain")[0], x, y)
 
