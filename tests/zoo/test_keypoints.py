@@ -16,6 +16,7 @@ NAMED = {
     "bench": {"seat_front_left", "seat_rear_right"},
     "bicycle": {"wheel_front", "wheel_rear", "saddle", "grip_left", "pedal_right"},
     "boat": {"bow", "stern_left"},
+    "cabinet": {"top_front_left", "top_rear_right", "bottom_front_left"},
     "car": {"wheel_front_left", "wheel_rear_right", "headlight_left", "taillight_right"},
     "chair": set(),
     "hair_drier": {"nozzle", "inlet", "handle", "switch"},
