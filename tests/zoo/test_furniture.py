@@ -9,6 +9,8 @@ import pytest
 
 from viewsphere import plugins, zoo
 from viewsphere.zoo.bed import Bed, bed
+from viewsphere.zoo.cabinet import Cabinet, cabinet
+from viewsphere.zoo.cabinet import surfaces as surfaces_of_cabinet
 from viewsphere.zoo.lamp import Lamp, bulb, lamp
 from viewsphere.zoo.shelf import Shelf, shelf
 from viewsphere.zoo.shelf import surfaces as surfaces_of_shelf
@@ -19,6 +21,7 @@ from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
 
 SIZES = {
     "bed": ((0.95, 2.7), (0.85, 2.1), (1.9, 2.6)),
+    "cabinet": ((0.39, 3.2), (0.48, 2.3), (0.33, 1.3)),
     "lamp": ((0.15, 0.95), (0.4, 2.15), (0.2, 1.75)),
     "shelf": ((0.54, 2.2), (0.7, 2.15), (0.27, 0.47)),
     "sofa": ((1.3, 3.1), (0.7, 0.98), (0.82, 1.72)),
@@ -28,6 +31,7 @@ SIZES = {
 
 PARTS = {
     "bed": {"leg", "rail", "headboard", "mattress", "duvet", "pillow"},
+    "cabinet": {"side", "carcass", "back", "handle"},
     "lamp": {"stem", "shade", "bulb"},
     "shelf": {"upright", "board"},
     "sofa": {"base", "seat_cushion", "back", "armrest", "leg"},
@@ -168,3 +172,29 @@ def test_a_lamp_tells_where_its_bulb_is_and_shines(style: str) -> None:
     assert (shade.min(axis=0) - 0.02 < bulb(p)).all() and (shade.max(axis=0) + 0.02 > bulb(p)).all()
     assert {"bulb"} <= {m.name for m in mesh.materials if max(m.emissive) > 0}
     assert part_vertices(mesh, "base", "leg")[:, 2].min() == pytest.approx(0, abs=1e-3)
+
+
+def test_a_cabinet_has_what_was_asked_for() -> None:
+    p = Cabinet(columns=((("pair", 1.0)[::-1],), ((0.5, "open"), (0.5, "drawer"))), width=1.2, height=0.8)
+    shut = cabinet(p)
+    assert {"door", "drawer", "handle", "top", "leg"} <= set(shut.parts)
+    assert part_vertices(shut, "door")[:, 0].max() < 0 < part_vertices(shut, "drawer")[:, 0].min()
+    assert {s.name for s in surfaces_of_cabinet(p)} == {"top", "bay_1"}
+    width, height, _ = zoo.real_size(shut)
+    assert (width, height) == pytest.approx((1.2, 0.8), abs=1e-3)
+    ajar, pulled = cabinet(replace(p, ajar=90)), cabinet(replace(p, pulled=0.15))
+    front = part_vertices(shut, "door")[:, 1].min()
+    assert part_vertices(ajar, "door")[:, 1].min() == pytest.approx(front - 0.28, abs=0.03)
+    assert part_vertices(pulled, "drawer")[:, 1].min() == pytest.approx(front - 0.15, abs=1e-3)
+
+
+@pytest.mark.parametrize("gas", [False, True])
+def test_a_kitchen_has_a_hole_for_its_basin_and_leaves_sink_and_hob_free(gas: bool) -> None:
+    unit = ((1.0, "pair"),)
+    p = Cabinet("kitchen", 1.84, 0.6, 0.9, (unit,) * 3, top=0.038, base="plinth", basin=0, cooker=2, gas=gas, stone="marble")
+    mesh = cabinet(p)
+    assert {"worktop", "sink", "tap", "hob", "burner", "knob"} <= set(mesh.parts)
+    basin, hob = part_vertices(mesh, "sink"), part_vertices(mesh, "hob")
+    assert basin[:, 2].min() < 0.9 - 0.15 and part_vertices(mesh, "tap")[:, 2].max() > 1.15
+    (free,) = surfaces_of_cabinet(p)
+    assert basin[:, 0].max() < free.rectangle[0] < free.rectangle[2] < hob[:, 0].min()

@@ -20,6 +20,7 @@ NAMED = {
     "bowl": {"rim", "base"},
     "can": {"top", "base"},
     "bus": {"wheel_front_left", "taillight_right", "roof_rear_left", "door", "windshield"},
+    "cabinet": {"top_front_left", "top_rear_right", "bottom_front_left"},
     "car": {"wheel_front_left", "wheel_rear_right", "headlight_left", "taillight_right"},
     "chair": set(),
     "hair_drier": {"nozzle", "inlet", "handle", "switch"},
