@@ -99,6 +99,11 @@ class Bed:
         """y at which the turned-back duvet ends towards the head."""
         return self.length / 2 - 0.58
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        return self.width + 0.36, self.length + 0.2, max(self.head_height, self.posts)
+
 
 @dataclass(frozen=True)
 class _Coats:

@@ -71,6 +71,11 @@ class Lamp:
     wood: Wood = field(default_factory=Wood)
     seed: int = 0
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        return *(2 * self.shade_radius + (0.32 if self.style == "tripod" else 0.04),) * 2, self.height
+
 
 @dataclass(frozen=True)
 class _Coats:

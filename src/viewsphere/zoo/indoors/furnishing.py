@@ -17,6 +17,9 @@ from viewsphere.zoo.shapes.resting import Surface
 DRAWS = 400
 """Members of a family that are drawn until one is as it is wanted."""
 
+STANDOFF = 0.9
+"""Metres between the free floor and the walls, for cameras."""
+
 SEATED = 0.7
 """Metres around a table that who sits there needs, towards other furniture."""
 
@@ -25,6 +28,9 @@ SPOTS = 30
 
 FACING = ("book", "laptop", "monitor", "television")
 """Small things that people turn to themselves."""
+
+LAYER = 0.25
+"""Metres between two boards of a shelf, at least."""
 
 STEP = 0.05
 """Metres between spots that are tried along a wall."""
@@ -77,7 +83,10 @@ class Stand:
 def extent(parameters: Any) -> tuple[float, float, float]:
     """Width, depth and height of a family's member, metres, by its parameters: its `extent`, or the measures that it has."""
     own: tuple[float, float, float] | None = getattr(parameters, "extent", None)
-    return own or (parameters.width, parameters.depth, parameters.height)
+    if own is not None:
+        return own
+    width: float = parameters.width if hasattr(parameters, "width") else 2 * parameters.radius
+    return width, getattr(parameters, "depth", width), parameters.height
 
 
 def across(turn_deg: float) -> Side:
@@ -205,20 +214,18 @@ class Furnishing:
         if found is None:
             return
         seed, p = found
-        reach = math.hypot(*extent(p)[:2]) / 2 if family not in FACING else max(extent(p)[:2]) / 2
+        wide, deep, _ = extent(p)
+        reach = (wide / 2, deep / 2) if family in FACING else (math.hypot(wide, deep) / 2,) * 2
         x0, y0, x1, y1 = surface.rectangle
-        if x1 - x0 < 2 * reach or y1 - y0 < min(2 * reach, extent(p)[1]):
+        spare = (x1 - x0) / 2 - reach[0], (y1 - y0) / 2 - reach[1]
+        if min(spare) < 0:
             return
         for _ in range(SPOTS):
-            u, v = (
-                self.rng.uniform(x0 + reach, x1 - reach),
-                self.rng.uniform(y0 + min(reach, (y1 - y0) / 2), y1 - min(reach, (y1 - y0) / 2)),
-            )
-            turn = self.rng.normal(0, 12) if family in FACING else self.rng.uniform(0, 360)
-            made = Stand(
-                family, seed, p, *other.at(float(u), -float(v)), (other.turn_deg + float(turn)) % 360, other.z + surface.height
-            )
-            near = [s for s in self.stands if s.z > 0 and abs(s.z - made.z) < 0.3]
+            u, v = (float(self.rng.uniform(-one, one)) for one in spare)
+            turn = float(self.rng.normal(0, 8) if family in FACING else self.rng.uniform(0, 360))
+            spot = other.at((x0 + x1) / 2 + u, -(y0 + y1) / 2 - v)
+            made = Stand(family, seed, p, *spot, (other.turn_deg + turn) % 360, other.z + surface.height)
+            near = [s for s in self.stands if s.z > 0 and abs(s.z - made.z) < LAYER]
             if not any(overlap(made.rectangle, s.rectangle, gap) for s in near):
                 self.stands.append(made)
                 return
@@ -235,17 +242,21 @@ class Furnishing:
         return made
 
     def free(self, least: float) -> Rectangle | None:
-        """The square of the floor, at least this wide, that is farthest from walls and furniture; None where there is none."""
+        """The square of the floor, at least this wide, that is farthest from furniture, and as far from walls as cameras need;
+        None where there is none.
+        """
         (x0, y0), (x1, y1) = self.room.low, self.room.high
         x, y = np.arange(x0 + 0.1, x1, 0.1), np.arange(y0 + 0.1, y1, 0.1)
         at = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-        room = np.minimum(np.minimum(at[..., 0] - x0, x1 - at[..., 0]), np.minimum(at[..., 1] - y0, y1 - at[..., 1]))
+        walls = np.minimum(np.minimum(at[..., 0] - x0, x1 - at[..., 0]), np.minimum(at[..., 1] - y0, y1 - at[..., 1]))
+        room = walls - STANDOFF
         for a, b, c, d in [s.rectangle for s in self.stands if s.size[2] > 0.06 and s.z == 0] + self._doors():
             apart = np.maximum(np.maximum(a - at[..., 0], at[..., 0] - c), np.maximum(b - at[..., 1], at[..., 1] - d))
             room = np.minimum(room, apart)
         i, k = np.unravel_index(int(room.argmax()), room.shape)
         half = float(room[i, k])
-        return None if 2 * half < least else (x[i] - half, y[k] - half, x[i] + half, y[k] + half)
+        a, b = float(x[i]), float(y[k])
+        return None if 2 * half < least else (a - half, b - half, a + half, b + half)
 
     def _sides(self, sides: Iterable[Side]) -> list[Side]:
         """The sides in a random order, those where nothing opens first."""

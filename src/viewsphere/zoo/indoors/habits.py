@@ -40,7 +40,7 @@ def _bedroom(f: Furnishing) -> None:
     if bed is not None:
         f.under(bed.at(0.0, bed.size[1] * 0.3), bed.turn_deg, "rug", _style(width=2.6, depth=2.0))
         for right in (-1, 1):
-            small = f.beside(bed, right, "table", _style("side", width=0.6, depth=0.5, height=0.62))
+            small = f.beside(bed, right, "cabinet", _style("bedside"))
             if small is not None:
                 f.on(small, "top", "lamp", _style("table", height=0.6))
                 f.scattered(small, "top", ("book", "mug"), 1)
@@ -62,8 +62,8 @@ def _living_room(f: Furnishing) -> None:
         board = f.against("cabinet", _style("sideboard", height=0.85), [across(sofa.turn_deg)], middle=True)
         if board is not None:
             f.on(board, "top", "television", _style(width=1.1 * board.size[0]))
-        if f.beside(sofa, 1, "lamp", _style("floor")) is None:
-            f.beside(sofa, -1, "lamp", _style("floor"))
+        if f.beside(sofa, 1, "lamp", _style("column", "tripod")) is None:
+            f.beside(sofa, -1, "lamp", _style("column", "tripod"))
         f.before(sofa, "chair", _seat("Armchair"), gap=0.45, right=sofa.size[0] / 2 + 0.5, turn=110.0)
     _filled(f, f.against("shelf"))
     f.against("plant", _style(width=0.9))

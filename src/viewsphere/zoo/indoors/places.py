@@ -17,7 +17,7 @@ from viewsphere.zoo.places import Place, PlacePiece, standing
 TRIES = 60
 """Interiors that are furnished until one leaves enough of its floor free."""
 
-LEAST = 1.3
+LEAST = 1.1
 """Width of the free floor around the origin, metres, at least."""
 
 
