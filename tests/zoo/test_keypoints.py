@@ -24,6 +24,7 @@ NAMED = {
     "lamp": {"foot", "bulb", "shade", "shade_top"},
     "lamp_post": {"lamp", "foot"},
     "post_box": {"slot", "door", "top"},
+    "refrigerator": {"top_front_left", "bottom_rear_right"},
     "road_sign": {"plate", "foot"},
     "shelf": {"top_front_left", "foot_rear_right"},
     "sofa": {"seat_front_left", "back_top_right", "armrest_front_left", "foot_rear_right"},
