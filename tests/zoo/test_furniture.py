@@ -12,6 +12,7 @@ from viewsphere.zoo.bed import Bed, bed
 from viewsphere.zoo.cabinet import Cabinet, cabinet
 from viewsphere.zoo.cabinet import surfaces as surfaces_of_cabinet
 from viewsphere.zoo.lamp import Lamp, bulb, lamp
+from viewsphere.zoo.refrigerator import Refrigerator, refrigerator
 from viewsphere.zoo.shelf import Shelf, shelf
 from viewsphere.zoo.shelf import surfaces as surfaces_of_shelf
 from viewsphere.zoo.sofa import Sofa, sofa
@@ -23,6 +24,7 @@ SIZES = {
     "bed": ((0.95, 2.7), (0.85, 2.1), (1.9, 2.6)),
     "cabinet": ((0.39, 3.2), (0.48, 2.3), (0.33, 1.3)),
     "lamp": ((0.15, 0.95), (0.4, 2.15), (0.2, 1.75)),
+    "refrigerator": ((0.5, 1.6), (1.38, 2.02), (0.57, 1.6)),
     "shelf": ((0.54, 2.2), (0.7, 2.15), (0.27, 0.47)),
     "sofa": ((1.3, 3.1), (0.7, 0.98), (0.82, 1.72)),
     "table": ((0.4, 2.2), (0.37, 1.07), (0.33, 1.3)),
@@ -33,6 +35,7 @@ PARTS = {
     "bed": {"leg", "rail", "headboard", "mattress", "duvet", "pillow"},
     "cabinet": {"side", "carcass", "back", "handle"},
     "lamp": {"stem", "shade", "bulb"},
+    "refrigerator": {"body", "door", "handle", "gasket", "foot", "condenser", "compressor"},
     "shelf": {"upright", "board"},
     "sofa": {"base", "seat_cushion", "back", "armrest", "leg"},
     "table": {"top"},
@@ -198,3 +201,17 @@ def test_a_kitchen_has_a_hole_for_its_basin_and_leaves_sink_and_hob_free(gas: bo
     assert basin[:, 2].min() < 0.9 - 0.15 and part_vertices(mesh, "tap")[:, 2].max() > 1.15
     (free,) = surfaces_of_cabinet(p)
     assert basin[:, 0].max() < free.rectangle[0] < free.rectangle[2] < hob[:, 0].min()
+
+
+@pytest.mark.parametrize("style", ["bottom_freezer", "top_freezer", "side_by_side", "french", "retro"])
+def test_a_refrigerator_has_its_doors_and_opens(style: str) -> None:
+    wide = style in ("side_by_side", "french")
+    p = Refrigerator(style=style, width=0.9 if wide else 0.6, dispenser=wide, notes=2)
+    shut = refrigerator(p)
+    assert zoo.real_size(shut)[:2] == pytest.approx((p.width, 1.85), abs=0.01)
+    doors = part_vertices(shut, "door")
+    assert doors[:, 1].min() == pytest.approx(-0.31, abs=1e-3) and np.ptp(doors[:, 0]) == pytest.approx(p.width, abs=1e-3)
+    assert ("dispenser" in shut.parts) == wide and {"note", "magnet"} <= set(shut.parts) and "food" not in shut.parts
+    ajar = refrigerator(replace(p, ajar=90))
+    assert {"glass_shelf", "crisper", "door_bin"} <= set(ajar.parts)
+    assert part_vertices(ajar, "door")[:, 1].min() < -0.31 - 0.35

@@ -30,6 +30,7 @@ NAMED = {
     "mug": {"rim", "base", "handle"},
     "plate": {"rim_front", "rim_rear", "base"},
     "post_box": {"slot", "door", "top"},
+    "refrigerator": {"top_front_left", "bottom_rear_right"},
     "road_sign": {"plate", "foot"},
     "shelf": {"top_front_left", "foot_rear_right"},
     "sofa": {"seat_front_left", "back_top_right", "armrest_front_left", "foot_rear_right"},
