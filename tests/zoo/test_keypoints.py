@@ -14,6 +14,7 @@ from viewsphere.zoo import build_zoo_model
 NAMED = {
     "bench": {"seat_front_left", "seat_rear_right"},
     "bicycle": {"wheel_front", "wheel_rear", "saddle", "grip_left", "pedal_right"},
+    "bollard": {"top", "foot"},
     "boat": {"bow", "stern_left"},
     "bus": {"wheel_front_left", "taillight_right", "roof_rear_left", "door", "windshield"},
     "car": {"wheel_front_left", "wheel_rear_right", "headlight_left", "taillight_right"},
@@ -21,8 +22,11 @@ NAMED = {
     "hair_drier": {"nozzle", "inlet", "handle", "switch"},
     "house": {"door", "roof", "eaves_front_left"},
     "lamp_post": {"lamp", "foot"},
+    "motorcycle": {"wheel_front", "seat", "grip_left", "headlight"},
     "post_box": {"slot", "door", "top"},
     "road_sign": {"plate", "foot"},
+    "traffic_cone": {"tip", "foot_front_left"},
+    "traffic_light": {"red", "amber", "green", "foot"},
     "truck": {"wheel_front_left", "mirror_right", "load_rear_left", "headlight_right"},
     "wheelie_bin": {"wheel_left", "handle_right"},
 }
