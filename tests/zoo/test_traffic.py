@@ -8,20 +8,33 @@ import numpy as np
 import pytest
 
 from viewsphere import plugins, zoo
+from viewsphere.zoo.bollard import Bollard, bollard
 from viewsphere.zoo.bus import Bus, bus
+from viewsphere.zoo.motorcycle import Motorcycle, motorcycle
 from viewsphere.zoo.townscape.lettering import lettering
+from viewsphere.zoo.traffic_cone import TrafficCone, traffic_cone
+from viewsphere.zoo.traffic_light import TrafficLight, traffic_light
 from viewsphere.zoo.truck import Truck, truck
 from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
 
 SIZES = {
+    "bollard": ((0.1, 0.6), (0.84, 1.16), (0.1, 0.6)),
     "bus": ((2.4, 3.1), (2.9, 4.8), (9.1, 13.0)),
+    "motorcycle": ((0.65, 1.0), (1.0, 1.6), (1.75, 2.6)),
+    "traffic_cone": ((0.2, 0.65), (0.4, 1.55), (0.2, 0.65)),
+    "traffic_light": ((0.2, 5.4), (2.8, 6.9), (0.4, 1.5)),
     "truck": ((2.1, 2.8), (1.9, 4.1), (5.5, 10.3)),
 }
 """Width, height and length that draws may have, metres."""
 
-MOST = {"bus": 40_000, "truck": 40_000}
+MOST = {"bus": 40_000, "motorcycle": 40_000, "truck": 40_000}
+CENTRED = ("bus", "motorcycle", "traffic_cone", "truck")
 STYLES = {
+    "bollard": {"style": 4, "top": 4, "plate": 2, "sides": 2},
     "bus": {"style": 3, "livery": 4, "roof_unit": 4, "door_side": 2, "flush": 2, "split": 2},
+    "motorcycle": {"style": 5, "engine": 3, "spokes": 6, "mufflers": 2, "top_box": 2, "panniers": 2},
+    "traffic_cone": {"foot": 3, "stack": 3, "bands": 6, "light": 2, "dark_foot": 2},
+    "traffic_light": {"style": 3, "lit": 3, "sides": 4, "heads": 2, "button": 2, "striped": 2},
     "truck": {"load": 5, "axles": 2, "livery": 4, "visor": 2, "high_roof": 2},
 }
 """Choices of a family, and how many values each has among draws."""
@@ -34,7 +47,7 @@ def test_draws_are_sound_of_real_size_and_differ(family: str) -> None:
         assert_sound(mesh, MOST.get(family, 8_000), least=150)
         low, high = mesh.bounds
         assert low[2] == pytest.approx(0, abs=1e-5)
-        assert abs((low + high)[:2]).max() / 2 < 0.05 * (high - low)[:2].max()
+        assert family not in CENTRED or abs((low + high)[:2]).max() / 2 < 0.05 * (high - low)[:2].max()
         for value, (least, most) in zip(zoo.real_size(mesh), SIZES[family], strict=True):
             assert least - 1e-3 <= value <= most + 1e-3
     assert len({m.vertices.tobytes() for m in meshes}) == len({repr(m.materials) for m in meshes}) == len(meshes)
@@ -111,6 +124,81 @@ def test_a_lorry_carries_what_was_asked_for_behind_its_cab(load: str) -> None:
     assert hold[:, 1].min() > cab and hold[:, 2].min() > 0.7
     bare = truck(Truck(load=load, goods="none", name="", livery="plain", visor=False))
     assert not {"load", "livery", "visor", "deflector", "wheel_third_left_tyre"} & set(bare.parts)
+
+
+@pytest.mark.parametrize("style", ["naked", "sport", "cruiser", "tourer", "scooter"])
+def test_a_motorcycle_stands_on_both_wheels_and_steers_to_the_left(style: str) -> None:
+    p = Motorcycle(style=style, screen=0.4)
+    straight, steered = motorcycle(p), motorcycle(replace(p, steering=20.0))
+    for end, sign in (("front", -1), ("rear", 1)):
+        tyre = part_vertices(straight, f"wheel_{end}_tyre")
+        assert tyre[:, 2].min() == pytest.approx(0, abs=0.02) and sign * tyre[:, 1].mean() > 0
+    own = {"sport": "fairing", "scooter": "leg_shield"}.get(style, "tank")
+    assert {"seat", "headlight", "taillight", "engine", "muffler", own} <= set(straight.parts)
+    assert ("windscreen" in straight.parts) == (style != "scooter")
+    assert ("leg_shield" in straight.parts) == (style == "scooter")
+    lamp = part_vertices(straight, "headlight")
+    assert lamp[:, 1].mean() < part_vertices(straight, "seat")[:, 1].mean() < part_vertices(straight, "taillight")[:, 1].mean()
+    ahead = [part_vertices(mesh, "mirror_left")[:, 1].mean() for mesh in (straight, steered)]
+    assert (
+        ahead[1] - part_vertices(steered, "seat")[:, 1].mean() > ahead[0] - part_vertices(straight, "seat")[:, 1].mean() + 0.05
+    )
+    fitted = {"top_box", "pannier"}
+    assert not fitted & set(straight.parts) and "top_box" in motorcycle(replace(p, top_box=True)).parts
+
+
+@pytest.mark.parametrize("style", ["post", "cantilever", "pedestrian"])
+def test_one_lamp_of_a_traffic_light_shines(style: str) -> None:
+    looks = set()
+    for lit in ("red", "amber", "green"):
+        mesh = traffic_light(TrafficLight(style=style, lit=lit, height=6.0 if style == "cantilever" else 3.4))
+        z = {}
+        for name in ("red", "amber", "green"):
+            part = mesh.triangle_part == mesh.parts.index(f"lamp_{name}")
+            glows = [max(mesh.materials[i].emissive) > 0.5 for i in set(mesh.triangle_material[part])]
+            assert glows == [name == lit]
+            z[name] = part_vertices(mesh, f"lamp_{name}").mean(axis=0)
+        assert z["red"][2] > z["amber"][2] > z["green"][2] and z["red"][1] < -0.05
+        walker = [n for n in mesh.parts if n.startswith("pedestrian")]
+        assert bool(walker) == (style == "pedestrian")
+        if walker:
+            go = mesh.triangle_part == mesh.parts.index("pedestrian_go")
+            assert any(max(mesh.materials[i].emissive) > 0.5 for i in set(mesh.triangle_material[go])) == (lit == "red")
+        looks.add(repr(mesh.materials))
+    assert len(looks) == 3
+
+
+def test_a_traffic_lights_heads_are_where_they_were_asked_for() -> None:
+    arm = traffic_light(TrafficLight(style="cantilever", height=6.0, arm=4.0, heads=2, sides=1))
+    reach = [part_vertices(arm, f"lamp_red{n}")[:, 0].mean() for n in ("_3", "_2")]
+    assert max(part_vertices(arm, "housing")[:, 0]) == pytest.approx(3.84, abs=0.3)
+    assert {"lamp_red", "lamp_red_2", "lamp_red_3"} <= set(arm.parts) and abs(reach[0]) < 0.1 and reach[1] > 2
+    around = traffic_light(TrafficLight(sides=4))
+    places = [part_vertices(around, f"lamp_green{n}")[:, :2].mean(axis=0) for n in ("_4", "_3", "_2")]
+    np.testing.assert_allclose(sorted(p[0] for p in places), np.array((-1, 0, 1)) * np.abs(places).max(), atol=1e-3)
+
+
+def test_a_cone_narrows_and_its_bands_lie_on_it() -> None:
+    p = TrafficCone(height=0.75, stack=1)
+    mesh = traffic_cone(p)
+    cone, band = part_vertices(mesh, "cone"), part_vertices(mesh, "band")
+    assert cone[:, 2].max() == pytest.approx(p.height)
+    low, high = cone[cone[:, 2] < 0.15], cone[cone[:, 2] > 0.7]
+    assert np.hypot(*low[:, :2].T).max() > 2.5 * np.hypot(*high[:, :2].T).max()
+    assert band[:, 2].min() == pytest.approx(0.35 * p.height) and band[:, 2].max() == pytest.approx(0.8 * p.height)
+    assert np.ptp(part_vertices(mesh, "foot"), axis=0)[0] == pytest.approx(p.base, abs=0.01)
+    assert "band" not in traffic_cone(replace(p, bands=())).parts and "light" in traffic_cone(replace(p, light=True)).parts
+    assert traffic_cone(replace(p, stack=3)).bounds[1][2] > p.height + 0.2
+
+
+@pytest.mark.parametrize("style", ["steel", "iron", "concrete", "guard"])
+@pytest.mark.parametrize("top", ["flat", "dome", "ball", "crown"])
+def test_a_bollard_has_its_height_and_stands_upright(style: str, top: str) -> None:
+    mesh = bollard(Bollard(style=style, top=top, height=0.95, radius=0.08))
+    assert mesh.bounds[1][2] == pytest.approx(0.95)
+    np.testing.assert_allclose((mesh.bounds.sum(axis=0) / 2)[:2], 0, atol=1e-6)
+    assert part_vertices(mesh, "band")[:, 2].mean() == pytest.approx(0.78 * 0.95)
+    assert outward_share(mesh) > 0.995
 
 
 def test_lettering_covers_each_cell_of_its_letters_once() -> None:

@@ -1,0 +1,1 @@
+"""The parts of a motorcycle: design, wheels, front, engine, bodywork, and a scooter's shell."""
