@@ -29,6 +29,11 @@ def _style(*styles: str, width: float = math.inf, depth: float = math.inf, heigh
     return fits
 
 
+def _is_shut(p: Any) -> bool:
+    """Whether no door stands open."""
+    return p.ajar == 0
+
+
 def _seat(*kinds: str) -> Fits:
     """Whether a chair is one of these kinds."""
     return lambda p: type(p).__name__ in kinds
@@ -74,8 +79,8 @@ def _kitchen(f: Furnishing) -> None:
     """Units along a wall with the refrigerator beside them; a table with chairs."""
     units = f.against("cabinet", _style("kitchen", width=0.75 * max(f.room.size)), gap=0.0)
     if units is not None:
-        if f.beside(units, 1, "refrigerator", gap=0.02) is None:
-            f.beside(units, -1, "refrigerator", gap=0.02)
+        if f.beside(units, 1, "refrigerator", _is_shut, gap=0.02) is None:
+            f.beside(units, -1, "refrigerator", _is_shut, gap=0.02)
         f.scattered(units, "", ("bottle", "can", "bowl", "mug", "plate", "plant"), int(f.rng.integers(3, 7)))
     table = f.in_the_middle("table", _style("dining", width=1.7))
     if table is not None:
