@@ -13,11 +13,13 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import BoxOf, center_of_all
+from viewsphere.sampling.layouts import is_slow
 from viewsphere.sampling.pose_numbers import as_ranges
 from viewsphere.sampling.samplers import Standing, Stock
 from viewsphere.sampling.samplers._random import (
     are_views_drawn,
     check_scene_models,
+    scene_around,
     scene_cast,
     scene_names,
     scene_split,
@@ -80,7 +82,7 @@ def split(stock: Stock, subject: str, pose: int) -> str:
 
 def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The models of a scene; nothing where the place they stand in is drawn for each frame."""
-    if not stock.recipe.scene.is_moved_each_frame:
+    if not stock.recipe.scene.is_moved_each_frame and not is_slow(scenes_entry(stock.recipe).layout):
         things = scene_things(stock, subject, None, box_of)
         views, poses = stock.pose_list.drawn_for(subject), tuple(numbers(_poses(stock, subject)))
         yield Standing(things, center_of_all(things, box_of), views, poses)
@@ -93,6 +95,7 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     middle = center_of_all(things, box_of)
     if stock.composition is not None:
         things = stock.composition.things(subject, things, pose, box_of)
+    things += scene_around(stock, subject, pose, box_of)
     views = stock.pose_list.drawn_for(subject)
     instants = [
         stock.instant(subject, stock.view(views, pose), middle, middle, split(stock, subject, pose), i)
