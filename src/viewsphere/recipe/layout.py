@@ -78,9 +78,7 @@ OnField = (
     | None
 )
 
-ON = (
-    "what they stand on instead of the floor: a surface of scene.place, or {size: [1.2, 0.8], height: 0.75}, a table"
-)
+ON = "what they stand on instead of the floor: a surface of scene.place, or {size: [1.2, 0.8], height: 0.75}, a table"
 
 
 def placer_of(layout: Layout) -> str:

@@ -16,7 +16,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import RngOf
-from viewsphere.sampling.placing._footprint import Footprint, footprint, standing
+from viewsphere.sampling.placing._footprint import Footprint, Outline, footprint, outline, standing
 from viewsphere.sampling.placing._room import Memory, Room, Spot, checked, forgetful
 from viewsphere.sampling.placing._shape import Shape
 from viewsphere.sampling.placing._way import Way
@@ -25,6 +25,7 @@ __all__ = [
     "Draws",
     "Footprint",
     "Memory",
+    "Outline",
     "Piece",
     "Placer",
     "Room",
@@ -35,6 +36,7 @@ __all__ = [
     "draws_of",
     "footprint",
     "forgetful",
+    "outline",
     "standing",
 ]
 
