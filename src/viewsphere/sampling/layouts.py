@@ -135,6 +135,11 @@ def check_layout(layout: Layout, field: str) -> None:
     _module(layout, field)
 
 
+def has_ways(layout: Layout) -> bool:
+    """Whether the placer knows how things came to where they stand."""
+    return hasattr(plugins.load("placers", placer_of(layout)), "ways")
+
+
 def is_slow(layout: Layout) -> bool:
     """Whether where things stand is not asked before frames are rendered."""
     return bool(getattr(plugins.load("placers", placer_of(layout)), "IS_SLOW", False))

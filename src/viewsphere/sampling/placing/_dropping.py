@@ -123,7 +123,7 @@ class Drop:
         calm = world.settle(each=RECORDED, look=film.shoot) if film else world.settle()
         if fences and calm:
             world.take_fences_away()
-            calm = world.settle()
+            calm = world.settle(each=RECORDED, look=film.shoot) if film else world.settle()
         for again in range(0 if film else ROUNDS):
             beside = self._beside(world)
             if not beside:

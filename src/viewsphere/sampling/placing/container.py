@@ -26,7 +26,7 @@ IS_SLOW = True
 FULL = 0.5
 """Share of a box's room that hulls of models which lie as they fall may fill at most; packings of alike ones reach 0.6."""
 
-ROOMY = 0.25
+ROOMY = 0.5
 """Share of its room that the boxes of the models fill of a box whose size is not said."""
 
 
@@ -34,7 +34,7 @@ class Options(Matter):
     """How things fall into a box."""
 
     size: tuple[Drawn[Length], Drawn[Length], Drawn[Length]] | None = Field(
-        default=None, description="[width, length, height] of the box outside, metres; by default four times its models' boxes"
+        default=None, description="[width, length, height] of the box outside, metres; by default twice its models' boxes"
     )
 
 
