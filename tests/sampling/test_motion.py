@@ -28,7 +28,7 @@ from viewsphere.zoo.places.neighbourhood import neighbourhood
 
 BOX = box_vertices((-1.0, -2.0, -0.5), (1.0, 2.0, 0.5))
 PLACED = standing(BOX, 3.0, 4.0, 30.0)
-KINDS = ("clip", "constant", "keyframes", "oscillate", "path", "random", "spline")
+KINDS = ("clip", "constant", "fall", "keyframes", "oscillate", "path", "random", "spline")
 TIMES = np.arange(51) / 25
 LANES = (Lane("there", ((0, -10, 0), (0, 10, 0)), 3), Lane("back", ((-3, 10, 0), (-3, -10, 0)), 3))
 
@@ -440,28 +440,28 @@ def test_a_plan_finds_mistakes_without_a_start():
 
 
 @pytest.fixture(params=["entry point", "file beside the others"])
-def fall(request, tmp_path, monkeypatch):
+def bounce(request, tmp_path, monkeypatch):
     """The motion in the docs, in a package of somebody's or beside ours."""
     if request.param == "entry point":
-        name = "my_fall"
+        name = "my_bounce"
         monkeypatch.syspath_prepend(tmp_path)
-        entry = EntryPoint("fall", name, "viewsphere.motions")
+        entry = EntryPoint("bounce", name, "viewsphere.motions")
         monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
     else:
-        name = "fall"
+        name = "bounce"
         monkeypatch.setattr(motion, "__path__", [*motion.__path__, str(tmp_path)])
     (tmp_path / f"{name}.py").write_text(FALL)
     yield
     for module in (name, f"{motion.__name__}.{name}"):
         sys.modules.pop(module, None)
-    motion.__dict__.pop("fall", None)
+    motion.__dict__.pop("bounce", None)
 
 
-@pytest.mark.usefixtures("fall")
+@pytest.mark.usefixtures("bounce")
 def test_the_motion_in_the_docs_is_one_file():
-    assert plugins.names("motions").count("fall") == 1
+    assert plugins.names("motions").count("bounce") == 1
     times = np.arange(0, 800) / 100
-    found = poses({"kind": "fall", "height": 2, "keeps": 0.5}, {"kind": "constant", "velocity": [1, 0, 0]}, times=times)
+    found = poses({"kind": "bounce", "height": 2, "keeps": 0.5}, {"kind": "constant", "velocity": [1, 0, 0]}, times=times)
     np.testing.assert_allclose(found[:, 0, 3], 3 + times, atol=1e-9)
     height = found[:, 2, 3] - 0.5
     lands = np.sqrt(2 * 2 / 9.81)
@@ -469,8 +469,8 @@ def test_the_motion_in_the_docs_is_one_file():
     np.testing.assert_allclose(height[falling], 2 - 9.81 / 2 * times[falling] ** 2, atol=1e-9)
     assert height[times > lands].max() == pytest.approx(0.5, abs=1e-3)  # half the speed: a quarter of the height
     assert height.min() >= -1e-9 and height[-1] == 0
-    assert mistake({"kind": "fall"}) == f"{WHERE}.height: expected a value; found nothing"
-    drawn = {poses({"kind": "fall", "height": [1, 2]}, key=f"car_{i:03}", times=[0.0])[0, 2, 3] for i in range(9)}
+    assert mistake({"kind": "bounce"}) == f"{WHERE}.height: expected a value; found nothing"
+    drawn = {poses({"kind": "bounce", "height": [1, 2]}, key=f"car_{i:03}", times=[0.0])[0, 2, 3] for i in range(9)}
     assert len(drawn) == 9
 
 

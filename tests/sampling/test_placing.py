@@ -40,7 +40,9 @@ def place(name, boxes, keys, seed=0, names=(), **room):
 
 def alone(name, shapes, keys, seed=0, names=(), **room):
     rng = partial(generator, seed, "layout", *names)
-    return tuple(plugins.load("placers", name).place([spec(key) for key in keys], Room(**room), shapes, (), rng))
+    module = plugins.load("placers", name)
+    options = [module.Options()] if hasattr(module, "Options") else []
+    return tuple(module.place([spec(key) for key in keys], Room(**room), shapes, (), rng, *options))
 
 
 def box(width, length, height=1.0, x=0.0, y=0.0, z=0.0):

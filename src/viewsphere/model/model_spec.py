@@ -35,7 +35,7 @@ class ModelSpec(Brief):
     its file's first frame; which time step it shows, and when, its thing's motion says.
     """
 
-    UNSAID = ("fps", "sidecar", "symmetries", "keypoints", "color", "material")
+    UNSAID = ("fps", "sidecar", "symmetries", "keypoints", "color", "material", "size")
 
     key: str  # unique and stable in the data set: also the name of its folder
     source: str
@@ -54,6 +54,7 @@ class ModelSpec(Brief):
     fps: float | None = None  # frames of an animated file that make a second, where that is not what the file says
     clip: str | None = None  # name of the animation that is played, where the file has several
     shown: tuple[str, ...] = ()  # objects of a .blend file that are read although renders do not show them
+    size: Size | None = None  # that a zoo family is built to, where it can be
     parts: Parts | None = None  # what is taken of it, when it is read and normalised
     sidecar: str | None = None  # absolute path of the file that says symmetries and keypoints, where it is not beside its own
     symmetries: Literal["found"] | None = None  # whether they are looked for where none are declared

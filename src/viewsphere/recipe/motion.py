@@ -27,7 +27,7 @@ class MotionEntry(Frozen):
     __pydantic_extra__: dict[str, JsonValue] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
     kind: str = Field(
-        min_length=1, description="keyframes, spline, constant, random, oscillate, path, clip, or one of your own"
+        min_length=1, description="keyframes, spline, constant, random, oscillate, path, clip, fall, or one of your own"
     )
     enter: Drawn[Number] | None = Field(default=None, description="seconds: before, the thing is not there")
     leave: Drawn[Number] | None = Field(default=None, description="seconds: from then on the thing is not there")

@@ -59,6 +59,7 @@ LATER_FIELDS: dict[tuple[str, ...], Any] = {
     ("scene", "company", "orientation"): "upright",
     ("scenes", "orientation"): "upright",
     ("scenes", "balance"): "models",
+    ("scenes", "on"): None,
     ("files", "shots"): "files",
     ("annotations",): [],
     ("labels",): {},

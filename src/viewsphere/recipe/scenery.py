@@ -5,25 +5,24 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.model_spec import Axis
-from viewsphere.model.numbers import FARTHEST, Length, Metres, Number
+from viewsphere.model.numbers import FARTHEST, Length, Number
 from viewsphere.recipe.draws import CountDrawn, Drawn, is_random, span
+from viewsphere.recipe.layout import LAYOUT, ORIENTATION, Layout, Orientation, Spot, placer_of, spots_of
 from viewsphere.recipe.models import ZOO, Unit
 from viewsphere.recipe.motion import MOTION, MotionField, MotionsField
-from viewsphere.recipe.values import Interval, OrShort, Point, shape_of
+from viewsphere.recipe.values import Interval, OrShort, Point
 
 Draw = Literal["fixed", "per_model", "per_sequence", "per_frame"]
 Labels = Literal["background", "own"]
-Spot = tuple[Metres, Metres, Number]
 
 DRAWS = "one for the whole data set (fixed), one a model (per_model), a sequence (per_sequence) or a frame (per_frame)"
 LABELS = "background, or own: every piece is an object with a category, boxes and a mask"
-ORIENTATION = "upright, or any: turned at random in all directions, uniform over rotations, on the lowest point"
 OF_FILES = ("origin", "up", "forward", "unit", "category")
 
 
@@ -70,24 +69,6 @@ class PlaceEntry(Brief):
         return self
 
 
-def _renamed(value: Any) -> Any:
-    """`random` is an older word for `scatter`; the placer of listed spots is asked for by the list."""
-    if value == "listed":
-        raise ValueError("expected a placer, such as scatter or row, or a list of [x, y, azimuth]; found listed without spots")
-    return "scatter" if value == "random" else value
-
-
-Layout = Annotated[
-    Annotated[str, Tag("text")] | Annotated[tuple[Spot, ...], Field(min_length=1), Tag("list")],
-    Discriminator(
-        shape_of,
-        custom_error_type="layout",
-        custom_error_message="expected a placer, such as scatter or row, or a list of [x, y, azimuth]",
-    ),
-    BeforeValidator(_renamed),
-]
-
-
 class CompanyEntry(Brief):
     """Other models of the recipe, of the same split, beside the one each frame is about."""
 
@@ -96,19 +77,15 @@ class CompanyEntry(Brief):
     count: CountDrawn | None = Field(
         default=None, description="how many, a number, [low, high] or a distribution; not needed where layout is a list"
     )
-    layout: Layout = Field(
-        default="scatter",
-        description="scatter: close by, turned at random; row: side by side; another placer's name; or where each stands: "
-        "[x, y, azimuth in degrees]",
-    )
+    layout: Layout = Field(default="scatter", description=LAYOUT)
     gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
     draw: Draw = Field(default="per_model", description=f"how many, who and where: {DRAWS}")
-    orientation: Literal["upright", "any"] = Field(default="upright", description=ORIENTATION)
+    orientation: Orientation = Field(default="upright", description=ORIENTATION)
     motion: MotionField = Field(default=None, description=f"{MOTION}; of distractors")
 
     @model_validator(mode="after")
     def _check(self) -> CompanyEntry:
-        listed = None if isinstance(self.layout, str) else len(self.layout)
+        listed = len(self.spots) or None
         if self.count is None and listed is None:
             raise ValueError("expected count, or a layout that lists where each stands; found neither")
         if self.count is not None and listed is not None and self.count != listed:
@@ -118,17 +95,17 @@ class CompanyEntry(Brief):
     @property
     def number(self) -> int:
         """Number of distractors, the most where it is drawn."""
-        return int(span(self.count)[1]) if self.count is not None else len(self.layout)
+        return int(span(self.count)[1]) if self.count is not None else len(self.spots)
 
     @property
     def placer(self) -> str:
         """Name of the placer that places the distractors."""
-        return self.layout if isinstance(self.layout, str) else "listed"
+        return placer_of(self.layout)
 
     @property
     def spots(self) -> tuple[Spot, ...]:
         """The listed spots of the distractors; empty where a placer chooses them."""
-        return () if isinstance(self.layout, str) else self.layout
+        return spots_of(self.layout)
 
 
 class Around(Frozen):

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValu
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Number
 from viewsphere.recipe.draws import CountDrawn, Distribution, span
-from viewsphere.recipe.scenery import ORIENTATION, Layout, Spot
+from viewsphere.recipe.layout import LAYOUT, ON, ORIENTATION, Layout, OnField, Orientation, Spot, placer_of, spots_of
 from viewsphere.recipe.values import OrShort
 
 
@@ -26,34 +26,31 @@ class ScenesEntry(Frozen):
     views: Count | None = Field(
         default=None, description="how many of the viewpoints each scene is taken from, drawn for each; by default all"
     )
-    layout: Layout = Field(
-        default="scatter",
-        description="scatter: close by, turned at random; row: side by side; another placer's name; or where each stands: "
-        "[x, y, azimuth in degrees]",
-    )
+    layout: Layout = Field(default="scatter", description=LAYOUT)
     gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
     balance: Literal["models", "category"] = Field(
         default="models",
         description="models: none is drawn more than another; category: each category has as many objects as any other, to "
         "one, over all scenes (of a split, where splits are by model), as far as it has models enough for a scene",
     )
-    orientation: Literal["upright", "any"] = Field(default="upright", description=ORIENTATION)
+    orientation: Orientation = Field(default="upright", description=ORIENTATION)
+    on: OnField = Field(default=None, description=ON)
 
     @model_validator(mode="after")
     def _check(self) -> ScenesEntry:
-        if not isinstance(self.layout, str) and span(self.objects) != (len(self.layout),) * 2:
-            raise ValueError(f"expected objects: {len(self.layout)}, as many as the layout lists; found another number")
+        if self.spots and span(self.objects) != (len(self.spots),) * 2:
+            raise ValueError(f"expected objects: {len(self.spots)}, as many as the layout lists; found another number")
         return self
 
     @property
     def placer(self) -> str:
         """Name of the placer."""
-        return self.layout if isinstance(self.layout, str) else "listed"
+        return placer_of(self.layout)
 
     @property
     def spots(self) -> tuple[Spot, ...]:
         """Where each stands, as far as the recipe says."""
-        return () if isinstance(self.layout, str) else self.layout
+        return spots_of(self.layout)
 
     @property
     def most_objects(self) -> int:

@@ -109,7 +109,7 @@ def generate(
         raise UserError(
             f"{store.root}: expected workers 0, as other processes do not see this process's memory; found {workers}"
         )
-    portion = replace(to_append(planned, store) if append else to_render(planned, store), share=share)
+    portion = replace(to_append(planned, store) if append else to_render(planned, store), share=share).remembering(store)
     wanted += _others(wanted, store) if portion.number else ()
     check_formats(planned, wanted, portion.record.channels)
     with recipe.located(), _at_work(portion, store) as pulse:

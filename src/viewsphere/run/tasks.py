@@ -63,7 +63,7 @@ class Worker:
         self.store = Store(root)
         self.stages = Stages()
         self.models = Models(self.store, self.stages, portion.record)
-        self._portion = portion
+        self._portion = portion.remembering(self.store)
         self._framing = Framing(portion.plan.recipe, self.stages)
         self._boxes = StoredBoxes(self.store)
         self._digests: dict[str, str] = {}

@@ -21,6 +21,7 @@ from viewsphere.recipe.rig import SensorList
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
 from viewsphere.recipe.viewpoints import Jitter, Normal, Sphere
+from viewsphere.sampling.layouts import check_layout
 from viewsphere.sampling.models import count_models
 from viewsphere.sampling.viewpoints import Poses
 
@@ -53,13 +54,13 @@ def check_names(recipe: Recipe) -> None:
         if entry.options:
             entry.arguments(f"formats[{i}].{entry.name}")
     company = recipe.scene.company
-    if company is not None and company.placer not in (placers := plugins.names("placers")):
-        raise RecipeError(f"scene.company.layout: {one_of(company.placer, placers)}")
+    if company is not None:
+        check_layout(company.layout, "scene.company")
     samplers = plugins.names("samplers")
     if recipe.sampler not in samplers:
         raise RecipeError(f"scenes.sampler: {one_of(recipe.sampler, samplers)}")
-    if isinstance(recipe.scenes, ScenesEntry) and recipe.scenes.placer not in (placers := plugins.names("placers")):
-        raise RecipeError(f"scenes.layout: {one_of(recipe.scenes.placer, placers)}")
+    if isinstance(recipe.scenes, ScenesEntry):
+        check_layout(recipe.scenes.layout, "scenes")
     for i, name in enumerate(recipe.channels):
         if name in on_request():
             raise RecipeError(f"channels[{i}]: expected a channel; found {name}, which is one of annotations")

@@ -6,32 +6,29 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from viewsphere import plugins
-from viewsphere.assets.cache import load_normalised
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.rotation import random_rotation, rigid, transform
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4, Vector
-from viewsphere.model.thing import Motion, Thing, TimeStep
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.cast import companions
-from viewsphere.sampling.placing import Draws, Footprint, Placer, Room, Shape, footprint, standing
+from viewsphere.sampling.layouts import BoxOf, Laid, Remembering, laid, remembered_as, shape, unremembered
+from viewsphere.sampling.placing import Footprint, Room, footprint, standing
 from viewsphere.sampling.scenery import (
     SceneryPiece,
-    composed,
     draw_names,
     draw_place,
     free_floor,
     place_lanes,
     place_pieces,
+    place_surfaces,
     plane_images,
     plane_pieces,
     plane_spec,
@@ -42,17 +39,9 @@ from viewsphere.sampling.sequence_poses import SequencePoses
 from viewsphere.sampling.time_steps import Schedule, TimedPoses
 from viewsphere.sampling.viewpoints import Poses
 from viewsphere.store import Category
-from viewsphere.zoo import build_zoo_model
-from viewsphere.zoo.places import Lane
+from viewsphere.zoo.places import Lane, Surface
 
-
-class BoxOf(Protocol):
-    """Gives the 3D box (8, 3) of a normalised model at a time step (None: as it rests) in its own axes, metres."""
-
-    def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> NDArray[np.float64]:
-        """The box, float64."""
-        ...
-
+__all__ = ["BoxOf", "Composition", "Moved", "Numbering", "center", "center_of_all", "compose", "still"]
 
 Moved = Callable[[Thing, SceneryPiece], Thing]
 """A piece of scenery with its motion."""
@@ -149,20 +138,30 @@ class Composition(Sendable):
             count = drawn(entry.count, scene_generators(self.recipe.seed, names), ("company", "count"))
         return (spec, *companions(self.recipe.seed, spec, self.groups[spec.key], count, names))
 
-    def targets(self, spec: ModelSpec, pose: str | None, box_of: BoxOf, again: Names = ()) -> tuple[Thing, ...]:
+    def targets(
+        self, spec: ModelSpec, pose: str | None, box_of: BoxOf, again: Names = (), memory: Remembering = unremembered
+    ) -> tuple[Thing, ...]:
         """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room. `again`
         names another draw of where company stands.
         """
         own = standing(box_of(spec))
-        cast, poses = (spec,), [own]
+        company = self.company(spec, pose, box_of, own, again, memory)
+        return still((spec,), [own]) if company is None else still((spec, *company.members), [own, *company.poses])
+
+    def company(
+        self, spec: ModelSpec, pose: str | None, box_of: BoxOf, own: Matrix4, again: Names, memory: Remembering
+    ) -> Laid | None:
+        """What is placed beside a frame's model that stands there; None where nothing is."""
         entry = self.recipe.scene.company
-        if entry is not None:
-            cast = self.cast(spec, pose)
-            taken = ((shape(spec, box_of), own),)
-            room = Room(self.free_floor(spec.key, pose), entry.gap, entry.spots, taken, "scene.company")
-            rng = partial(generator, self.recipe.seed, "layout", *draw_names(entry.draw, spec.key, pose), *again)
-            poses += placed(entry.placer, cast[1:], room, box_of, rng, entry.orientation)
-        return still(cast, poses)
+        if entry is None:
+            return None
+        cast, names = self.cast(spec, pose)[1:], (*draw_names(entry.draw, spec.key, pose), *again)
+        taken = ((shape(spec, box_of), own),)
+        keep = partial(memory, remembered_as(entry, cast, ("company", spec.key, *names)))
+        free, moves = self.free_floor(spec.key, pose), self.recipe.time is not None
+        room = Room(free, entry.gap, entry.spots, taken, "scene.company", memory=keep, moves=moves)
+        rng = partial(generator, self.recipe.seed, "layout", *names)
+        return laid(entry.layout, entry.orientation, cast, room, box_of, rng)
 
     def free_floor(self, subject: str, pose: str | None) -> Footprint | None:
         """The floor that the place leaves free, None for all of it."""
@@ -173,6 +172,11 @@ class Composition(Sendable):
         """The lanes of the place where it stands, world axes; none where it has none."""
         place = self.recipe.scene.place
         return place_lanes(self.recipe, place, draw_names(place.draw, subject, pose)) if place else ()
+
+    def surfaces(self, subject: str, pose: str | None) -> tuple[Surface, ...]:
+        """Where things may stand above the floor of the place, world axes; none where it has none."""
+        place = self.recipe.scene.place
+        return place_surfaces(self.recipe, place, draw_names(place.draw, subject, pose)) if place else ()
 
     def things(
         self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf, moved: Moved = _as_it_stands
@@ -286,27 +290,6 @@ def compose(
     return made
 
 
-def placed(
-    placer: str, cast: Sequence[ModelSpec], room: Room, box_of: BoxOf, rng: Draws, orientation: str = "upright"
-) -> Sequence[Matrix4]:
-    """Where the placer of this name puts the models, upright or turned to `any` side before; raises RecipeError where there is
-    no room.
-    """
-    module: Placer = plugins.load("placers", placer)
-    shapes = [shape(spec, box_of) for spec in cast]
-    if orientation == "upright":
-        return module.place(cast, room, shapes, (), rng)
-    turns = [random_rotation(rng("orientation", str(slot), spec.key)) for slot, spec in enumerate(cast)]
-    turned = [one.turned(turn) for one, turn in zip(shapes, turns, strict=True)]
-    poses = module.place(cast, room, turned, (), rng)
-    return [composed(pose, rigid(turn, (0.0, 0.0, 0.0))) for pose, turn in zip(poses, turns, strict=True)]
-
-
-def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
-    """A model's shape for a placer."""
-    return Shape(box_of(spec), partial(_vertices, spec))
-
-
 def still(cast: Sequence[ModelSpec], poses: Sequence[Matrix4]) -> tuple[Thing, ...]:
     """Objects 1, 2, ... that stand still."""
     return tuple(Thing(id=i, model=m, motion=Motion.still(w)) for i, (m, w) in enumerate(zip(cast, poses, strict=True), 1))
@@ -323,11 +306,6 @@ def center_of_all(things: Sequence[Thing], box_of: BoxOf) -> Vector:
     corners = np.concatenate([transform(t.world_from_object, box_of(t.model, t.step)) for t in things])
     x, y, z = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
     return x, y, z
-
-
-def _vertices(spec: ModelSpec) -> NDArray[np.float64]:
-    """Those of the normalised model, (N, 3); raises ModelError if its file cannot be used."""
-    return load_normalised(spec, build_zoo_model).vertices.astype(np.float64)
 
 
 def _blend(recipe: Recipe, numbering: Numbering) -> BlendScenery | None:

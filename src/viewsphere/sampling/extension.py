@@ -35,7 +35,7 @@ from viewsphere.sampling.pose_numbers import (
     numbered,
 )
 from viewsphere.sampling.sendable import Sendable
-from viewsphere.store import Block, Category, Part, PlanRecord, Row
+from viewsphere.store import Block, Category, Part, PlanRecord, Row, Simulated, Store
 from viewsphere.store.index import Index, Ranges, numbers
 
 
@@ -60,6 +60,10 @@ class Portion(Sendable):
     def adds_nothing(self) -> bool:
         """Whether all that its recipe asks for was there before."""
         return not self.part.frames and not self.part.supplies
+
+    def remembering(self, store: Store) -> Portion:
+        """The same portion, which keeps in the store what is simulated for it."""
+        return replace(self, plan=self.plan.changed(memory=Simulated(store.root)))
 
     def __str__(self) -> str:
         """What the part adds, in words."""

@@ -44,7 +44,7 @@ class Shape:
     is_used: NDArray[np.bool_]
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> Shape:
     """The shape of a model at a time step; the last ones are kept. Raises ModelError if its file cannot be used."""
     spec, step = shown

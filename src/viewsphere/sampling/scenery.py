@@ -30,7 +30,7 @@ from viewsphere.recipe.scenery import Labels, PlaceEntry, PlaneEntry
 from viewsphere.sampling.pictures import IMAGE_SUFFIXES, files_in, proportions
 from viewsphere.sampling.placing import Footprint, footprint, standing
 from viewsphere.sampling.seeds import Names, generator, scene_generators, share
-from viewsphere.zoo.places import Lane
+from viewsphere.zoo.places import Lane, Surface
 
 TRIES = 200
 """Spots that are tried for one plane."""
@@ -126,6 +126,15 @@ def place_lanes(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple
         return ()
     world_from_place = np.array(_turned(recipe, entry, names))
     return tuple(_carried(lane, world_from_place) for lane in draw_place(recipe.seed, entry.name, names).lanes)
+
+
+def place_surfaces(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Surface, ...]:
+    """Where things may stand above the floor of a place, world axes; none where it has none."""
+    if entry is None or not entry.name:
+        return ()
+    world_from_place = _turned(recipe, entry, names)
+    laid = getattr(draw_place(recipe.seed, entry.name, names), "surfaces", ())
+    return tuple(replace(one, world_from_surface=composed(world_from_place, one.world_from_surface)) for one in laid)
 
 
 def _carried(lane: Lane, world_from_place: NDArray[np.float64]) -> Lane:

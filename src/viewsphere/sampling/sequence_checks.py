@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.thing import Thing
+from viewsphere.recipe.scenes import ScenesEntry
+from viewsphere.sampling.layouts import has_ways
 from viewsphere.sampling.motion import Lane
 from viewsphere.sampling.samplers._course import no_such_thing, piece_moving, target_moving, time_of
 from viewsphere.sampling.scenery import SCENERY, SceneryPiece, draw_names, place_pieces
@@ -71,10 +74,19 @@ def _check_thing(planned: Plan, wanted: int | str, cast: Sequence[ModelSpec]) ->
 def _check_motions(planned: Plan, subject: str, cast: Sequence[ModelSpec], lanes: tuple[Lane, ...], checked: set[str]) -> None:
     """Make the motions of models, each model's once."""
     names = (subject, planned.pose_list.place(0))
+    company, scenes = planned.recipe.scene.company, planned.recipe.scenes
+    entry = scenes if isinstance(scenes, ScenesEntry) else company
+    falls = entry is not None and has_ways(entry.layout)
     for slot, spec in enumerate(cast):
         if spec.key not in checked:
             checked.add(spec.key)
-            target_moving(planned, Thing(id=slot + 1, model=spec), slot, names, lanes)
+            way = _nowhere if falls and (slot or scenes is not None) else None
+            target_moving(planned, Thing(id=slot + 1, model=spec), slot, names, lanes, way)
+
+
+def _nowhere(seconds: float) -> Matrix4:
+    """Where a thing is on a way that nobody asked for yet."""
+    return IDENTITY
 
 
 def _check_pieces(planned: Plan) -> None:

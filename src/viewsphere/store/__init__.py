@@ -21,6 +21,7 @@ from viewsphere.store.exported import Exported
 from viewsphere.store.folder import Store, new_folder
 from viewsphere.store.index import Block, Row
 from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord
+from viewsphere.store.simulated import Simulated
 from viewsphere.store.watching import Finished, Watch
 from viewsphere.urls import located
 
@@ -35,6 +36,7 @@ __all__ = [
     "Part",
     "PlanRecord",
     "Row",
+    "Simulated",
     "Store",
     "Watch",
     "check_codecs",

@@ -1,8 +1,9 @@
 """Procedural models that ship with the tool, in metres, front -Y, up +Z, standing on z = 0.
 
 A family is one module of this package, named as its file: `NAME(...)` builds a Mesh from parameters and `NAME_random(rng)`
-draws the parameters. `HOME` says where its members are found, `KEYPOINTS` are its named points by its parts, and `SKELETON`
-lines between them. Sub-packages hold the parts that families are built from.
+draws the parameters; `NAME_sized(rng, (width, height, length))`, where a family has it, draws those that its size leaves open.
+`HOME` says where its members are found, `KEYPOINTS` are its named points by its parts, and `SKELETON` lines between them.
+Sub-packages hold the parts that families are built from.
 """
 
 from __future__ import annotations
@@ -48,10 +49,11 @@ def build(family: str, rng: np.random.Generator) -> Mesh:
 
 
 def build_zoo_model(spec: ModelSpec) -> Mesh:
-    """The procedural model that a `zoo:family` source names, drawn from its seed."""
+    """The procedural model that a `zoo:family` source names, drawn from its seed, and built to the size that it asks for."""
     import numpy as np
 
-    return build(spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed))
+    family, rng = spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed)
+    return build(family, rng) if spec.size is None else getattr(plugins.family(family), f"{family}_sized")(rng, spec.size)
 
 
 def rooms_of(spec: ModelSpec) -> tuple[NDArray[np.float64], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -55,7 +56,8 @@ class Start:
 
     placed: world from object as the thing's placer put it; seconds: length of the sequence; rng: a generator for what is drawn
     for these names; lanes: of the place, world axes; timeline: frames of the model's file while its clip plays, None where it
-    has none; field: the recipe's, which messages begin with.
+    has none; field: the recipe's, which messages begin with; way: where it was at a time, seconds from its first, on the way to
+    where it is placed, None where it was put there at once.
     """
 
     placed: Matrix4
@@ -65,6 +67,7 @@ class Start:
     lanes: tuple[Lane, ...] = ()
     timeline: Timeline | None = None
     field: str = "models[0].motion"
+    way: Callable[[float], Matrix4] | None = None
 
     def playing(self, timeline: Timeline | None, field: str) -> Start:
         """The same of a thing whose file has this timeline, and whose motion stands in this field of the recipe."""

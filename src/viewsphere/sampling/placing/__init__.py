@@ -7,18 +7,38 @@ What a placer needs stands here: what it is asked (`Room`, `Shape`, `Draws`), an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
-from viewsphere.sampling.placing._footprint import Footprint, footprint, standing
-from viewsphere.sampling.placing._room import Room, Spot, checked
+from viewsphere.recipe.draws import RngOf
+from viewsphere.sampling.placing._footprint import Footprint, Outline, footprint, outline, standing
+from viewsphere.sampling.placing._room import Memory, Room, Spot, checked, forgetful
 from viewsphere.sampling.placing._shape import Shape
+from viewsphere.sampling.placing._way import Way
 
-__all__ = ["Draws", "Footprint", "Placer", "Room", "Shape", "Spot", "checked", "footprint", "standing"]
+__all__ = [
+    "Draws",
+    "Footprint",
+    "Memory",
+    "Outline",
+    "Piece",
+    "Placer",
+    "Room",
+    "Shape",
+    "Spot",
+    "Way",
+    "checked",
+    "draws_of",
+    "footprint",
+    "forgetful",
+    "outline",
+    "standing",
+]
 
 
 class Draws(Protocol):
@@ -31,11 +51,33 @@ class Draws(Protocol):
         ...
 
 
+def draws_of(rng: Draws, *names: str) -> RngOf:
+    """What the distributions among a placer's options are drawn with, for these names, such as a slot and a model's key."""
+    return lambda path: rng("option", ".".join(path), *names)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece of scenery that a placer needs: a member of a zoo family that is built to a size, (width, height, length) in
+    metres, and where it stands.
+    """
+
+    family: str
+    size: tuple[float, float, float]
+    world_from_piece: Matrix4
+
+
 class Placer(Protocol):
-    """A module that places things."""
+    """A module that places things. One with options has a class of them, `Options`, whose fields may be distributions; its
+    functions are given one, nothing of it drawn, as their last argument.
+
+    `around(cast, room, shapes, rng[, options])`, if there, gives the pieces of scenery that things stand in.
+    `ways(cast, room, shapes, rng[, options])`, if there, gives the `Way` of each to its place.
+    `IS_SLOW = True`: where things stand is not asked before frames are rendered.
+    """
 
     def place(
-        self, cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws
+        self, cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, *options: Any
     ) -> Sequence[Matrix4]:
         """World from object for each member of the cast, metres, rigid; `shapes[i]` is that of `cast[i]`.
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.geometry.hull import convex_hull
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.scene import Matrix4
 
 Float = NDArray[np.float64]
@@ -30,7 +32,7 @@ class Footprint:
                 return True
         return False
 
-    def contains(self, other: Footprint) -> bool:
+    def contains(self, other: Footprint | Outline) -> bool:
         """Whether all of the other lies in this one."""
         return bool((np.abs((other.corners - self.center) @ self.axes.T) <= self.half + 1e-9).all())
 
@@ -39,6 +41,29 @@ class Footprint:
         """The four corners, (4, 2)."""
         a, b = self.axes * self.half[:, None]
         return self.center + np.array([a + b, a - b, -a - b, b - a])
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A convex polygon on the floor: its corners (N, 2), counter-clockwise; metres."""
+
+    corners: Float
+
+    def apart(self, other: Outline, gap: float) -> bool:
+        """Whether a side of one of the two separates them by at least `gap`: then nothing of them is nearer than that."""
+        for polygon in (self.corners, other.corners):
+            sides = np.roll(polygon, -1, axis=0) - polygon
+            axes = sides[:, ::-1] * (1, -1) / np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), 1e-12)
+            a, b = self.corners @ axes.T, other.corners @ axes.T
+            between = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
+            if between.max() >= gap - 1e-9:
+                return True
+        return False
+
+
+def outline(points: Float, world_from_object: Matrix4) -> Outline:
+    """What points (N, 3) of a model, in its own axes, cover of the floor together, as seen from above."""
+    return Outline(convex_hull(transform(np.array(world_from_object), points)[:, :2]))
 
 
 def footprint(box: Float, world_from_object: Matrix4) -> Footprint:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
@@ -15,11 +16,24 @@ Spot = tuple[float, float, float]
 """(x, y) on the floor, metres, and the azimuth that a front faces there, degrees."""
 
 
+Memory = Callable[[Callable[[], Any]], Any]
+"""Gives the plain data that the function makes, or what it made when it was first asked for the same, on any machine."""
+
+
+def forgetful(make: Callable[[], Any]) -> Any:
+    """What the function makes now."""
+    return make()
+
+
 @dataclass(frozen=True, eq=False)
 class Room:
     """What there is room in: the floor that is free (None: all of it), the metres that stay free between any two things, at
     least, the spots that the recipe names, what stands there before (the model that company joins, at the origin, facing -Y),
     and the recipe's field that asks for all this, which messages begin with.
+
+    `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it; `clearance`: metres
+    of air above, None where it has no end; `memory`: keeps what is simulated; `moves`: whether it is asked how things came
+    to where they stand, too.
     """
 
     free: Footprint | None = None
@@ -27,6 +41,10 @@ class Room:
     spots: tuple[Spot, ...] = ()
     taken: tuple[tuple[Shape, Matrix4], ...] = ()
     field: str = "scene.company"
+    below: float = 0.0
+    clearance: float | None = None
+    memory: Memory = forgetful
+    moves: bool = False
 
     @property
     def prints(self) -> tuple[Footprint, ...]:

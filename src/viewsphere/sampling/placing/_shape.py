@@ -16,19 +16,33 @@ from viewsphere.geometry.rotation import transform
 Float = NDArray[np.float64]
 
 
+Surface = tuple[Float, NDArray[np.int32]]
+
+
 @dataclass(frozen=True, eq=False)
 class Shape:
     """A model's shape in its own axes, metres: its box (8, 3), and its convex hull, for which `vertices` is asked when it is
-    first needed: it gives those of the model's mesh, (N, 3).
+    first needed: it gives those of the model's mesh, (N, 3). `surface` gives them with the mesh's triangles (M, 3).
     """
 
     box: Float
     vertices: Callable[[], Float]
+    surface: Callable[[], Surface] | None = None
 
     def turned(self, rotation: Float) -> Shape:
         """The shape turned by a rotation (3, 3) in its own axes; raises ModelError if the model's file cannot be used."""
-        points = transform(rotation, self.vertices())
-        return Shape(box_vertices(points.min(axis=0), points.max(axis=0)), lambda: points)
+        points, surface = transform(rotation, self.vertices()), self.surface
+
+        def turned_surface() -> Surface:
+            vertices, triangles = surface() if surface else (self.vertices(), np.zeros((0, 3), np.int32))
+            return transform(rotation, vertices), triangles
+
+        return Shape(box_vertices(points.min(axis=0), points.max(axis=0)), lambda: points, turned_surface)
+
+    @property
+    def length(self) -> float:
+        """Of its box's longest side, metres."""
+        return float((self.box.max(axis=0) - self.box.min(axis=0)).max())
 
     @cached_property
     def hull(self) -> Float:

@@ -2,55 +2,56 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.hull import convex_hull
 from viewsphere.model.camera import Camera
+from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
-from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, footprint, standing
+from viewsphere.sampling.placing import Draws, Room, Shape, footprint, outline
+from viewsphere.sampling.placing._spot import free_spot
 
-TRIES = 2000
-"""Spots that are tried for one model; the circle they lie in grows with each."""
 
-GROWTH = 0.01
+class Options(Frozen):
+    """How near to one another."""
+
+    between: Literal["boxes", "hulls"] = Field(
+        default="boxes",
+        description="what the gap is between: boxes, or hulls, as seen from above, which lets models stand closer together",
+    )
 
 
 def place(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses, no two boxes nearer than the room's gap; raises RecipeError where no spot is found for one.
+    """Poses, no two boxes, or hulls, nearer than the room's gap; raises RecipeError where no spot is found for one.
 
     Each member's draws are for its slot and its key.
     """
     poses: list[Matrix4] = []
-    prints = list(room.prints)
+    of_hulls = options.between == "hulls"
+    prints: list[Any] = [outline(shape.vertices(), pose) for shape, pose in room.taken] if of_hulls else list(room.prints)
     for slot, (spec, shape) in enumerate(zip(cast, shapes, strict=True)):
-        pose = _pose(rng(str(slot), spec.key), room, shape, prints)
+        cover = partial(outline, _seen_from_above(shape)) if of_hulls else partial(footprint, shape.box)
+        pose = free_spot(rng(str(slot), spec.key), room, shape.box, prints, cover if of_hulls else None)
         if pose is None:
             raise RecipeError(
                 f"{room.field}: expected room for {len(prints) + len(cast) - slot} models; found none for {spec.key}: ask for "
                 "fewer, or for a smaller gap"
             )
         poses.append(pose)
-        prints.append(footprint(shape.box, pose))
+        prints.append(cover(pose))
     return poses
 
 
-def _pose(rng: np.random.Generator, room: Room, shape: Shape, others: Sequence[Footprint]) -> Matrix4 | None:
-    """A pose clear of the others, on the free floor; None where none is found."""
-    box, free = shape.box, room.free
-    radius = float(others[0].half.min() + (box[4] - box[2])[:2].min() / 2) + room.gap if others else 0.0  # none is nearer
-    widest = math.inf if free is None else float(np.linalg.norm(free.corners, axis=1).max())
-    for _ in range(TRIES):
-        turn, far, azimuth = rng.random(3)
-        x, y = (radius * math.sqrt(far) * f(2 * math.pi * turn) for f in (math.cos, math.sin))
-        pose = standing(box, x, y, 360.0 * float(azimuth))
-        own = footprint(box, pose)
-        if (free is None or free.contains(own)) and all(own.apart(other, room.gap) for other in others):
-            return pose
-        radius = min((1 + GROWTH) * radius, widest)
-    return None
+def _seen_from_above(shape: Shape) -> NDArray[np.float64]:
+    """Points (N, 3) of a model that cover as much of the floor as all of it, however it is turned about the vertical."""
+    return np.insert(convex_hull(shape.vertices()[:, :2]), 2, 0.0, axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -11,7 +11,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Vector
+from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.sequence import TimeEntry
@@ -19,13 +19,16 @@ from viewsphere.sampling.composition import BoxOf, center, center_of_all, still
 from viewsphere.sampling.motion import Lane, Start, mover
 from viewsphere.sampling.placing import standing
 from viewsphere.sampling.samplers._moving import Moving
-from viewsphere.sampling.samplers._random import scene_things
+from viewsphere.sampling.samplers._random import scene_around, scene_laid, scene_things
 from viewsphere.sampling.samplers._stock import Stock
 from viewsphere.sampling.scenery import SceneryPiece
 from viewsphere.sampling.seeds import Names, generator
 from viewsphere.sampling.sequence_poses import TrajectoryPoses
 from viewsphere.sampling.trajectories import RigPose, World, shaken
 from viewsphere.sampling.trajectories import standing as steady
+
+Way = Callable[[float], Matrix4]
+"""Where a thing was at a time, seconds, on the way to where it is placed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +89,11 @@ def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
     things = targets
     if stock.composition is not None:
         things = stock.composition.things(subject, targets, around, box_of, piece_moved)
-    own = [target_moving(stock, thing, i, names, lanes) for i, thing in enumerate(targets)]
+    ways = target_ways(stock, subject, around, box_of)
+    if stock.recipe.scenes is not None:
+        around_them = scene_around(stock, subject, around, box_of)
+        things, pieces = (*things, *around_them), [*pieces, *[None] * len(around_them)]
+    own = [target_moving(stock, thing, i, names, lanes, way) for (i, thing), way in zip(enumerate(targets), ways, strict=True)]
     made = Course(stock.repainted(things, subject, start), (*own, *pieces), focus, None)
     return replace(made, rig=_rig(stock, made, subject, start, lanes, box_of))
 
@@ -97,8 +104,22 @@ def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) 
         return scene_things(stock, subject, pose, box_of)
     spec = stock.spec(subject)
     if stock.composition is not None:
-        return stock.composition.targets(spec, pose, box_of)
+        return stock.composition.targets(spec, pose, box_of, memory=stock.memory)
     return still((spec,), (standing(box_of(spec)),))
+
+
+def target_ways(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Way | None, ...]:
+    """How each target of a sequence came to where it is placed, None for one that was put there at once."""
+    if stock.recipe.scenes is not None:
+        made = scene_laid(stock, subject, pose, box_of)
+        return tuple(way.at for way in made.ways) or (None,) * len(made.members)
+    spec = stock.spec(subject)
+    company = None
+    if stock.composition is not None:
+        company = stock.composition.company(spec, pose, box_of, standing(box_of(spec)), (), stock.memory)
+    if company is None:
+        return (None,)
+    return (None, *(tuple(way.at for way in company.ways) or (None,) * len(company.members)))
 
 
 def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
@@ -106,9 +127,11 @@ def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
     return center(things[0], box_of) if len(things) == 1 else center_of_all(things, box_of)
 
 
-def target_moving(stock: Stock, thing: Thing, slot: int, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
+def target_moving(
+    stock: Stock, thing: Thing, slot: int, names: Names, lanes: tuple[Lane, ...], way: Way | None = None
+) -> Moving | None:
     """What moves a target, the one of this number, in the sequence of these names; None where it stands still."""
-    return _moving(stock, thing, *_motions(stock, thing.model, slot), (*names, str(slot), thing.model.key), lanes)
+    return _moving(stock, thing, *_motions(stock, thing.model, slot), (*names, str(slot), thing.model.key), lanes, way)
 
 
 def piece_moving(stock: Stock, thing: Thing, piece: SceneryPiece, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
@@ -117,7 +140,13 @@ def piece_moving(stock: Stock, thing: Thing, piece: SceneryPiece, names: Names, 
 
 
 def _moving(
-    stock: Stock, thing: Thing, motions: Motions | None, field: str, names: Names, lanes: tuple[Lane, ...]
+    stock: Stock,
+    thing: Thing,
+    motions: Motions | None,
+    field: str,
+    names: Names,
+    lanes: tuple[Lane, ...],
+    way: Way | None = None,
 ) -> Moving | None:
     """What moves a thing, drawn for these names; None where it stands still."""
     if motions is None:
@@ -125,7 +154,7 @@ def _moving(
     time, rng = time_of(stock), partial(generator, stock.recipe.seed, "motion", *names)
     place = stock.position.get(thing.model.key)
     line = None if place is None else stock.timelines[place]
-    start = Start(thing.world_from_object, thing.model, time.at(time.count - 1), rng, lanes)
+    start = Start(thing.world_from_object, thing.model, time.at(time.count - 1), rng, lanes, way=way)
     return Moving(mover(motions, start.playing(line, field)), time)
 
 

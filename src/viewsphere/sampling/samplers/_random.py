@@ -10,17 +10,28 @@ from collections.abc import Sequence
 from functools import lru_cache, partial
 
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.box import box_vertices
+from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.thing import Thing
+from viewsphere.model.scene import IDENTITY
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.draws import drawn
+from viewsphere.recipe.layout import SurfaceEntry
+from viewsphere.recipe.models import ZOO
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.sampling.cast import balanced, mixed
-from viewsphere.sampling.composition import BoxOf, placed, still
-from viewsphere.sampling.placing import Room
+from viewsphere.sampling.composition import BoxOf, still
+from viewsphere.sampling.layouts import Laid, laid, remembered_as
+from viewsphere.sampling.placing import Piece, Room, footprint
 from viewsphere.sampling.samplers._stock import Stock
+from viewsphere.sampling.scenery import draw_names, place_surfaces, scenery_key
 from viewsphere.sampling.seeds import generator, share, shares
 from viewsphere.sampling.splits import drawn_split, shared
+from viewsphere.zoo.places import Surface
+
+LOOKS = 8
+"""Looks of one piece of scenery."""
 
 
 def scenes_entry(recipe: Recipe) -> ScenesEntry:
@@ -39,6 +50,7 @@ def scene_names(recipe: Recipe) -> tuple[str, ...]:
             f"scenes.count: expected at most {recipe.max_frames:,} frames; found {count:,} scenes: set max_frames: {count} in "
             "the recipe if that is meant"
         )
+    check_surface(recipe)
     return tuple(f"scene-{number:06d}" for number in range(count))
 
 
@@ -91,12 +103,91 @@ def scene_split(stock: Stock, subject: str) -> str:
     return drawn_split(_shares(stock.untried or stock), stock.recipe.lasting_seed, (subject,))
 
 
+@lru_cache(maxsize=4)
+def scene_laid(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
+    """The models of a scene as its layout places them; the last ones are kept."""
+    recipe, entry, models = stock.recipe, scenes_entry(stock.recipe), scene_cast(stock, subject)
+    free = None if stock.composition is None else stock.composition.free_floor(subject, pose)
+    stand = surface(stock, subject, pose)
+    if stand is not None:
+        free = footprint(
+            box_vertices((-stand.size[0] / 2, -stand.size[1] / 2, 0), (stand.size[0] / 2, stand.size[1] / 2, 0)), IDENTITY
+        )
+    names = ("scene", subject) if pose is None else ("scene", subject, pose)
+    room = Room(
+        free,
+        entry.gap,
+        entry.spots,
+        field="scenes",
+        below=0.0 if stand is None else stand.world_from_surface[2][3],
+        clearance=None if stand is None else stand.clearance,
+        memory=partial(stock.memory, remembered_as(entry, models, names)),
+        moves=recipe.time is not None,
+    )
+    world_from_room = IDENTITY if stand is None else stand.world_from_surface
+    rng = partial(generator, recipe.seed, "layout", subject)
+    return laid(entry.layout, entry.orientation, models, room, box_of, rng, world_from_room)
+
+
 def scene_things(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """The models of a scene where they stand; raises RecipeError where there is no room."""
-    entry, models = scenes_entry(stock.recipe), scene_cast(stock, subject)
-    free = None if stock.composition is None else stock.composition.free_floor(subject, pose)
-    room, rng = Room(free, entry.gap, entry.spots, field="scenes"), partial(generator, stock.recipe.seed, "layout", subject)
-    return still(models, placed(entry.placer, models, room, box_of, rng, entry.orientation))
+    made = scene_laid(stock, subject, pose, box_of)
+    return still(made.members, made.poses)
+
+
+def scene_around(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+    """What the models of a scene stand on or in that comes with their layout: background."""
+    pieces = list(scene_laid(stock, subject, pose, box_of).around)
+    on, seed = scenes_entry(stock.recipe).on, stock.recipe.seed
+    if isinstance(on, SurfaceEntry):
+        pieces.append(Piece("plain_table", (on.size[0], on.height, on.size[1]), IDENTITY))
+    return tuple(
+        Thing(id=0, model=_spec(piece, seed, subject), motion=Motion.still(piece.world_from_piece), scenery=True)
+        for piece in pieces
+    )
+
+
+def _spec(piece: Piece, seed: int, subject: str) -> ModelSpec:
+    """The model of a piece of scenery, one of a few looks that are drawn for the scene."""
+    look = int(generator(seed, "piece", subject, piece.family).integers(LOOKS))
+    return ModelSpec(
+        key=scenery_key(piece.family, f"{piece.size} {look}"),
+        source=ZOO + piece.family,
+        seed=look,
+        category=piece.family,
+        category_id=0,
+        centring="as_is",
+        size=piece.size,
+    )
+
+
+def check_surface(recipe: Recipe) -> None:
+    """Raise RecipeError where models are to stand on a surface that the place does not have."""
+    on, place = scenes_entry(recipe).on, recipe.scene.place
+    if isinstance(on, str):
+        names = () if place is None else draw_names(place.draw, "scene-000000", "")
+        _named(on, place_surfaces(recipe, place, names))
+
+
+def surface(stock: Stock, subject: str, pose: str | None) -> Surface | None:
+    """What the models of a scene stand on, world axes; None for the floor. Raises RecipeError for one that is not there."""
+    on = scenes_entry(stock.recipe).on
+    if on is None:
+        return None
+    if isinstance(on, SurfaceEntry):
+        return Surface("on", ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, on.height), (0, 0, 0, 1)), on.size)
+    return _named(on, () if stock.composition is None else stock.composition.surfaces(subject, pose))
+
+
+def _named(name: str, found: Sequence[Surface]) -> Surface:
+    names = {one.name: one for one in found}
+    if not names:
+        raise RecipeError(
+            f"scenes.on: expected a scene.place that has surfaces, or {{size: [1.2, 0.8], height: 0.75}}; found {name!r}"
+        )
+    if name not in names:
+        raise RecipeError(f"scenes.on: {one_of(name, tuple(names))}")
+    return names[name]
 
 
 def scene_views(stock: Stock, subject: str) -> Sequence[int]:

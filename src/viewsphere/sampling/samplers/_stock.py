@@ -28,6 +28,7 @@ from viewsphere.sampling.camera import looking
 from viewsphere.sampling.clips import shown_steps
 from viewsphere.sampling.composition import Composition
 from viewsphere.sampling.engine_digest import engine_options
+from viewsphere.sampling.layouts import Remembering, unremembered
 from viewsphere.sampling.pictures import Pictures
 from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.scenes import Scenes
@@ -60,6 +61,7 @@ class Stock(Sendable):
     timelines: tuple[Timeline | None, ...] = ()  # of each model, the animation of its file that it plays in sequences
     tries: Mapping[int, int] = field(default_factory=dict[int, int])  # poses of which something is drawn again: the how manieth
     untried: Stock | None = None  # the same without these tries
+    memory: Remembering = unremembered  # of what is simulated
     sequence_numbers: tuple[int, ...] = ()  # of each viewpoint of sequences, a data set's number; none where it has the same
 
     def trying(self, tries: Mapping[int, int]) -> Self:

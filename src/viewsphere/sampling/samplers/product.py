@@ -13,6 +13,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import BoxOf, center
+from viewsphere.sampling.layouts import is_slow
 from viewsphere.sampling.samplers import Standing, Stock
 from viewsphere.sampling.time_steps import Run, TimedPoses, at_step
 from viewsphere.store import Block
@@ -72,8 +73,11 @@ def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The model and its company at each time step; the model alone where company is drawn for each frame."""
     spec = stock.spec(subject)
     things, target = (Thing(id=1, model=spec),), None
+    company = stock.recipe.scene.company
+    if company is not None and is_slow(company.layout):
+        return
     if stock.composition is not None and not stock.recipe.scene.is_moved_each_frame:
-        things = stock.composition.targets(spec, None, box_of)
+        things = stock.composition.targets(spec, None, box_of, memory=stock.memory)
         target = stock.composition.center(things, box_of)
     for run in stock.schedule(spec).runs:
         at = _target(stock, things[0], run, target, box_of)
@@ -85,7 +89,8 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     spec = stock.spec(subject)
     things, target = (Thing(id=1, model=spec),), None
     if stock.composition is not None:
-        targets = stock.composition.targets(spec, stock.scene_pose(poses[0]), box_of, stock.layout_names(poses[0]))
+        again = stock.layout_names(poses[0])
+        targets = stock.composition.targets(spec, stock.scene_pose(poses[0]), box_of, again, stock.memory)
         things = stock.composition.things(subject, targets, stock.scene_pose(poses[0]), box_of)
         target = stock.composition.center(targets, box_of)
     things = stock.repainted(things, subject, poses[0])

@@ -9,15 +9,19 @@ from itertools import groupby
 import numpy as np
 
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import BoxOf, center_of_all
+from viewsphere.sampling.layouts import is_slow
 from viewsphere.sampling.pose_numbers import as_ranges
 from viewsphere.sampling.samplers import Standing, Stock
 from viewsphere.sampling.samplers._random import (
     are_views_drawn,
     check_scene_models,
+    scene_around,
     scene_cast,
     scene_names,
     scene_split,
@@ -28,6 +32,9 @@ from viewsphere.sampling.samplers._random import (
 from viewsphere.sampling.time_steps import is_animated
 from viewsphere.store import Block
 from viewsphere.store.index import Ranges, numbers
+
+IN_THE_AIR = 1e-3
+"""Metres between the floor and models that do not stand on it."""
 
 
 def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
@@ -80,7 +87,7 @@ def split(stock: Stock, subject: str, pose: int) -> str:
 
 def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The models of a scene; nothing where the place they stand in is drawn for each frame."""
-    if not stock.recipe.scene.is_moved_each_frame:
+    if not stock.recipe.scene.is_moved_each_frame and not is_slow(scenes_entry(stock.recipe).layout):
         things = scene_things(stock, subject, None, box_of)
         views, poses = stock.pose_list.drawn_for(subject), tuple(numbers(_poses(stock, subject)))
         yield Standing(things, center_of_all(things, box_of), views, poses)
@@ -89,16 +96,19 @@ def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
 def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
     """The models of a scene, and what stands around them; cameras look at the middle of the models."""
     pose = stock.scene_pose(poses[0])
-    things = scene_things(stock, subject, pose, box_of)
+    targets = things = scene_things(stock, subject, pose, box_of)
     middle = center_of_all(things, box_of)
     if stock.composition is not None:
         things = stock.composition.things(subject, things, pose, box_of)
+    things += scene_around(stock, subject, pose, box_of)
     views = stock.pose_list.drawn_for(subject)
     instants = [
         stock.instant(subject, stock.view(views, pose), middle, middle, split(stock, subject, pose), i)
         for i, pose in enumerate(poses, first // len(stock.rig.sensors))
     ]
     scene = stock.scene(subject, stock.pose_list.name(poses[0]))
+    if min(float(transform(thing.world_from_object, box_of(thing.model))[:, 2].min()) for thing in targets) > IN_THE_AIR:
+        scene = scene.model_copy(update={"floor": Floor(height=0.0)})
     return stock.finished(key, first, stock.repainted(things, subject, poses[0]), scene, instants)
 
 

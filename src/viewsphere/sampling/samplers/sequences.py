@@ -18,7 +18,9 @@ from viewsphere.model.scene import Floor, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.sampling.composition import BoxOf
+from viewsphere.sampling.layouts import is_slow
 from viewsphere.sampling.samplers import Standing, Stock
 from viewsphere.sampling.samplers._course import Course, course, middle, placed_targets, time_of
 from viewsphere.sampling.samplers._exposing import exposures
@@ -96,11 +98,18 @@ def split(stock: Stock, subject: str, pose: int) -> str:
 
 def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The things as they are placed, seen by cameras that stand still; nothing where they are drawn for each sequence."""
-    if not stock.recipe.scene.is_moved_each_frame and is_still(stock.recipe.viewpoints):
+    if not stock.recipe.scene.is_moved_each_frame and is_still(stock.recipe.viewpoints) and not _is_slow(stock.recipe):
         things = placed_targets(stock, subject, None, box_of)
         count, views = time_of(stock).count, stock.views_of(subject)
         poses = [view * count for view, names in _taken(stock).items() if subject in names]
         yield Standing(things, middle(things, box_of), views, poses)
+
+
+def _is_slow(recipe: Recipe) -> bool:
+    """Whether where things are placed is not asked before frames are rendered."""
+    company, scenes = recipe.scene.company, recipe.scenes
+    layout = company.layout if company is not None else scenes.layout if isinstance(scenes, ScenesEntry) else None
+    return layout is not None and is_slow(layout)
 
 
 def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:

@@ -41,14 +41,28 @@ class Lane:
 
 
 @dataclass(frozen=True)
+class Surface:
+    """A level rectangle above the floor where things may stand, such as a table's top: a frame whose origin is its middle, +Z
+    up, its size along the frame's x and y, and the metres of air above it, None where that has no end. name is unique in its
+    place.
+    """
+
+    name: str
+    world_from_surface: Matrix4
+    size: tuple[float, float]
+    clearance: float | None = None
+
+
+@dataclass(frozen=True)
 class Place:
     """A layout, of which nothing is built yet. `free`: lowest x and y, highest x and y of the floor that is left to targets;
-    None where this floor has no end. `lanes`: where things may drive.
+    None where this floor has no end. `lanes`: where things may drive. `surfaces`: where things may stand above the floor.
     """
 
     pieces: tuple[PlacePiece, ...]
     free: tuple[float, float, float, float] | None = None
     lanes: tuple[Lane, ...] = ()
+    surfaces: tuple[Surface, ...] = ()
 
 
 def places() -> tuple[str, ...]:

@@ -1,0 +1,209 @@
+"""Bodies and boards as MuJoCo simulates them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix
+from viewsphere.model.scene import Matrix4
+from viewsphere.sampling.physics._body import Board, Body, Touch, needed
+
+Float = NDArray[np.float64]
+
+TYPICAL = 0.4
+"""Length in metres that the typical body is simulated with."""
+
+STEP_S = 0.002
+SOFT_S = 4 * STEP_S
+"""Seconds in which a contact gives way: shorter ones need shorter steps, longer ones let bodies sink into one another."""
+
+LOOK = 25
+"""Steps between two looks at whether bodies move."""
+
+CALM_LOOKS = 8
+CALM_SPEED, CALM_TURN = 0.005, 0.02
+CALM_WAY, CALM_ANGLE = 0.0003, 0.002
+"""A body is at rest when so many looks found it slower than this, metres and radians a second, and it went no farther from the
+first to the last: piles creep at a speed that no look finds."""
+
+DAMPED_S, DAMPING = 2.0, 10.0
+"""Seconds after which bodies lose a share of their speed, and how much of it a second: piles creep otherwise."""
+
+LONGEST_S = 15.0
+"""Simulated seconds after which bodies that still move are given up."""
+
+HULL_CORNERS = 256
+"""Of a part at most: fewer would cut off millimetres, which then stand in others."""
+
+ROLLING = (0.005, 0.002)
+"""Friction against spinning and rolling, metres."""
+
+
+class World:
+    """Bodies in a gravity of 9.81 m/s2 on a floor, among boards and bodies that are `fixed`. `typical` is the length of its
+    typical body, metres. Where `floor` is below 0, z = 0 is only the top of a board.
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        poses: Sequence[Matrix4],
+        boards: Sequence[Board],
+        typical: float,
+        floor: float = 0.0,
+        fixed: Sequence[tuple[Body, Matrix4]] = (),
+    ) -> None:
+        self._mujoco = needed("mujoco")
+        self._scale = TYPICAL / typical
+        self._bodies, self._fences = len(bodies), [i for i, board in enumerate(boards, 1) if board.is_fence]
+        self._model = self._compiled(bodies, boards, floor, fixed)
+        self._data = self._mujoco.MjData(self._model)
+        self._steps = 0
+        self._since = 0
+        for number, pose in enumerate(poses):
+            self.put(number, pose)
+
+    def _compiled(
+        self, bodies: Sequence[Body], boards: Sequence[Board], floor: float, fixed: Sequence[tuple[Body, Matrix4]]
+    ) -> Any:
+        mujoco = self._mujoco
+        spec = mujoco.MjSpec()
+        spec.option.timestep, spec.option.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        spec.option.cone, spec.option.noslip_iterations = mujoco.mjtCone.mjCONE_ELLIPTIC, 4
+        still = spec.worldbody
+        still.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], pos=[0, 0, floor * self._scale], **_contact(Touch()))
+        for board in boards:
+            pos, size = np.multiply(board.center, self._scale), np.multiply(board.half, self._scale)
+            turn = [np.cos(board.turn / 2), 0, 0, np.sin(board.turn / 2)]
+            still.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, quat=turn, size=size, **_contact(Touch()))
+        for number, body in enumerate(bodies):
+            made = still.add_body(name=f"body {number}")
+            made.add_freejoint()
+            self._add(spec, made, f"part {number}", body)
+        for number, (body, pose) in enumerate(fixed):
+            matrix = np.array(pose)
+            at = {"pos": matrix[:3, 3] * self._scale, "quat": quaternion_from_matrix(matrix[:3, :3])}
+            self._add(spec, still.add_body(name=f"fixed {number}", **at), f"fixed part {number}", body)
+        return spec.compile()
+
+    def _add(self, spec: Any, made: Any, name: str, body: Body) -> None:
+        mujoco = self._mujoco
+        shares = body.mass * body.volumes / body.volumes.sum() * self._scale**3
+        for part, ((corners, triangles), mass) in enumerate(zip(body.parts, shares, strict=True)):
+            flat = (corners * self._scale).ravel(), triangles.ravel()
+            mesh = spec.add_mesh(name=f"{name} {part}", uservert=flat[0], userface=flat[1], maxhullvert=HULL_CORNERS)
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # needs no watertight mesh, and comes to rest soonest
+            made.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, mass=mass, priority=1, **_contact(body.touch))
+
+    def put(self, number: int, pose: Matrix4) -> None:
+        """Put a body, by its number, somewhere else, where it is at rest."""
+        matrix = np.array(pose)
+        at, speed = self._data.qpos.reshape(-1, 7)[number], self._data.qvel.reshape(-1, 6)[number]
+        at[:3], at[3:], speed[:] = matrix[:3, 3] * self._scale, quaternion_from_matrix(matrix[:3, :3]), 0.0
+        self._since = self._steps
+
+    def take_fences_away(self) -> None:
+        """Let bodies go where fences were."""
+        for number in self._fences:
+            self._model.geom_contype[number] = self._model.geom_conaffinity[number] = 0
+        self._fences = []
+
+    @property
+    def has_fences(self) -> bool:
+        """Whether fences are there."""
+        return bool(self._fences)
+
+    @property
+    def seconds(self) -> float:
+        """Seconds that went by in the world."""
+        return self._steps * STEP_S / self._scale**0.5
+
+    def step(self, steps: int = 1) -> None:
+        """Let so much time go by."""
+        for _ in range(steps):
+            self._mujoco.mj_step(self._model, self._data)
+            self._steps += 1
+            if (self._steps - self._since) * STEP_S > DAMPED_S:
+                self._data.qvel *= 1 - DAMPING * STEP_S
+
+    def settle(self, longest_s: float = LONGEST_S, each: int = LOOK, look: Any = None) -> bool:
+        """Let time go by until all bodies are at rest; whether they are before so many simulated seconds are over. `look` is
+        called every so many steps.
+        """
+        calm: list[Float] = []
+        for step in range(each, int(longest_s / STEP_S) + 1, each):
+            self.step(each)
+            if look is not None:
+                look()
+            if step % LOOK < each:
+                calm = [*calm, self._data.qpos.reshape(-1, 7).copy()] if self._is_slow else []
+                if len(calm) >= CALM_LOOKS and _is_still(calm[-CALM_LOOKS], calm[-1]):
+                    return True
+        return False
+
+    @property
+    def _is_slow(self) -> bool:
+        speeds = np.abs(self._data.qvel.reshape(-1, 6))
+        return bool(speeds[:, :3].max() < CALM_SPEED and speeds[:, 3:].max() < CALM_TURN)
+
+    @property
+    def speed(self) -> float:
+        """Metres a second of the fastest body."""
+        return float(np.linalg.norm(self._data.qvel.reshape(-1, 6)[:, :3], axis=1).max()) / self._scale**0.5
+
+    @property
+    def poses(self) -> tuple[Matrix4, ...]:
+        """World from body of each, to 1e-10 m."""
+        return tuple(_matrix(row, self._scale) for row in self._data.qpos.reshape(-1, 7))
+
+    @property
+    def states(self) -> Float:
+        """World from body of each: x, y, z in metres and a quaternion w, x, y, z, (N, 7)."""
+        rows = self._data.qpos.reshape(-1, 7).copy()
+        rows[:, :3] /= self._scale
+        return rows
+
+    @property
+    def deepest(self) -> float:
+        """Metres that bodies overlap one another, boards or the floor, at most."""
+        distances = self._data.contact.dist[: self._data.ncon]
+        return max(0.0, -float(distances.min())) / self._scale if len(distances) else 0.0
+
+    @property
+    def touching(self) -> frozenset[tuple[int, int]]:
+        """Pairs of numbers of bodies that touch, the lower one first; -1 is what stands still."""
+        owner = self._model.geom_bodyid - 1
+        pairs = self._data.contact.geom[: self._data.ncon]
+        owner[owner >= self._bodies] = -1  # what is fixed
+        return frozenset((int(min(p)), int(max(p))) for p in owner[pairs])
+
+
+def _is_still(before: Float, now: Float) -> bool:
+    """Whether bodies at rest went no way between two states."""
+    way = np.linalg.norm(now[:, :3] - before[:, :3], axis=1)
+    half = np.abs((now[:, 3:] * before[:, 3:]).sum(axis=1)).clip(0, 1)
+    return bool(way.max() < CALM_WAY and 2 * np.arccos(half).max() < CALM_ANGLE)
+
+
+def _contact(touch: Touch) -> dict[str, Any]:
+    """A contact's settings: a spring of equal stiffness whatever its damping."""
+    ratio = touch.damping_ratio
+    solid = [0.9, 0.95, 0.001, 0.5, 2]
+    return {
+        "solref": [SOFT_S / ratio, ratio],
+        "solimp": solid,
+        "friction": [touch.friction, *ROLLING],
+        "condim": 6,
+        "margin": 0.0,
+    }
+
+
+def _matrix(row: Float, scale: float) -> Matrix4:
+    turn = np.round(matrix_from_quaternion(row[3:]), 12) + 0.0
+    x, y, z = (np.round(row[:3] / scale, 10) + 0.0).tolist()
+    (a, b, c), (d, e, f), (g, h, i) = turn.tolist()
+    return ((a, b, c, x), (d, e, f, y), (g, h, i, z), (0.0, 0.0, 0.0, 1.0))

@@ -1,0 +1,277 @@
+"""Things that are let go and come to rest, as several placers drop them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.numbers import Length, Portion, Positive, Strength
+from viewsphere.model.scene import Matrix4
+from viewsphere.recipe.draws import Drawn, drawn
+from viewsphere.sampling.physics import Board, Body, Touch, World, body_of
+from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, Way, draws_of
+from viewsphere.sampling.placing._parts import convex_parts
+
+Float = NDArray[np.float64]
+
+TRIES = 3
+"""Draws of a fall, of which the first that ends well is taken."""
+
+ROUNDS = 6
+"""How often what fell beside is let go again."""
+
+SPOTS = 12
+"""Spots that are tried for each thing that is let go; the lowest is taken."""
+
+MOST_OVERLAP = 0.002
+"""Metres that two things may overlap at rest."""
+
+CLEAR = 0.001
+"""The same of things that are caught in flight, where some hit others."""
+
+FENCE = 50.0
+"""How high fences are, in lengths of the longest thing."""
+
+RECORDED = 5
+"""Steps of the simulation between two states of a way."""
+
+
+class Matter(Frozen):
+    """What things are made of; each is drawn for itself."""
+
+    density: Drawn[Positive] = Field(default=300.0, description="kg in a cubic metre of the thing's hull")
+    mass: Drawn[Positive] | None = Field(default=None, description="kg, instead of what density says")
+    friction: Drawn[Strength] = Field(default=0.8, description="coefficient of sliding friction: 0.1 ice, 0.8 wood, 1 rubber")
+    restitution: Drawn[Portion] = Field(default=0.0, description="share of its speed that a thing has after a bounce")
+    collide: Literal["hulls", "parts"] = Field(
+        default="hulls",
+        description="hulls: things touch as their convex hulls do; parts: as convex parts of them, for chairs, mugs and what "
+        "others shall lie in; takes seconds a model once, by coacd",
+    )
+    drop: Drawn[Length] = Field(default=0.05, description="metres of air below each thing when it is let go")
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What things fall on: boards, and where they have to stay: over a rectangle of z = 0, their lowest points no higher than
+    this; None: anywhere.
+    """
+
+    boards: tuple[Board, ...] = ()
+    within: Footprint | None = None
+    height: float = math.inf
+
+
+@dataclass(eq=False)
+class Drop:
+    """A cast that falls in a room."""
+
+    cast: Sequence[ModelSpec]
+    room: Room
+    shapes: Sequence[Shape]
+    rng: Draws
+    options: Matter
+    ground: Ground
+    region: Footprint
+    _bodies: list[Body] = field(default_factory=list[Body])
+
+    def __post_init__(self) -> None:
+        self._bodies = [self._body(i) for i in range(len(self.cast))]
+
+    @property
+    def typical(self) -> float:
+        """Length of the typical thing, metres."""
+        return float(np.median([shape.length for shape in self.shapes]))
+
+    def rested(self) -> dict[str, Any]:
+        """Plain data: `poses` of all at rest, and, where the room asks how they moved, `ways`: seconds and states."""
+        return self._best("rest")
+
+    def caught(self) -> dict[str, Any]:
+        """The same of things that are caught while they fall, at a moment before the last one lands."""
+        return self._best("mid")
+
+    def _best(self, moment: str) -> dict[str, Any]:
+        problems: list[tuple[float, str]] = []
+        for number in range(TRIES):
+            made, problem = self._once(str(number), moment)
+            if problem is None:
+                return made
+            problems.append(problem)
+        raise RecipeError(f"{self.room.field}.layout: {min(problems)[1]} (the best of {TRIES} draws)")
+
+    def _once(self, number: str, moment: str) -> tuple[dict[str, Any], tuple[float, str] | None]:
+        """What comes of one draw, and, where it is not good, how bad that is, and in words."""
+        places = [self._spheres(i) for i in range(len(self.cast))]
+        starts = self._starts(number, range(len(self.cast)), places, [])
+        fences = tuple(_fences(self.ground.within, FENCE * max(s.length for s in self.shapes))) if self.ground.within else ()
+        fixed = [(body_of([shape.hull], 1.0), pose) for shape, pose in self.room.taken]
+        world = World(self._bodies, starts, (*self.ground.boards, *fences), self.typical, -self.room.below, fixed)
+        if moment == "mid":
+            return self._flying(world, number), None
+        film = _Film(world) if self.room.moves else None
+        calm = world.settle(each=RECORDED, look=film.shoot) if film else world.settle()
+        if fences and calm:
+            world.take_fences_away()
+            calm = world.settle(each=RECORDED, look=film.shoot) if film else world.settle()
+        for again in range(0 if film else ROUNDS):
+            beside = self._beside(world)
+            if not beside:
+                break
+            for i, pose in zip(
+                beside, self._starts(f"{number} {again}", beside, places, self._lying(world, beside)), strict=True
+            ):
+                world.put(i, pose)
+            calm = world.settle()
+        made: dict[str, Any] = {"poses": world.poses}
+        return made | ({"ways": film.ways} if film else {}), self._problem(world, calm, bool(film))
+
+    def _problem(self, world: World, calm: bool, moves: bool) -> tuple[float, str] | None:
+        beside = [] if moves else self._beside(world)
+        if beside:
+            inside = len(self.cast) - len(beside)
+            found = f"found {inside} inside, {self.cast[beside[0]].key} not: ask for fewer, or for more room"
+            return 2.0 + len(beside), f"expected room for {len(self.cast)} models; {found}"
+        if not calm:
+            return 1.0, f"expected models that come to rest; found one at {1000 * world.speed:.2g} mm/s: ask for more friction"
+        if world.deepest > MOST_OVERLAP:
+            found = f"found {1000 * world.deepest:.2g} mm: ask for fewer, or for models of more alike sizes"
+            return world.deepest, f"expected models at rest that overlap by {1000 * MOST_OVERLAP:g} mm at most; {found}"
+        return None
+
+    def _flying(self, world: World, number: str) -> dict[str, Any]:
+        landed, frames = set[int](), list[tuple[float, tuple[Matrix4, ...]]]()
+        while len(landed) < len(self.cast) and world.seconds < 60:
+            if world.deepest <= CLEAR:
+                frames.append((world.seconds, world.poses))
+            world.step(RECORDED)
+            landed.update(i for pair in world.touching if -1 in pair or landed.intersection(pair) for i in pair if i >= 0)
+        wanted = world.seconds * float(self.rng("moment", number).random())
+        return {"poses": min(frames, key=lambda frame: abs(frame[0] - wanted))[1]}
+
+    def _body(self, slot: int) -> Body:
+        spec, shape = self.cast[slot], self.shapes[slot]
+        own = drawn(self.options, draws_of(self.rng, str(slot), spec.key))
+        parts = [shape.hull] if own.collide == "hulls" else convex_parts(shape)
+        return body_of(parts, own.density, own.mass, Touch(own.friction, own.restitution))
+
+    def _spheres(self, slot: int) -> tuple[Float, float]:
+        """Middle (3,) and radius of a ball around a thing, its own axes."""
+        box = self.shapes[slot].box
+        return box.mean(axis=0), float(np.linalg.norm(box[0] - box.mean(axis=0)))
+
+    def _lying(self, world: World, without: Sequence[int]) -> list[tuple[Float, float]]:
+        """Balls around what lies there, world axes."""
+        found: list[tuple[Float, float]] = []
+        for i, pose in enumerate(world.poses):
+            if i not in without:
+                middle, radius = self._spheres(i)
+                found.append((transform(np.array(pose), middle), radius))
+        return found
+
+    def _starts(
+        self, number: str, slots: Sequence[int], places: Sequence[tuple[Float, float]], there: list[tuple[Float, float]]
+    ) -> list[Matrix4]:
+        """Where things are let go: over the region, turned about the vertical at random, each as low as it is clear of those
+        before.
+        """
+        balls = [*there, *(_ball(shape, pose) for shape, pose in self.room.taken)]
+        poses: list[Matrix4] = []
+        for slot in slots:
+            middle, radius = places[slot]
+            rng = self.rng("release", number, str(slot), self.cast[slot].key)
+            air = drawn(self.options.drop, draws_of(self.rng, "drop", number, str(slot), self.cast[slot].key))
+            reach = np.maximum(self.region.half - radius, 0.0)
+            spots = self.region.center + (2 * rng.random((SPOTS, 2)) - 1) * reach @ self.region.axes
+            bottom = radius if balls else float(middle[2] - self.shapes[slot].box[:, 2].min())
+            x, y, z = min(((*spot, _clear(spot, radius, balls, bottom + air, air)) for spot in spots), key=lambda p: p[2])
+            balls.append((np.array([x, y, z]), radius))
+            poses.append(_turned(middle, (x, y, z), 2 * math.pi * rng.random()))
+        return poses
+
+    def _beside(self, world: World) -> list[int]:
+        """Numbers of things whose middle is not over where they have to stay, or that lie higher than they may, or lower."""
+        within = self.ground.within
+        if within is None:
+            return []
+        found: list[int] = []
+        for i, pose in enumerate(world.poses):
+            middle = transform(np.array(pose), self._spheres(i)[0])
+            is_on = (np.abs((middle[:2] - within.center) @ within.axes.T) <= within.half).all()
+            lowest = float(transform(np.array(pose), self._bodies[i].corners)[:, 2].min())
+            if not is_on or middle[2] < 0 or lowest > self.ground.height:
+                found.append(i)
+        return found
+
+
+class _Film:
+    """The states of a world's bodies, one after another."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._seconds, self._states = [0.0], [world.states]
+
+    def shoot(self) -> None:
+        self._seconds.append(self._world.seconds)
+        self._states.append(self._world.states)
+
+    @property
+    def ways(self) -> dict[str, Any]:
+        states = np.round(np.array(self._states), 6) + 0.0
+        return {"seconds": np.round(self._seconds, 6).tolist(), "states": states.transpose(1, 0, 2).tolist()}
+
+
+def ways_of(made: dict[str, Any]) -> list[Way]:
+    """The ways in plain data."""
+    seconds = tuple(made["ways"]["seconds"])
+    return [Way(seconds, tuple(map(tuple, states))) for states in made["ways"]["states"]]
+
+
+def poses_of(made: dict[str, Any]) -> list[Matrix4]:
+    """The poses in plain data."""
+    poses: list[Any] = [tuple(map(tuple, pose)) for pose in made["poses"]]
+    return poses
+
+
+def _ball(shape: Shape, pose: Matrix4) -> tuple[Float, float]:
+    middle = shape.box.mean(axis=0)
+    return transform(np.array(pose), middle), float(np.linalg.norm(shape.box[0] - middle))
+
+
+def _clear(spot: Float, radius: float, balls: Sequence[tuple[Float, float]], lowest: float, air: float) -> float:
+    """How high a ball at a spot is at least, clear of others with some air between."""
+    height = lowest
+    for middle, other in balls:
+        reach, off = radius + other + air, float(np.hypot(*(spot - middle[:2])))
+        if off < reach:
+            height = max(height, float(middle[2]) + math.sqrt(reach**2 - off**2))
+    return height
+
+
+def _turned(middle: Float, at: tuple[float, float, float], turn: float) -> Matrix4:
+    """A pose turned about the vertical whose middle is there."""
+    c, s = math.cos(turn), math.sin(turn)
+    x, y, z = at[0] - c * middle[0] + s * middle[1], at[1] - s * middle[0] - c * middle[1], at[2] - middle[2]
+    return ((c, -s, 0.0, float(x)), (s, c, 0.0, float(y)), (0.0, 0.0, 1.0, float(z)), (0.0, 0.0, 0.0, 1.0))
+
+
+def _fences(around: Footprint, height: float) -> list[Board]:
+    """Four boards around a rectangle."""
+    turn = math.atan2(around.axes[0, 1], around.axes[0, 0])
+    thick, found = float(around.half.max()), list[Board]()
+    for axis, side in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        half = [float(h) + 2 * thick for h in around.half]
+        half[axis] = thick
+        x, y = (around.center + side * (around.half[axis] + thick) * around.axes[axis]).tolist()
+        found.append(Board((x, y, height / 2), (half[0], half[1], height / 2), turn, is_fence=True))
+    return found
