@@ -337,8 +337,9 @@ def _dealt_split(dataset: Dataset, row: Row, sequence: str) -> tuple[str, str | 
     """
     part = dataset.plan.parts[row.part]
     deals = [one.dealt_splits for one in ((part,) if part.merged else dataset.plan.parts[: row.part + 1])]
-    found = ((name, deal[name]) for name in (sequence, row.subject) for deal in deals if name in deal)
-    return next(found, (row.subject, None))
+    names = part.world(sequence), part.world(row.subject)
+    found = ((name, deal[name]) for name in names for deal in deals if name in deal)
+    return next(found, (names[1], None))
 
 
 def _proofs_by_models(sample: Sample, again: Again, caster: RayCaster | None) -> Iterator[tuple[str, list[str]]]:

@@ -183,6 +183,7 @@ class Sample(Shown):
     image_size: tuple[int, int] | None = None  # (width, height) in pixels, if the camera is not known
     source: Mapping[str, Any] | None = None  # the imported data set's entry of the picture
     sequence: str = ""  # empty for still pictures
+    variation: str = ""  # of a recipe with variations, under which of them it is
     sensor: str = CAMERA
     instant: int = 0  # counted from 0 in the sequence, or, for still pictures, in the data set
     time: float = 0.0  # seconds from the sequence's first instant

@@ -40,6 +40,7 @@ class Shot(Frozen):
     scene: Scene
     first: int = 0
     sequence: str = ""  # of still pictures none
+    variation: str = ""  # of the recipe's variations, under which it is rendered; it ends the sequence's name
     tracks: Tracks | None = None
     engine: str = "raster"
     engine_options: dict[str, JsonValue] = Field(default_factory=dict)
@@ -87,13 +88,21 @@ class Shot(Frozen):
         so that records of such shots are what they were before.
         """
         found: dict[str, Any] = handler(self)
-        for name in ("annotations", "labels"):
+        for name in ("annotations", "labels", "variation"):
             if not getattr(self, name):
                 found.pop(name, None)
         if not self.shutter:
             found.pop("shutter", None)
             found.pop("exposures", None)
         return found
+
+    @property
+    def world(self) -> str:
+        """The name of what it shows, without its variation: its sequence's, else its own."""
+        if not self.variation or self.sequence:
+            return (self.sequence or self.key).removesuffix(f"-{self.variation}" if self.variation else "")
+        subject, _, position = self.key.rpartition("-")
+        return f"{subject.removesuffix(f'-{self.variation}')}-{position}"
 
     @property
     def objects(self) -> tuple[Thing, ...]:

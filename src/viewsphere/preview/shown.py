@@ -48,7 +48,7 @@ def preview_samples(
     stages, chosen = Stages(), _spread(planned, count)
     _check(stages, planned, [subject for subject, _ in chosen])
     for subject, groups in chosen:
-        for poses in [[pose] for group in groups for pose in group] if recipe.scene.is_new_each_frame else groups:
+        for poses in [[pose] for group in groups for pose in group] if recipe.is_new_each_frame else groups:
             yield from _rendered(stages, planned, subject, poses, width)
 
 
@@ -126,7 +126,7 @@ def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
     """Subjects and their poses, those of one time step together, such that subjects follow in order and poses step through
     the grid; all where there are so few.
     """
-    subjects, taken = planned.subjects, planned.rows.taken
+    subjects, taken = planned.taken, planned.rows.taken
     if count >= planned.frames:
         return [(subject, [list(numbers(poses)) for poses in taken(subject)]) for subject in subjects]
     chosen: dict[str, list[int]] = {}

@@ -63,6 +63,8 @@ def film_caption(film: Film, i: int) -> str:
 
 def _caption(sample: Sample) -> str:
     pose, seen = sample.known_pose, sample.objects
+    if sample.variation and pose is not None:
+        return f"{sample.variation}  az {pose.azimuth_deg:.4g}  el {pose.elevation_deg:.4g}  d {pose.distance:.4g}"
     if pose is None:
         return ", ".join(dict.fromkeys(o.category for o in seen)) or "nothing labelled"
     key = f"{seen[0].key}  " if seen else ""

@@ -34,7 +34,7 @@ from viewsphere.model.file_names import is_reserved
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.lidar import LIDAR
-from viewsphere.model.mistakes import Marks, report, shown
+from viewsphere.model.mistakes import Marks, at, report, shown
 from viewsphere.model.notebook import Shown
 from viewsphere.model.numbers import Count, Natural, Number
 from viewsphere.recipe.formats import FormatEntry, FormatField
@@ -45,12 +45,13 @@ from viewsphere.recipe.scenes import ScenesField
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.recipe.tracks import TracksEntry
 from viewsphere.recipe.values import OrShort, shape_of
+from viewsphere.recipe.variations import VariationsField, check_alike, varied
 from viewsphere.recipe.viewpoints import Viewpoints
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames", "keep_annotations_above"}
 """Fields of a recipe that change neither a picture nor a label, as the credits of its models do not."""
 
-LATER = {"scenes", "time", "rig", "tracks", "min_visibility", "empty"}
+LATER = {"scenes", "time", "rig", "tracks", "variations", "min_visibility", "empty"}
 """Fields that recipes once did not have: without them a recipe has the digest that it had then."""
 
 LATER_FIELDS: dict[tuple[str, ...], Any] = {
@@ -162,6 +163,11 @@ class Recipe(Shown, Frozen):
         description="points that are followed through each sequence: {grid: 16}, {count: 1024, on: objects}, or {points: file}",
     )
     scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
+    variations: VariationsField | None = Field(
+        default=None,
+        description="conditions under each of which all shots are rendered, with the same labels: names, and the fields of "
+        "scene that are others there: {morning: {sun: {elevation_deg: 9}}, overcast: {sky: {daylight: {clouds: 1}}}}",
+    )
     min_visibility: Annotated[Number, Field(gt=0, le=1)] | None = Field(
         default=None,
         description="least visibility of the frame's model (of random scenes: of each model); where it is less, the random "
@@ -243,6 +249,21 @@ class Recipe(Shown, Frozen):
         value.check_still()
         return value
 
+    @field_validator("variations")
+    @classmethod
+    def _fit_scene(cls, value: dict[str, SceneEntry] | None, info: ValidationInfo) -> dict[str, SceneEntry] | None:
+        scene, timed = info.data.get("scene"), info.data.get("time") is not None
+        if value is None or scene is None:
+            return value
+        merged: dict[str, SceneEntry] = {}
+        for name, change in value.items():
+            with at(name):
+                if not timed:
+                    change.check_still()
+                merged[name] = varied(scene, change.over_time() if timed else change)
+        check_alike(merged)
+        return value
+
     @field_validator("name")
     @classmethod
     def _one_line(cls, value: str) -> str:
@@ -300,6 +321,22 @@ class Recipe(Shown, Frozen):
         again = self.model_copy(update={"seed": seed})
         again._lasting_seed = self.lasting_seed
         return again
+
+    @property
+    def conditions(self) -> Mapping[str, Recipe]:
+        """The recipe under each of its variations, by their names, without variations; itself alone, without a name, where it
+        has none.
+        """
+        if self.variations is None:
+            return {"": self}
+        timed = self.time is not None
+        scenes = {name: varied(self.scene, change.over_time() if timed else change) for name, change in self.variations.items()}
+        return {name: self.model_copy(update={"scene": scene, "variations": None}) for name, scene in scenes.items()}
+
+    @property
+    def is_new_each_frame(self) -> bool:
+        """Whether anything that frames of one shot must share is drawn anew for every frame."""
+        return any(one.scene.is_new_each_frame for one in self.conditions.values())
 
     @property
     def lasting_seed(self) -> int:

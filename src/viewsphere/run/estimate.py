@@ -76,8 +76,8 @@ def estimate(recipe: Recipe, workers: int = 1, clock: Callable[[], float] = time
 def extrapolate(planned: Plan, rates: Rates, workers: int) -> Estimate:
     """The cost of a whole plan; no workers count as one, for then the calling process works."""
     crew, models = max(workers, 1), sum(max(1, len(planned.steps_of(spec))) for spec in planned.kept_specs)
-    scenes = len(planned.subjects)
-    scenes = planned.frames if planned.recipe.scene.is_new_each_frame else max(scenes, min(crew, planned.shot_count))
+    scenes = len(planned.taken)
+    scenes = planned.frames if planned.recipe.is_new_each_frame else max(scenes, min(crew, planned.shot_count))
     shared = models * rates.model + scenes * rates.scene + planned.frames * rates.frame
     seconds = shared / crew + planned.frames * rates.export
     return Estimate(seconds, models * rates.model_bytes + planned.frames * rates.frame_bytes, crew, rates.unused)
@@ -140,9 +140,9 @@ def _export(store: Store, formats: Sequence[FormatEntry], stopwatch: _Stopwatch)
 
 def _spread(planned: Plan) -> Iterator[Row]:
     """Some shots of subjects evenly over the plan: together evenly over the poses."""
-    count = min(SUBJECTS, len(planned.subjects))
+    count = min(SUBJECTS, len(planned.taken))
     for i in range(count):
-        subject = planned.subjects[i * (len(planned.subjects) - 1) // max(count - 1, 1)]
+        subject = planned.taken[i * (len(planned.taken) - 1) // max(count - 1, 1)]
         shots = planned.rows.count_of(subject)
         parts = {int((i * SHOTS_OF_EACH + k + 1) * GOLDEN % 1 * shots) for k in range(SHOTS_OF_EACH)}
         yield from (planned.rows.row_of(subject, part) for part in sorted(parts))

@@ -274,7 +274,7 @@ def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool
         tell(Progress("models", done, total))
     for key, problem in _distance_problems(portion, store, failed):
         failed.setdefault(key, problem)
-    own = {m.key for m in planned.model_specs} | set(planned.subjects)
+    own = {m.key for m in planned.model_specs} | set(planned.taken)
     stops = [e for k, e in failed.items() if not (keep_going and k in own and isinstance(e, (ModelError, RecipeError)))]
     elsewhere = {} if portion.share.is_all else store.skipped()
     if stops or (failed and own <= failed.keys() | elsewhere.keys()):
@@ -371,7 +371,7 @@ class Missing:
         if self.portion.plan.recipe.scene.is_moved_each_frame:
             return sum(row.count for row in self._wanted())
         cast = self.portion.plan.cast
-        left = [name for name in self.portion.plan.subjects if name not in self.skipped]
+        left = [name for name in self.portion.plan.taken if name not in self.skipped]
         whole = [name for name in left if not any(member.key in self.skipped for member in cast(name))]
         return sum(index.samples_of(name) for index in indices for name in whole)
 

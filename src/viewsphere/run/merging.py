@@ -278,7 +278,8 @@ def _parts(source: _Source) -> Iterator[Part]:
 def _moved(source: _Source, part: Part, block: Block) -> Block:
     """The block with its models' new keys and its poses' new numbers; where poses are not known, positions are frames."""
     by = source.first_pose if part.is_sampled else source.first_frame
-    subjects = tuple(source.model_keys.get(key, key) for key in block.subjects)
+    worlds = {name: part.world(name) for name in block.subjects}
+    subjects = tuple(source.model_keys.get(world, world) + name.removeprefix(world) for name, world in worlds.items())
     return replace(block, subjects=subjects, positions=tuple((a + by, b + by) for a, b in block.positions))
 
 

@@ -316,6 +316,7 @@ def render_sample(
         channels={name: observed[name] for name in kept},
         files={},
         sequence=shot.sequence,
+        variation=shot.variation,
         sensor=shot.rig.sensors[sensor].name,
         instant=now.index,
         time=now.seconds,

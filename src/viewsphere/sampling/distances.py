@@ -48,6 +48,7 @@ class Distances:
         What is drawn for each frame is not looked at, nor what follows from a share of the picture: that is left to whoever
         renders the frame.
         """
+        subject = self.plan.world(subject)
         step = -(-self.plan.poses // max(1, min(MOST_CAMERAS, MOST_PAIRS // len(self.plan.subjects))))
         for there in self.plan.sampler.standing(self.plan, subject, self.box_of):
             if not there.views.are_known:

@@ -116,7 +116,7 @@ class Portion(Sendable):
     def subjects(self) -> tuple[str, ...]:
         """What the shots show, each once; of the whole part all that the plan has."""
         if self.share.is_all:
-            return self.plan.subjects
+            return self.plan.taken
         return tuple(dict.fromkeys(subject for index in self.indices for subject, shots in index.counts.items() if shots))
 
     def find(self, key: str) -> Row | None:
@@ -280,7 +280,7 @@ def _missing(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterato
 
 def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterator[tuple[int, tuple[str, ...]]]:
     """Channels that frames of earlier parts lack: their part's number, and the channels in the table's order."""
-    subjects = set(planned.subjects)
+    subjects = set(planned.taken)
     for number, part in enumerate(there.parts):
         if not part.is_sampled or not part.frames:
             continue

@@ -30,6 +30,9 @@ LOOK = "the engine's program"
 OF = " of "
 """What stands in names of settings between a model's field and its key, and in no other name."""
 
+VARIED = "variations."
+"""What begins names of settings that are a variation's, and no other name: a recipe has those that it adds, or some."""
+
 MOVES = ("motion", "clip", "fps")
 """Fields of a model that say how it moves in sequences, and what an animated one plays of its file."""
 
@@ -76,6 +79,7 @@ def settings(planned: Plan) -> Settings:
         value["viewpoints.shake"] = viewpoints.get("shake")
     if recipe.tracks is not None:
         value["tracks"] = recipe.tracks.model_dump(mode="json")
+    value |= {f"{VARIED}{name}": change for name, change in (recipe.model_dump(mode="json")["variations"] or {}).items()}
     value |= _movements(planned)
     digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
     return digests | {LOOK: engine_digest(recipe.engine.name)}
@@ -100,7 +104,7 @@ def _check_sampler(planned: Plan, part: Part) -> None:
 def _check_settings(planned: Plan, own: Settings, part: Part) -> None:
     added = [name for name in own if part.settings and name not in part.settings and name in (RIG, *SHOWN)]
     for name in (*part.settings, *added):
-        if OF not in name and own.get(name) != part.settings.get(name):
+        if OF not in name and own.get(name) != part.settings.get(name) and (name in own or not name.startswith(VARIED)):
             found = planned.recipe.model_dump(mode="json")
             values = [_value(recipe, name) for recipe in (part.recipe, found)]
             differ = f"{values[0]}, as the data set has; found {values[1]}"

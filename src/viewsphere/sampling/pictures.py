@@ -7,6 +7,7 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -47,14 +48,15 @@ _TAIL = 64  # bytes in which an end is searched: some programs write a little be
 
 def scene_pictures(recipe: Recipe) -> Pictures:
     """The files of every path in the recipe's scene; raises RecipeError for those that are not there."""
-    return {(kind, path): _files(recipe, field, kind, path) for field, kind, path in _paths(recipe)}
+    found = chain.from_iterable(map(_paths, recipe.conditions.values()))
+    return {(kind, path): _files(recipe, field, kind, path) for field, kind, path in found}
 
 
 def check_pictures(recipe: Recipe, pictures: Pictures) -> None:
     """See that the files of a scene are pictures, as far as their first and last bytes tell; raises RecipeError for the first
     that is not.
     """
-    for field, kind, path in _paths(recipe):
+    for field, kind, path in chain.from_iterable(map(_paths, recipe.conditions.values())):
         for file in pictures[kind, path]:
             if kind == "hdri":
                 _check_sphere(file, field)

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import chain, repeat
 from os import PathLike
@@ -24,6 +24,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scene import SceneEntry
 from viewsphere.sampling.checks import (
     check_all_frames,
     check_blend,
@@ -57,7 +58,7 @@ from viewsphere.sampling.splits import expected, quotas
 from viewsphere.sampling.time_steps import check_keys, timed
 from viewsphere.sampling.tracks import tracks_digest, tracks_of
 from viewsphere.store import Block, Category, Row
-from viewsphere.store.index import Index, numbers
+from viewsphere.store.index import Index, numbers, under, without
 
 COUNTED = 200_000
 """Frames, or scenes, whose splits are counted one by one."""
@@ -104,7 +105,8 @@ class Plan(Shown, Stock):
     def factors(self) -> str:
         """What its frames are the product of, in words."""
         sensors = len(self.rig.sensors)
-        return self.sampler.factors(self) + (f" x {sensors} sensors" if sensors > 1 else "")
+        more = {"sensors": sensors if sensors > 1 else 0, "variations": len(self.recipe.variations or ())}
+        return self.sampler.factors(self) + "".join(f" x {count} {what}" for what, count in more.items() if count)
 
     @property
     def max_objects(self) -> int:
@@ -134,16 +136,16 @@ class Plan(Shown, Stock):
         """Split -> number of its frames; of hashed ones what is expected, where there are more than `COUNTED` to hash."""
         by, drawn = self.recipe.splits.by, self.recipe.scenes is not None and self.recipe.splits.by == "model"
         found = Counter({name: 0 for name in self.splits})
-        if by in ("model", "scene", "sequence") and not (drawn and len(self.subjects) > COUNTED):
+        if by in ("model", "scene", "sequence") and not (drawn and len(self.taken) > COUNTED):
             for block in self.blocks:
                 for subject in block.subjects:
                     found[self.split(subject, block.positions[0][0])] += block.size * block.each
         elif drawn:
-            some = Counter(self.split(subject, 0) for subject in self.subjects[:COUNTED])
+            some = Counter(self.split(subject, 0) for subject in self.taken[:COUNTED])
             found = Counter(quotas({name: some[name] / COUNTED for name in self.splits}, self.frames))
         elif by == "pose" and len(self.blocks) == 1 and self.poses <= COUNTED:
             for pose in numbers(self.blocks[0].positions):
-                found[self.split(self.subjects[0], pose)] += len(self.subjects) * len(self.rig.sensors)
+                found[self.split(self.taken[0], pose)] += len(self.taken) * len(self.rig.sensors)
         elif self.frames <= COUNTED:
             taken = (self.split(s, i) for block in self.blocks for s in block.subjects for i in numbers(block.positions))
             found.update(chain.from_iterable(repeat(name, len(self.rig.sensors)) for name in taken))
@@ -166,9 +168,11 @@ class Plan(Shown, Stock):
             found.append(
                 f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
             )
-        if any(is_night(sun) for sun in alternatives(scene.sun)):
-            found.append("scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight")
-        doubts = chain(no_light(scene), hidden_by_exposure(scene), out_of_view(scene, self.pose_list, self.intrinsics))
+        doubts: Iterator[str] = out_of_view(scene, self.pose_list, self.intrinsics)
+        for name, recipe in self.recipe.conditions.items():
+            found += (
+                message.replace("scene", f"variations.{name}", 1) if name else message for message in _unlit(recipe.scene)
+            )
         doubts = chain(doubts, hidden_background(scene, self.pose_list, self.intrinsics))
         doubts = chain(doubts, too_small(self.recipe, self.pose_list, self.intrinsics))
         if self.blend is not None:
@@ -184,7 +188,7 @@ class Plan(Shown, Stock):
 
     def split(self, subject: str, pose: int) -> str:
         """The split of a frame."""
-        return self.sampler.split(self, subject, pose)
+        return self.sampler.split(self, self.world(subject), pose)
 
     def keeping(self, splits: Mapping[str, str], poses: Sequence[int] = ()) -> Plan:
         """The same plan for a data set that has some of its models, scenes and sequences in these splits already, and these
@@ -209,7 +213,32 @@ class Plan(Shown, Stock):
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
         """Which subjects are taken from which poses, time step by time step, by all sensors each."""
-        return tuple(replace(block, each=len(self.rig.sensors)) for block in self.sampler.blocks(self))
+        found = (replace(block, each=len(self.rig.sensors)) for block in self.sampler.blocks(self))
+        return tuple(replace(block, subjects=self._taken(block.subjects)) for block in found)
+
+    @cached_property
+    def taken(self) -> tuple[str, ...]:
+        """What pictures are about: the subjects, where there are variations each under each of them."""
+        return self._taken(self.subjects)
+
+    def _taken(self, subjects: Sequence[str]) -> tuple[str, ...]:
+        names = tuple(self.recipe.variations or ("",))
+        return tuple(under(subject, name) for subject in subjects for name in names)
+
+    def world(self, subject: str) -> str:
+        """The subject without its variation."""
+        return subject if self.recipe.variations is None else without(subject)[0]
+
+    @cached_property
+    def _under(self) -> Mapping[str, Self]:
+        """The same plan under each variation; it shares what was computed, but for light and finish."""
+        return {name: self._lit(recipe, name) for name, recipe in self.recipe.conditions.items()}
+
+    def _lit(self, recipe: Recipe, variation: str) -> Self:
+        made = replace(self, recipe=recipe, untried=self, variation=variation)
+        known = {field.name for field in fields(self)} | {"scenes", "taken", "blocks", "rows", "_under"}
+        vars(made).update({name: value for name, value in vars(self).items() if name not in known})
+        return made
 
     @cached_property
     def rows(self) -> Index:
@@ -243,11 +272,16 @@ class Plan(Shown, Stock):
         """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
         each frame. `first` is the number of its first sample, `tries` as for `shot`.
         """
-        stock = self.trying(dict(zip(poses, tries, strict=True))) if any(tries) else self
+        key, variation, stock = key or subject, "", self
+        if self.recipe.variations is not None:
+            subject, variation = without(subject)
+            stock = self._under[variation]
+        stock = stock.trying(dict(zip(poses, tries, strict=True))) if any(tries) else stock
         with self.recipe.located():
-            shot = filled(
-                self.sampler.shot(stock, subject, poses, box_of, key or subject, first), self.recipe.scenes is not None
-            )
+            shot = filled(self.sampler.shot(stock, subject, poses, box_of, key, first), self.recipe.scenes is not None)
+            if variation:
+                named = {"variation": variation, "sequence": shot.sequence and under(shot.sequence, variation)}
+                shot = shot.model_copy(update=named)
             if self.recipe.empty is None:
                 return shot
             shares = (share(self.recipe.seed, "empty", subject, self.pose_list.name(pose)) for pose in poses)
@@ -255,7 +289,7 @@ class Plan(Shown, Stock):
 
     def cast(self, subject: str, pose: int | None = None) -> tuple[ModelSpec, ...]:
         """The recipe's models in a frame of a subject, from a pose (its number); without one, those in all of its frames."""
-        return self.sampler.cast(self, subject, pose)
+        return self.sampler.cast(self, self.world(subject), pose)
 
     def shots(self, box_of: BoxOf) -> Iterator[Shot]:
         """All shots in order, made one by one."""
@@ -279,6 +313,13 @@ class Plan(Shown, Stock):
         return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
 
 
+def _unlit(scene: SceneEntry) -> Iterator[str]:
+    """What makes a scene's pictures black, or white."""
+    if any(is_night(sun) for sun in alternatives(scene.sun)):
+        yield "scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight"
+    yield from chain(no_light(scene), hidden_by_exposure(scene))
+
+
 def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -> Plan:
     """What a recipe (or the one in this file) means, frame by frame, without touching a mesh.
 
@@ -289,9 +330,10 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
     with recipe.located():
         check_names(recipe)
         check_blend(recipe)
-        check_catcher(recipe)
+        for one in recipe.conditions.values():
+            check_catcher(one)
+            check_shutter(one)
         check_splits(recipe)
-        check_shutter(recipe)
         check_redraws(recipe)
         check_motions(recipe)
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
@@ -305,7 +347,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         check_listed(recipe, specs)
         check_materials(recipe, specs)
         most = recipe.shot_frames or shot_frames or SHOT_FRAMES
-        frames = 1 if recipe.scene.is_new_each_frame and recipe.time is None else most
+        frames = 1 if recipe.is_new_each_frame and recipe.time is None else most
         timings = timings if any(timings) else ()
         sampler: Sampler = plugins.load("samplers", recipe.sampler)
         check_sizes(recipe, views, sampler)

@@ -50,11 +50,13 @@ PARTS = tuple(Finish.model_fields)
 @dataclass(frozen=True, eq=False)
 class Scenes:
     """The scenes of a recipe. `model` is a model's key, `pose` a pose's name, or, for what all frames of a sequence share, the
-    name of the pose whenever it is taken.
+    name of the pose whenever it is taken. Only noise differs by the name of a `variation`: equal distributions of its light
+    and of others' have equal draws.
     """
 
     recipe: Recipe
     pictures: Pictures
+    variation: str = ""
 
     @cached_property
     def is_jittered(self) -> bool:
@@ -179,7 +181,8 @@ class Scenes:
     def _finish(self, names: tuple[Names, ...], frame: Names) -> Finish:
         parts = {name: self._part(name, drawn_for) for name, drawn_for in zip(PARTS, names, strict=True)}
         if self.recipe.scene.effects.is_noisy:
-            seed = int(share(self.recipe.seed, "noise", *frame) * 2**32)
+            of = (*frame, self.variation) if self.variation else frame
+            seed = int(share(self.recipe.seed, "noise", *of) * 2**32)
             parts["effects"] = parts["effects"].model_copy(update={"seed": seed})
         return Finish(**parts)
 

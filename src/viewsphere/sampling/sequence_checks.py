@@ -37,7 +37,7 @@ def check_sequences(planned: Plan) -> None:
     """
     checked = set[str]()
     for subject in planned.subjects[:MOST_SUBJECTS]:
-        cast = planned.cast(subject, 0)
+        cast = planned.sampler.cast(planned, subject, 0)
         lanes = () if planned.composition is None else planned.composition.lanes(subject, planned.scene_pose(0))
         _check_trajectory(planned, subject, cast, lanes)
         _check_motions(planned, subject, cast, lanes, checked)

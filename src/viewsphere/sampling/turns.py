@@ -32,7 +32,7 @@ class Turns:
 
     def in_order(self) -> Iterator[Row]:
         """All turns, subject by subject."""
-        return chain.from_iterable(map(self._index.of, self.plan.subjects))
+        return chain.from_iterable(map(self._index.of, self.plan.taken))
 
     def shuffled(self, epoch: int) -> Iterator[Row]:
         """All turns in an order that the recipe's seed and the epoch draw."""

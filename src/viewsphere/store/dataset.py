@@ -272,7 +272,8 @@ class Dataset(Shown, Sequence[Sample]):
         places = self.choice.places(row.first, row.count)
         if not self.choice.models or not places:
             return places
-        model = row.subject if self.plan.parts[row.part].is_product else None
+        part = self.plan.parts[row.part]
+        model = part.world(row.subject) if part.is_product else None
         if model is not None and self.choice.has_model(model):
             return places
         if model is not None and not self._has_chosen_step(model):

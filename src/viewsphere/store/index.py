@@ -22,6 +22,17 @@ Ranges = tuple[tuple[int, int], ...]
 """Numbers, as ranges [first, stop) in order."""
 
 
+def under(subject: str, variation: str) -> str:
+    """The name of a subject under a variation, which no other has: that of a variation has no hyphen; without one its own."""
+    return f"{subject}-{variation}" if variation else subject
+
+
+def without(subject: str) -> tuple[str, str]:
+    """The subject and the variation that make a name."""
+    name, _, variation = subject.rpartition("-")
+    return name, variation
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
     """One shot: its key (stable, unique, fit for a folder's name), what it shows, its first sample and number of samples, the

@@ -24,7 +24,7 @@ from viewsphere.model.mistakes import first_of
 from viewsphere.model.model_spec import Size, step_key
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
-from viewsphere.store.index import Block, Index, Row
+from viewsphere.store.index import Block, Index, Row, without
 from viewsphere.store.manifest import sealed, unsealed
 from viewsphere.store.paths import names
 from viewsphere.store.texts import parsed
@@ -193,6 +193,10 @@ class Part:
     def subjects(self) -> tuple[str, ...]:
         """What its samples are about, each once: keys of models, or names of scenes."""
         return tuple(dict.fromkeys(name for block in self.blocks for name in block.subjects))
+
+    def world(self, subject: str) -> str:
+        """One of its subjects without its variation: the key of a model, or the name of a scene."""
+        return without(subject)[0] if self.recipe.get("variations") else subject
 
     @property
     def is_product(self) -> bool:

@@ -66,6 +66,7 @@ def whole_sample(sample: Sample) -> dict[str, Any]:
         "index": sample.index,
         "split": sample.split,
         **({"sequence": sample.sequence} if sample.sequence else {}),
+        **({"variation": sample.variation} if sample.variation else {}),
         **({"sensor": sample.sensor} if sample.sensor != CAMERA else {}),
         "instant": sample.instant,
         **({"time": sample.time} if sample.time else {}),
@@ -97,6 +98,7 @@ class _Picture:
     files: dict[str, str]
     objects: list[dict[str, Any]]
     sequence: str = ""
+    variation: str = ""
     sensor: str = CAMERA
     time: float = 0.0
     size: tuple[PositiveInt, PositiveInt] | None = None
@@ -129,6 +131,7 @@ def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapp
         channels=channels,
         files=files,
         sequence=picture.sequence,
+        variation=picture.variation,
         sensor=picture.sensor,
         instant=picture.instant,
         time=picture.time,
@@ -186,6 +189,7 @@ class ShotRecords:
             channels=channels,
             files=files,
             sequence=self.shot.sequence,
+            variation=self.shot.variation,
             sensor=self.shot.rig.sensors[sensor].name,
             instant=now.index,
             time=now.seconds,

@@ -18,7 +18,7 @@ from viewsphere.model.sample import ObjectView, Rle, Sample
 if TYPE_CHECKING:
     from viewsphere.store.dataset import Dataset
 
-OF_SAMPLE = ("index", "split", "sequence", "sensor", "instant", "time", "width", "height")
+OF_SAMPLE = ("index", "split", "sequence", "variation", "sensor", "instant", "time", "width", "height")
 OF_CAMERA = ("camera.K", "camera.R", "camera.t", "camera.P")
 OF_POSE = ("pose.azimuth_deg", "pose.elevation_deg", "pose.distance", "pose.tilt_deg", "pose.category")
 

@@ -321,11 +321,11 @@ class SampleViews:
 
     @property
     def drawn_as(self) -> tuple[str, ...]:
-        """What randomness in the sample's labels follows from besides a seed: its shot, its sensor, and its instant, which is
-        named by its time and by where the rig is then.
+        """What randomness in the sample's labels follows from besides a seed: its shot, whatever its variation, its sensor, and
+        its instant, which is named by its time and by where the rig is then.
         """
         shot, now = self.views.shot, self.views.shot.instants[self.instant]
-        return shot.sequence or shot.key, self.sensor.name, repr(now.seconds), repr(now.world_from_rig)
+        return shot.world, self.sensor.name, repr(now.seconds), repr(now.world_from_rig)
 
     @property
     def followed(self) -> Followed:

@@ -71,11 +71,12 @@ class Options(Frozen):
     """Which Virtual KITTI, and of what weather."""
 
     version: Literal["1.3.1", "2"] = Field(default="2", description="of the tree: one camera, or two and more maps")
-    variation: str = Field(
-        default="clone",
+    variation: str | None = Field(
+        default=None,
         pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$",
         max_length=64,
-        description="name of the folder that tells renderings of one world apart: clone, fog, morning, ...",
+        description="name of the folder that tells renderings of one world apart: clone, fog, morning, ...; by default that of "
+        "the recipe's variation, else clone",
     )
 
 
@@ -119,7 +120,7 @@ class VKitti(Tree):
         return (f"{rows.HEADS[key]}\n".encode(), "", *told)
 
     def _one(self, sample: Sample) -> Iterator[File | Piece]:
-        world, frame = scene(sample), f"{sample.instant:05d}.png"
+        (world, variation), frame = self._place(sample), f"{sample.instant:05d}.png"
         for kind, content in (
             ("rgb", picture(sample, ".png")),
             ("depthgt", depth_png(sample, 0.01, FAR, FAR)),
@@ -127,8 +128,8 @@ class VKitti(Tree):
             ("flowgt", maps.flow_png(sample, "flow") if self._has_next(sample) else None),
         ):
             if content is not None:
-                yield File(f"vkitti_1.3.1_{kind}/{world}/{self._variation}/{frame}", content)
-        text = f"{world}_{self._variation}"
+                yield File(f"vkitti_1.3.1_{kind}/{world}/{variation}/{frame}", content)
+        text = f"{world}_{variation}"
         yield Piece(f"vkitti_1.3.1_extrinsicsgt/{text}.txt", rows.line(sample.instant, *rows.extrinsics(sample.camera)))
         yield Piece(f"vkitti_1.3.1_motgt/{text}.txt", rows.tracked(sample, self._names))
         for encoded in rows.encodings(sample, self._names):
@@ -136,7 +137,8 @@ class VKitti(Tree):
 
     def _two(self, sample: Sample) -> Iterator[File | Piece]:
         camera = int(self._eyes.side(sample) == "right")
-        root, frame = f"Scene{scene(sample)}/{self._variation}", f"{sample.instant:05d}"
+        world, variation = self._place(sample)
+        root, frame = f"Scene{world}/{variation}", f"{sample.instant:05d}"
         for kind, name, content in (
             ("rgb", f"rgb_{frame}.jpg", picture(sample, ".jpg")),
             ("depth", f"depth_{frame}.png", depth_png(sample, 0.01, FAR, FAR)),
@@ -154,6 +156,13 @@ class VKitti(Tree):
         yield Piece(f"{root}/colors.txt", b"")
         for told in rows.infos(sample, self._names):
             yield Piece(f"{root}/info.txt", b"", told)
+
+    def _place(self, sample: Sample) -> tuple[str, str]:
+        """The names of a sample's world and of its rendering: two of one world are of different variations."""
+        name = scene(sample)
+        if self._variation is None and sample.variation:
+            return name.removesuffix(f"-{sample.variation}"), sample.variation
+        return name, self._variation or "clone"
 
     def _has_next(self, sample: Sample) -> bool:
         return sample.instant < instants(self.dataset, sample) - 1

@@ -62,11 +62,12 @@ class Stock(Sendable):
     tries: Mapping[int, int] = field(default_factory=dict[int, int])  # poses of which something is drawn again: the how manieth
     untried: Stock | None = None  # the same without these tries
     memory: Remembering = unremembered  # of what is simulated
+    variation: str = ""  # of the recipe's, that this is the light and the finish of
     sequence_numbers: tuple[int, ...] = ()  # of each viewpoint of sequences, a data set's number; none where it has the same
 
     def trying(self, tries: Mapping[int, int]) -> Self:
         """The same stock with poses at these tries; it shares what was computed, none of which follows from tries."""
-        made = replace(self, tries=tries, untried=self)
+        made = replace(self, tries=tries, untried=self.untried or self)
         known = {field.name for field in fields(self)}
         vars(made).update({name: value for name, value in vars(self).items() if name not in known})
         return made
@@ -94,7 +95,7 @@ class Stock(Sendable):
     @cached_property
     def scenes(self) -> Scenes:
         """Where light, ground, materials, finishes and jitter are drawn."""
-        return Scenes(self.recipe, self.pictures)
+        return Scenes(self.recipe, self.pictures, self.variation)
 
     @property
     def models(self) -> int:
