@@ -1,8 +1,8 @@
 """How a name finds its module; what a plug-in must offer stands in its package (`Engine` in `viewsphere.engines`, ...).
 
 A plug-in is one module; its name is its file's name, listed without importing it. Third parties use the entry-point
-groups `viewsphere.engines`, `viewsphere.formats`, `viewsphere.labels`, `viewsphere.motions`, `viewsphere.placers` and
-`viewsphere.samplers`. What is found by name is imported here and nowhere else.
+groups `viewsphere.engines`, `viewsphere.formats`, `viewsphere.labels`, `viewsphere.materials`, `viewsphere.motions`,
+`viewsphere.placers` and `viewsphere.samplers`. What is found by name is imported here and nowhere else.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from typing import Any, Literal
 
 from viewsphere.errors import UserError
 
-Kind = Literal["engines", "formats", "labels", "motions", "placers", "samplers"]
+Kind = Literal["engines", "formats", "labels", "materials", "motions", "placers", "samplers"]
 
 PACKAGES: dict[Kind, str] = {
     "engines": "viewsphere.engines",
     "formats": "viewsphere.formats",
     "labels": "viewsphere.labels",
+    "materials": "viewsphere.materials",
     "motions": "viewsphere.sampling.motion",
     "placers": "viewsphere.sampling.placing",
     "samplers": "viewsphere.sampling.samplers",

@@ -7,16 +7,17 @@ from viewsphere.model.brief import Brief
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Sensor
+from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.draws import Distribution, Gaussian
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.scenery import CompanyEntry, PlaceEntry
-from viewsphere.recipe.surface import MaterialEntry
+from viewsphere.recipe.surface import GroundEntry, MaterialEntry
 from viewsphere.recipe.viewpoints import PoseList
 
 CLASSES = [
-    *(Viewpoint, ModelSpec, Sensor, Repaint, Distribution, Gaussian),
-    *(ModelEntry, PlaceEntry, CompanyEntry, MaterialEntry, PoseList),
+    *(Viewpoint, ModelSpec, Sensor, Repaint, Ground, Distribution, Gaussian),
+    *(ModelEntry, PlaceEntry, CompanyEntry, GroundEntry, MaterialEntry, PoseList),
 ]
 
 

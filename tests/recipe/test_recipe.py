@@ -235,7 +235,7 @@ MISTAKES = [
     ({"scene": {"lights": [{**LAMP, "kind": "sopt"}]}}, "scene.lights[0].kind: expected one of point, spot", "'spot'?"),
     ({"scene": {"lights": [{**LAMP, "blend": 1}]}}, "scene.lights[0].blend: expected one of count, strength, color", ""),
     ({"scene": {"lights": [{"position": [0, 0, 3]}]}}, "scene.lights[0].strength: expected a value; found nothing", ""),
-    ({"scene": {"ground": {"roughnes": 1}}}, "scene.ground.roughnes: expected one of color, pattern", "'roughness'?"),
+    ({"scene": {"ground": {"roughnes": 1}}}, "scene.ground.roughnes: expected one of color, material, pattern", "'roughness'?"),
     ({"scene": {"materials": [{"models": "car_*"}]}}, "scene.materials[0]: expected tint, metallic, roughness, image", ""),
     ({"scene": {"background": {"blur": 0.1}}}, "scene.background: expected image or images beside blur", ""),
     ({"scene": {"background": {"image": "a", "zoom": 2}}}, "scene.background: expected fit: crop beside zoom and pl", ""),

@@ -11,8 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.box_mapping import box_mapped
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.opaque import Stamp, opaque_picture, stamp_of
+from viewsphere.assets.substance import made_of, pictures_of, scaled
+from viewsphere.materials import is_grained, metres
 from viewsphere.model.thing import Repaint
 
 FIELD = "scene.materials"
@@ -29,25 +32,44 @@ def repainted(material: Material, repaints: Sequence[Repaint]) -> tuple[Material
     return replace(material, base_color=(red * tint[0], green * tint[1], blue * tint[2], alpha)), found
 
 
-def textured(mesh: Mesh, repaints: Sequence[Repaint]) -> Mesh:
-    """The mesh whose opaque materials have the pictures of the repaints that match them as their colour; the mesh itself where
-    none does. Others keep theirs: their clear texels are holes, of which labels know.
+def textured(mesh: Mesh, repaints: Sequence[Repaint], rest: Mesh | None = None) -> Mesh:
+    """The mesh whose opaque materials have the pictures of the repaints that match them as their colour, or are made of
+    their substance; the mesh itself where none does. Others keep theirs: their clear texels are holes, of which labels know.
 
-    A mesh without texture coordinates gets those of a box: of each vertex its place along the two axes that its normal faces
-    least, the model's longest side once over the picture. Raises RecipeError for a picture that cannot be read.
+    A mesh without texture coordinates gets those of a box for pictures: of each vertex its place along the two axes that its
+    normal faces least, the model's longest side once over the picture. Substances lie on the sides of a box in any case, in
+    metres, and on a deforming model as they do at `rest`. Glass stays glass. Raises RecipeError for a picture that cannot be
+    read.
     """
+    found = [_found(material, repaints) for material in mesh.materials]
+    if not any(one.image or one.texture for one in found):
+        return mesh
     images, materials = list(mesh.images), list(mesh.materials)
-    for i, material in enumerate(mesh.materials):
-        found = next((r for r in reversed(repaints) if fnmatchcase(material.name, r.material)), None)
-        if found is not None and found.image is not None and material.alpha_mode == "OPAQUE":
+    for i, (material, own) in enumerate(zip(mesh.materials, found, strict=True)):
+        if own.texture is not None:
+            substance = own.texture
+            materials[i] = scaled(made_of(material, substance, len(images)), metres(substance.name, substance.seed))
+            images += pictures_of(substance)
+        elif own.image is not None:
             texcoord = 0 if material.base_color_texture is None else material.base_color_texture.texcoord
             texture = Texture(len(images), texcoord=texcoord)
             materials[i] = replace(material, base_color=(1.0, 1.0, 1.0, material.base_color[3]), base_color_texture=texture)
-            images.append(_picture(found.image, stamp_of(found.image, FIELD)))
-    if len(images) == len(mesh.images):
-        return mesh
-    uv0 = _box_coordinates(mesh) if mesh.uv0 is None else mesh.uv0
-    return replace(mesh, images=tuple(images), materials=tuple(materials), uv0=uv0)
+            images.append(_picture(own.image, stamp_of(own.image, FIELD)))
+    uv0 = _box_coordinates(mesh) if mesh.uv0 is None and any(own.image for own in found) else mesh.uv0
+    painted = replace(mesh, images=tuple(images), materials=tuple(materials), uv0=uv0)
+    made = np.array([own.texture is not None for own in found])
+    if not made.any():
+        return painted
+    grained = np.array([own.texture is not None and is_grained(own.texture.name) for own in found])
+    return box_mapped(painted, made[mesh.triangle_material], grained[mesh.triangle_material], rest)
+
+
+def _found(material: Material, repaints: Sequence[Repaint]) -> Repaint:
+    """The last repaint whose pattern matches, as far as it gives the material a picture or a substance."""
+    found = next((r for r in reversed(repaints) if fnmatchcase(material.name, r.material)), None)
+    if found is None or material.alpha_mode != "OPAQUE":
+        return Repaint()
+    return found.model_copy(update={"texture": None}) if material.transmission else found
 
 
 def repaint_stamps(repaints: Iterable[Repaint]) -> tuple[Stamp, ...]:

@@ -68,7 +68,8 @@ class Look:
 
     def mesh(self, load: Load) -> Mesh:
         """The painted mesh of the model that `load` gives."""
-        return textured(load(self.model, self.step), self.repaints)
+        rest = load(self.model) if any(repaint.texture for repaint in self.repaints) else None
+        return textured(load(self.model, self.step), self.repaints, rest)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
+from viewsphere.model.substance import Substance
 
 Vector = tuple[float, float, float]
 Row = tuple[float, float, float, float]
@@ -119,7 +121,7 @@ class HemisphereLight(Light):
 AnyLight = Annotated[PointLight | SpotLight | AreaLight | HemisphereLight, Field(discriminator="kind")]
 
 
-class Ground(Frozen):
+class Ground(Brief):
     """An endless level plane at the lowest point of all that is placed.
 
     A catcher shows nothing but the shadows and the occlusion it receives, and is not there for labels unless `labels` says so.
@@ -139,11 +141,15 @@ class Ground(Frozen):
     tile: Length = Field(default=2.0, description="metres after which images repeat; a slab is half as wide")
     catcher: bool = Field(default=False, description="true: only the shadows on it are seen, over the background")
     labels: bool = Field(default=False, description="whether a catcher has depth and normals; other ground always has")
+    material: Substance | None = Field(default=None, description="what it is made of instead of slabs or pictures")
+
+    UNSAID = ("material",)
 
     @property
     def has_slabs(self) -> bool:
         """Whether slabs are seen."""
-        return self.pattern == "slabs" and not (self.image or self.roughness_image or self.normal_image or self.catcher)
+        pictured = self.image or self.roughness_image or self.normal_image or self.material
+        return self.pattern == "slabs" and not (pictured or self.catcher)
 
     @property
     def is_labelled(self) -> bool:

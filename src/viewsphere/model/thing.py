@@ -11,12 +11,13 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Portion
 from viewsphere.model.scene import IDENTITY, Color, Matrix4, Picture
+from viewsphere.model.substance import Substance
 
 
 class Repaint(Brief):
     """A change to the materials whose names match `material`, a pattern of fnmatch. What is None stays as the file says."""
 
-    UNSAID = ("image",)
+    UNSAID = ("image", "texture")
 
     material: str = Field(default="*", min_length=1, description="names of the materials, a pattern such as paint*")
     tint: Color | None = Field(default=None, description="multiplies the colour; white changes nothing: linear [r, g, b]")
@@ -25,6 +26,7 @@ class Repaint(Brief):
     image: Picture | None = Field(
         default=None, description="path of a picture: the colour of opaque materials instead of what the model says"
     )
+    texture: Substance | None = Field(default=None, description="what opaque materials are made of instead")
 
 
 class TimeStep(Frozen):
@@ -115,6 +117,11 @@ class Thing(Frozen):
     def step(self) -> TimeStep | None:
         """The time step that a still thing shows, a moving one at first."""
         return self.motion.steps[0]
+
+    @property
+    def resting(self) -> Thing:
+        """The thing where it stands, with its model as it rests."""
+        return self if self.step is None else self.model_copy(update={"motion": Motion(poses=self.motion.poses)})
 
     def showing(self, step: TimeStep) -> Thing:
         """The thing where it stands, at one time step of its model's file."""

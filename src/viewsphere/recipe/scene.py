@@ -336,7 +336,14 @@ class SceneEntry(Frozen):
     def is_new_each_frame(self) -> bool:
         """Whether anything that frames of one shot must share is drawn anew for every frame."""
         lit = (self.sun, self.sky, self.lights, self.ground, self.materials)
-        return self.is_moved_each_frame or (self.draw == "per_frame" and (is_random(lit) or self._has_folder))
+        drawn = is_random(lit) or self._has_folder or self._has_grain
+        return self.is_moved_each_frame or (self.draw == "per_frame" and drawn)
+
+    @property
+    def _has_grain(self) -> bool:
+        """Whether the ground or a model is made of a material whose grain is drawn."""
+        grounds = [ground for ground in alternatives(self.ground) if isinstance(ground, GroundEntry)]
+        return any(ground.material is not None for ground in grounds) or any(m.texture is not None for m in self.materials)
 
     @property
     def _has_folder(self) -> bool:

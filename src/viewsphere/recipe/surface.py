@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     Discriminator,
     Field,
@@ -12,15 +13,59 @@ from pydantic import (
     model_validator,
 )
 
+from viewsphere import plugins
 from viewsphere.model.brief import Brief
+from viewsphere.model.mistakes import one_of
 from viewsphere.model.scene import Ground, Picture
 from viewsphere.model.thing import Repaint
-from viewsphere.recipe.entries import entry_of, is_drawn_color
+from viewsphere.recipe.draws import Drawn
+from viewsphere.recipe.entries import entry_of, is_drawn_color, pictures_of
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color, shape_of, switch
 
+ANY = "any"
+"""Stands for all materials."""
 
-class GroundEntry(entry_of(Ground, optional=("color",), fixed=("catcher", "labels"))):
+
+def _known(name: str) -> str:
+    """The name of a material; raises ValueError, with the nearest known one, for others."""
+    names = plugins.names("materials")
+    if name not in names:
+        raise ValueError(one_of(name, (*names, ANY)))
+    return name
+
+
+def _choice(value: Any) -> Any:
+    """A list of materials, or any, as a choice between them."""
+    if value == ANY:
+        return {"choice": plugins.names("materials")}
+    return {"choice": value} if isinstance(value, (list, tuple)) else value
+
+
+MaterialNames = Annotated[
+    Drawn[Annotated[str, AfterValidator(_known)]],
+    BeforeValidator(_choice),
+    OrShort({"type": "array", "items": {"type": "string"}, "minItems": 1}),
+]
+"""The name of a material, or several, or any, to draw one from."""
+
+
+class GroundEntry(entry_of(Ground, optional=("color",), fixed=("catcher", "labels")), Brief):
     """A horizontal plane at the lowest point of all that is placed."""
+
+    UNSAID = ("material",)
+
+    material: MaterialNames | None = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        default=None, description="what it is made of: wood, a list of names to draw from, or any; its grain is drawn, too"
+    )
+
+    @model_validator(mode="after")
+    def _one_look(self) -> GroundEntry:
+        others = [name for name in pictures_of(Ground) if getattr(self, name) is not None]
+        if self.material is not None and others:
+            raise ValueError(f"expected material or {others[0]}; found both")
+        if self.material is not None and self.tile != type(self).model_fields["tile"].default:
+            raise ValueError("expected no tile beside material, which has a size of its own; found one: leave it out")
+        return self
 
 
 def _ground(value: Any) -> Any:
@@ -49,16 +94,22 @@ GroundField = Annotated[
 class MaterialEntry(entry_of(Repaint, fixed=("material",)), Brief):
     """A change to materials of the models; where several fit one, the last counts."""
 
-    UNSAID = ("image", "images")
+    UNSAID = ("image", "images", "texture")
 
     models: str = Field(default="*", min_length=1, description="keys of the models it is for, a pattern such as car_*")
     images: Picture | None = Field(default=None, description="or a folder of pictures to draw from")
+    texture: MaterialNames | None = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        default=None,
+        description="what opaque materials are made of instead: wood, a list of names to draw from, or any; its "
+        "grain is drawn, too",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> MaterialEntry:
         changes = [*(name for name in Repaint.model_fields if name != "material"), "images"]
         if all(getattr(self, name) is None for name in changes):
             raise ValueError(f"expected {', '.join(changes[:-1])} or {changes[-1]}; found none")
-        if self.image is not None and self.images is not None:
-            raise ValueError("expected image or images; found both")
+        sources = [name for name in ("image", "images", "texture") if getattr(self, name) is not None]
+        if len(sources) > 1:
+            raise ValueError(f"expected {' or '.join(sources)}; found {'both' if len(sources) == 2 else 'all'}")
         return self

@@ -13,6 +13,7 @@ from fnmatch import fnmatchcase
 from functools import cached_property, lru_cache
 from typing import Any
 
+from viewsphere import materials
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
@@ -31,6 +32,7 @@ from viewsphere.model.scene import (
     Sun,
     Vector,
 )
+from viewsphere.model.substance import Substance
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.draws import RngOf, drawn, is_random
 from viewsphere.recipe.entries import concrete, pictures_of
@@ -96,6 +98,8 @@ class Scenes:
         )
 
     def _repaint(self, entry: MaterialEntry, number: int, names: Names) -> Repaint:
+        if entry.texture is not None:
+            return concrete(entry, texture=_substance(entry.texture, 512, self._rng_of(names), ("materials", str(number))))
         if entry.images is not None:
             return concrete(entry, image=self._file("textures", entry.images, ("materials", str(number), "images"), names))
         return concrete(entry, image=None if entry.image is None else self.pictures["image", entry.image][0])
@@ -151,7 +155,7 @@ class Scenes:
                 sun=_sun(sun, sky),
                 sky=sky.model_copy(update={"strength": 0.0}) if isinstance(sky, Daylight) and is_night(sun) else sky,
                 lights=_lights(entry.lights, rng_of),
-                ground=self._ground(drawn(entry.ground, rng_of, ("ground",))),
+                ground=self._ground(drawn(entry.ground, rng_of, ("ground",)), rng_of),
                 finish=self._finish(names_of_finish, ()) if names_of_finish else Finish(),
             )
 
@@ -162,12 +166,16 @@ class Scenes:
             return concrete(entry, file=self._file("hdri", entry.hdri, ("sky", "hdri"), names))
         return concrete(entry.daylight if isinstance(entry, DaylightSky) else entry)
 
-    def _ground(self, entry: Any) -> Ground | None:
+    def _ground(self, entry: Any, rng_of: RngOf) -> Ground | None:
         if entry == "auto":
             entry = self.recipe.scene.automatic_ground
         if not isinstance(entry, GroundEntry):
             return None if entry == "off" else Ground(catcher=entry == "catcher")
         files = {name: self.pictures["image", path][0] for name in pictures_of(Ground) if (path := getattr(entry, name))}
+        if entry.material is not None:
+            made = _substance(entry.material, 1024, rng_of, ("ground",))
+            tile = materials.metres(made.name, made.seed)
+            return concrete(entry, material=made, tile=tile, color=entry.color or WHITE)
         ground: Ground = concrete(entry, **files)
         return ground if entry.color or not entry.image else ground.model_copy(update={"color": WHITE})
 
@@ -204,6 +212,11 @@ class Scenes:
         elif entry.image is not None:
             image = self.pictures["image", entry.image][0]
         return concrete(entry, image=image)
+
+
+def _substance(name: Any, size: int, rng_of: RngOf, field: tuple[str, ...]) -> Substance:
+    """A piece of a material; what else is drawn of it follows from the seed."""
+    return Substance(name=name, seed=int(rng_of((*field, "seed")).integers(2**32)), size=size)
 
 
 def _sun(entry: Any, sky: AnySky) -> Sun | None:

@@ -6,6 +6,7 @@ Distance needs no special rule: a far pixel covers many repeats, and the last mi
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.opaque import Stamp, opaque_picture, stamp_of
 from viewsphere.assets.srgb import linear
+from viewsphere.assets.substance import made_of, pictures_of
 from viewsphere.model.scene import Ground
 
 SLABS = 2
@@ -30,8 +32,9 @@ def ground_material(ground: Ground) -> tuple[Material, tuple[Image, ...]]:
     """The ground as a glTF material and the images it names; equal grounds give the same objects while files do not change.
 
     Textures are used with (x, -y) / tile of the world; a picture that is not square keeps the proportions of the first picture
-    named. Where `image` is clear the ground's colour alone is seen; of `roughness_image` green counts, as in glTF. Raises
-    RecipeError, naming the field, for a picture that cannot be read.
+    named. Where `image` is clear the ground's colour alone is seen; of `roughness_image` green counts, as in glTF. A
+    substance has pictures of its own, and says what is metal. Raises RecipeError, naming the field, for a picture that cannot
+    be read.
     """
     return _material(ground.model_dump_json(), ground_stamps(ground))
 
@@ -43,7 +46,8 @@ def ground_stamps(ground: Ground) -> tuple[Stamp, ...]:
 
 def only_scatters(ground: Ground) -> bool:
     """Whether the ground mirrors nothing, and no picture says what it is made of."""
-    return ground.roughness == 1 and ground.metallic == 0 and not any(getattr(ground, name) for name in IMAGES)
+    pictured = ground.material is not None or any(getattr(ground, name) for name in IMAGES)
+    return ground.roughness == 1 and ground.metallic == 0 and not pictured
 
 
 def ground_frame(ground: Ground, material: Material, origin: ArrayLike, unit: float) -> tuple[float, float, float]:
@@ -80,6 +84,10 @@ def _material(described: str, stamps: tuple[Stamp, ...]) -> tuple[Material, tupl
         height, width = images[0].pixels.shape[:2]
         uses[image.name] = Texture(i, scale=(1.0, width / height))
     r, g, b = linear(ground.color).tolist()
+    if ground.material is not None:
+        material = made_of(Material("ground", base_color=(r, g, b, 1.0)), ground.material, 0)
+        tinted = replace(material, base_color=(r, g, b, 1.0), roughness=ground.roughness)
+        return tinted, pictures_of(ground.material)
     material = Material(
         name="ground",
         base_color=(r, g, b, 1.0),

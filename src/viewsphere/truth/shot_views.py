@@ -316,7 +316,8 @@ class SampleViews:
         if mesh_of is None:
             raise ValueError(f"shot {shot.key}: expected its meshes, found none")
         things = shot.things_at(self.instant)
-        meshes = [textured(mesh_of(thing), thing.repaints) for thing in things]
+        rest = [mesh_of(thing.resting) if any(r.texture for r in thing.repaints) else None for thing in things]
+        meshes = [textured(mesh_of(thing), thing.repaints, own) for thing, own in zip(things, rest, strict=True)]
         return Painted(things, meshes, shot.scene.ground)
 
     @property

@@ -1,0 +1,45 @@
+"""Materials that are drawn from numbers: wood, brick, leather, ..., as squares that repeat, in metres.
+
+A material is one module, named as its file: `NAME(parameters, size)` draws a `Surface` from frozen parameters, and `draw(rng)`
+draws these, `metres` among them, the square's side. `WORD` is what sentences say of things that are made of it, and `GRAINED`
+says that it runs along what is made of it. Third parties use the entry-point group `viewsphere.materials`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from viewsphere import plugins
+from viewsphere.materials._patterns.surface import Color, Light, Map, Surface
+
+__all__ = ["Color", "Light", "Map", "Surface", "drawn", "is_grained", "metres", "surface", "word"]
+
+
+def drawn(name: str, seed: int) -> Any:
+    """The parameters that a seed means; raises UserError for an unknown material, with the nearest known one."""
+    return plugins.load("materials", name).draw(np.random.default_rng(seed))
+
+
+def surface(name: str, seed: int, size: int) -> Surface:
+    """The material that a seed means, `size` texels a side; equal arguments give the same bytes on every processor.
+
+    Raises UserError for an unknown name, with the nearest known one.
+    """
+    return getattr(plugins.load("materials", name), name)(drawn(name, seed), size)
+
+
+def metres(name: str, seed: int) -> float:
+    """After how many metres the material that a seed means repeats."""
+    return drawn(name, seed).metres
+
+
+def word(name: str) -> str:
+    """What sentences say of things that are made of a material: wooden."""
+    return plugins.load("materials", name).WORD
+
+
+def is_grained(name: str) -> bool:
+    """Whether a material runs along the longest side of what is made of it."""
+    return getattr(plugins.load("materials", name), "GRAINED", False)

@@ -1,0 +1,61 @@
+"""Blades of grass and tufts of yarn: strokes laid one over another."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.materials._patterns.kernels_noise import lay_strokes
+from viewsphere.materials._patterns.surface import Map
+
+
+class Strokes(NamedTuple):
+    """Height, 0 where none lies to 1; the number of the stroke on top, -1 for none; the share of the way along it, negative on
+    its shaded side.
+    """
+
+    height: Map
+    number: Map
+    along: Map
+
+    def each(self, values: NDArray[np.float64]) -> Map:
+        """Numbers (count,), one a stroke, where it is seen; of the last where none is."""
+        return values.astype(np.float32)[self.number.astype(np.intp)]
+
+
+def strokes(
+    size: int,
+    count: int,
+    length: tuple[float, float],
+    width: tuple[float, float],
+    bend: float,
+    rng: np.random.Generator,
+) -> Strokes:
+    """So many bent strokes, each in a direction of its own; lengths and widths from and to, shares of the square.
+
+    bend: how much of its length a stroke's tip is aside.
+    """
+    u = rng.random((6, count))
+    heading = _directions(u[2])
+    aside = np.stack([-heading[:, 1], heading[:, 0]], axis=1) * (2 * u[3, :, None] - 1) * bend
+    long = (length[0] + (length[1] - length[0]) * u[4]) * size
+    steps = max(int(length[1] * size * 1.1), 2)
+    share = ((np.arange(steps) + 0.5) / steps)[None, :, None]
+    path = (heading[:, None] + 2 * share * aside[:, None]) * (long / steps)[:, None, None]
+    maps = Strokes(*(np.zeros((size, size), np.float32) for _ in range(3)))
+    maps.number.fill(-1)
+    wide = np.maximum((width[0] + (width[1] - width[0]) * u[5]) * size, 1.0)
+    lay_strokes(*maps, (u[:2].T * size).astype(np.float32), path.astype(np.float32), wide.astype(np.float32))
+    return maps
+
+
+def _directions(chance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors (N, 2) of all directions, nearly alike: of points on a square, as sines are rounded differently."""
+    t = 8 * chance
+    side, at = np.floor(t / 2).astype(np.intp), t % 2 - 1
+    x = np.choose(side, (at, np.ones_like(at), -at, -np.ones_like(at)))
+    y = np.choose(side, (-np.ones_like(at), at, np.ones_like(at), -at))
+    r = np.sqrt(x * x + y * y)
+    return np.stack([x / r, y / r], axis=1)

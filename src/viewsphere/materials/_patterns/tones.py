@@ -1,0 +1,35 @@
+"""Colours of tones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from viewsphere.materials._patterns.kernels_noise import lay_colors
+from viewsphere.materials._patterns.surface import BRIGHTEST, DARKEST, Color, Light, Map
+
+
+def colored(tone: Map, *stops: tuple[float, Color]) -> Light:
+    """The colours between whose stops, ascending, each tone lies."""
+    out = np.empty((*tone.shape, 3), np.float32)
+    places, colors = (np.array(values, np.float32) for values in zip(*stops, strict=True))
+    lay_colors(out, np.ascontiguousarray(tone, np.float32), places, colors)
+    return out
+
+
+def mixed(one: Light | Color, other: Light | Color, share: Map) -> Light:
+    """From one colour to another."""
+    a, b = np.asarray(one, np.float32), np.asarray(other, np.float32)
+    return a + (b - a) * share[..., None]
+
+
+def shaded(color: Light | Color, shade: Map) -> Light:
+    """A colour times a shade, within what surfaces can be."""
+    return np.clip(np.asarray(color, np.float32) * shade[..., None], DARKEST, BRIGHTEST)
+
+
+def times(color: Color, factor: float | Sequence[float]) -> Color:
+    """A colour times a number, or one a component."""
+    r, g, b = (np.array(color) * np.array(factor)).clip(DARKEST, BRIGHTEST).tolist()
+    return r, g, b
