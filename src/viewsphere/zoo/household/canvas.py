@@ -23,8 +23,9 @@ class Canvas:
 
     def paint(self, distance: Float, color: ArrayLike, strength: float = 1.0) -> None:
         """Colour where the signed distance (H, W) to a shape, metres, is negative; edges are a pixel wide."""
-        share = strength * np.clip(0.5 - distance / self.pixel, 0, 1)[..., None]
-        self.rgb[:] = self.rgb * (1 - share) + np.asarray(color, np.float64) * share
+        near = distance < 0.5 * self.pixel
+        share = strength * np.minimum(0.5 - distance[near] / self.pixel, 1)[:, None]
+        self.rgb[near] = self.rgb[near] * (1 - share) + np.asarray(color, np.float64) * share
 
     def shade(self, factor: Float) -> None:
         """Multiply all colours by factors (H, W)."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.zoo.shapes.solids import Float
@@ -72,6 +73,17 @@ def flat(low: tuple[float, float], high: tuple[float, float], axes: tuple[int, i
     return chart
 
 
+def plane(corner: ArrayLike, across: ArrayLike, up: ArrayLike) -> Chart:
+    """Onto a rectangle anywhere: its lower left corner, and its edges to the right and up, (3,)."""
+    origin, u, v = (np.asarray(p, np.float64) for p in (corner, across, up))
+
+    def chart(corners: Float, _normals: Float) -> Float:
+        rest = corners - origin
+        return np.stack([rest @ u / (u @ u), 1 - rest @ v / (v @ v)], axis=-1)
+
+    return chart
+
+
 def sides(charts: Mapping[tuple[int, int], Chart]) -> Chart:
     """Another chart for each side, (axis, sign) of the largest part of a triangle's normal; uv 0 on sides without one."""
 
@@ -85,12 +97,3 @@ def sides(charts: Mapping[tuple[int, int], Chart]) -> Chart:
         return uv
 
     return chart
-
-
-def within(chart: Chart, low: tuple[float, float], high: tuple[float, float]) -> Chart:
-    """A chart that fills a part of the picture: uv between two corners (left top, right bottom)."""
-
-    def inner(corners: Float, normals: Float) -> Float:
-        return np.asarray(low) + chart(corners, normals) * (np.asarray(high) - np.asarray(low))
-
-    return inner
