@@ -432,7 +432,10 @@ def chairs() -> None:
 # The gallery
 
 
-def family(name: str, azimuth: float = 35, fill: float = 0.85) -> None:
+FURNITURE = ("table", "sofa", "bed", "shelf", "cabinet", "lamp", "refrigerator", "television", "rug")
+
+
+def family(name: str, azimuth: float = 35, fill: float = 0.85, width: int = WIDTH, quality: int = 85) -> None:
     """Twenty draws of a family."""
     made_of = Recipe(
         name=name,
@@ -441,7 +444,7 @@ def family(name: str, azimuth: float = 35, fill: float = 0.85) -> None:
         camera={"size": [320, 240], "fov_deg": 30},
         scene={"ground": "on"},
     )
-    save(f"zoo_{name}.jpg", grid([s.rgb for s in render(made_of)], 5))
+    save(f"zoo_{name}.jpg", grid([s.rgb for s in render(made_of)], 5, width), quality)
 
 
 def neighbourhood() -> None:
@@ -470,6 +473,7 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_chair": partial(family, "chair"),
     "zoo_boat": partial(family, "boat", fill=0.65),
     "zoo_hair_drier": partial(family, "hair_drier", 50),
+    **{f"zoo_{name}": partial(family, name, width=1200, quality=68) for name in FURNITURE},
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 

@@ -60,6 +60,12 @@ def test_categories_keep_coco_ids_however_spelled(name):
     assert official_ids(categories) == {1: 91, 2: 89, 3: 93}
 
 
+def test_the_zoos_furniture_has_cocos_ids():
+    names = ("sofa", "bed", "television", "refrigerator")
+    categories = [Category(i, name, "") for i, name in enumerate(names, 1)]
+    assert list(official_ids(categories).values()) == [63, 65, 72, 82]
+
+
 def test_detections_rebuilt_from_the_stored_maps_score_one(exported):
     dataset, folder = exported
     for split in dataset.splits:

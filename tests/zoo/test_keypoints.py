@@ -39,12 +39,14 @@ NAMED = {
     "post_box": {"slot", "door", "top"},
     "refrigerator": {"top_front_left", "bottom_rear_right"},
     "road_sign": {"plate", "foot"},
+    "rug": {"corner_front_left", "corner_rear_right"},
     "shelf": {"top_front_left", "foot_rear_right"},
     "sofa": {"seat_front_left", "back_top_right", "armrest_front_left", "foot_rear_right"},
     "table": {"top_front_left", "top_rear_right"},
     "traffic_cone": {"tip", "foot_front_left"},
     "traffic_light": {"red", "amber", "green", "foot"},
     "truck": {"wheel_front_left", "mirror_right", "load_rear_left", "headlight_right"},
+    "television": {"screen_top_left", "screen_bottom_right"},
     "wheelie_bin": {"wheel_left", "handle_right"},
 }
 """Points that every member of a family has."""

@@ -275,12 +275,16 @@ def _pillows(p: Bed, coats: _Coats, rng: np.random.Generator) -> list[Piece]:
 
 
 def surfaces(parameters: Bed) -> tuple[Surface, ...]:
-    """What of the duvet's top is even: between its turned-back band, or pillows, and the blanket or the foot end."""
-    p, x = parameters, parameters.width / 2 - 0.1
-    low = -p.length / 2 + (0.82 if p.throw else 0.12)
-    high = p.duvet_end - (p.folded or 0.08) - 0.06 - (0.15 if p.cushions else 0)
+    """What of the duvet's top is even, between its turned-back band, or pillows, and the blanket or the foot end, and the
+    blanket's top.
+    """
+    p, x, foot = parameters, parameters.width / 2 - 0.1, -parameters.length / 2
+    low, high = foot + (0.82 if p.throw else 0.12), p.duvet_end - (p.folded or 0.08) - 0.06 - (0.15 if p.cushions else 0)
     clear = p.posts - p.top - 0.1 if p.posts else float("inf")
-    return (Surface("duvet", (-x, low, x, high), p.top + 0.045, clear),)
+    found = [Surface("duvet", (-x, low, x, high), p.top + 0.045, clear)] if high - low > 0.15 else []
+    if p.throw:
+        found.append(Surface("throw", (-x, foot + 0.25, x, foot + 0.75), p.top + 0.06, clear - 0.02))
+    return tuple(found)
 
 
 def bed_random(rng: np.random.Generator) -> Mesh:

@@ -10,7 +10,7 @@ import numpy as np
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.part_points import sided
-from viewsphere.zoo.furnishing.casework import block
+from viewsphere.zoo.furnishing.casework import block, footed
 from viewsphere.zoo.furnishing.coats import BLACK_STEEL, WHITE_STEEL, Timber, Wood, drawn_wood, furnished, grain
 from viewsphere.zoo.furnishing.stock import books, box, vase
 from viewsphere.zoo.joinery.coats import BRASS, STEEL
@@ -119,7 +119,7 @@ def _uprights(p: Shelf, timber: Timber) -> list[Piece]:
         rails = []
         for x in (-p.width / 2 + t, p.width / 2 - t):
             low, high = np.array((x, -y + 0.02, 0)), np.array((x, y - 0.03, p.height))
-            rails += [rod(low, high, 1.3 * t, 4), block((x - t, y - 0.05, 0), (x + t, y - 0.015, p.height - 0.01))]
+            rails += [footed(rod(low, high, 1.3 * t, 4)), block((x - t, y - 0.05, 0), (x + t, y - 0.015, p.height - 0.01))]
         return [Piece("upright", timber.upright, join(*rails))]
     boards = [
         block((x - t, -y, 0 if k in (0, p.columns) else p.plinth), (x + t, y, p.height - 0.0005)) for k, x in enumerate(p.edges)

@@ -32,7 +32,7 @@ CATEGORY_IDS: dict[str, int] = dict(
 
 _OTHER_SPELLINGS = {
     **{"hairdryer": "hair drier", "bike": "bicycle", "motorbike": "motorcycle", "aeroplane": "airplane"},
-    **{"sofa": "couch", "tvmonitor": "tv"},
+    **{"sofa": "couch", "tvmonitor": "tv", "television": "tv"},
 }
 _FIRST_FREE_ID = 91
 
