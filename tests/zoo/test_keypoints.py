@@ -12,6 +12,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.zoo import build_zoo_model
 
 NAMED = {
+    "backpack": {"handle", "pocket", "strap_left", "bottom_rear_right"},
     "bench": {"seat_front_left", "seat_rear_right"},
     "bicycle": {"wheel_front", "wheel_rear", "saddle", "grip_left", "pedal_right"},
     "bollard": {"top", "foot"},
@@ -19,12 +20,14 @@ NAMED = {
     "bus": {"wheel_front_left", "taillight_right", "roof_rear_left", "door", "windshield"},
     "car": {"wheel_front_left", "wheel_rear_right", "headlight_left", "taillight_right"},
     "chair": set(),
+    "fountain": {"top", "basin_left"},
     "hair_drier": {"nozzle", "inlet", "handle", "switch"},
     "house": {"door", "roof", "eaves_front_left"},
     "lamp_post": {"lamp", "foot"},
     "motorcycle": {"wheel_front", "seat", "grip_left", "headlight"},
     "post_box": {"slot", "door", "top"},
     "road_sign": {"plate", "foot"},
+    "shop": {"sign", "door", "eaves_front_left", "wall_rear_right"},
     "traffic_cone": {"tip", "foot_front_left"},
     "traffic_light": {"red", "amber", "green", "foot"},
     "truck": {"wheel_front_left", "mirror_right", "load_rear_left", "headlight_right"},

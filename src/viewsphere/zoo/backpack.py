@@ -97,7 +97,7 @@ class _Bag:
         y = (curve(t, self.deep) * grow + off) * s * reach
         return np.stack([x, y, t * self.height], axis=-1) + self.at
 
-    def solid(self, rings: int = 16, sides: int = 28) -> Solid:
+    def solid(self, rings: int = 15, sides: int = 28) -> Solid:
         """The closed bag."""
         t = (1 - np.cos(np.linspace(0, np.pi, rings))) / 2
         a = np.linspace(0, 2 * np.pi, sides, endpoint=False)
@@ -286,7 +286,7 @@ def _hiking(p: Backpack, bag: _Bag, c: dict[str, Material]) -> list[Piece]:
         3.4,
         (0, -0.008, 0.86 * h),
     )
-    pieces = [Piece("lid", c["second"], lid.solid(10, 28)), *_zip(lid, (-150, -30), (0.35, 0.6), c)]
+    pieces = [Piece("lid", c["second"], lid.solid(9, 26)), *_zip(lid, (-150, -30), (0.35, 0.6), c)]
     bands: list[Solid] = []
     buckles: list[Solid] = []
     for x in (-0.45 * w, 0.45 * w):
