@@ -13,6 +13,7 @@ from viewsphere.zoo import build_zoo_model
 
 NAMED = {
     "bed": {"mattress_foot_left", "mattress_head_right", "headboard_top_left", "leg_foot_right"},
+    "backpack": {"handle", "pocket", "strap_left", "bottom_rear_right"},
     "bench": {"seat_front_left", "seat_rear_right"},
     "bicycle": {"wheel_front", "wheel_rear", "saddle", "grip_left", "pedal_right"},
     "bollard": {"top", "foot"},
@@ -26,6 +27,7 @@ NAMED = {
     "cabinet": {"top_front_left", "top_rear_right", "bottom_front_left"},
     "car": {"wheel_front_left", "wheel_rear_right", "headlight_left", "taillight_right"},
     "chair": set(),
+    "fountain": {"top", "basin_left"},
     "hair_drier": {"nozzle", "inlet", "handle", "switch"},
     "house": {"door", "roof", "eaves_front_left"},
     "lamp": {"foot", "bulb", "shade", "shade_top"},
@@ -43,6 +45,7 @@ NAMED = {
     "shelf": {"top_front_left", "foot_rear_right"},
     "sofa": {"seat_front_left", "back_top_right", "armrest_front_left", "foot_rear_right"},
     "table": {"top_front_left", "top_rear_right"},
+    "shop": {"sign", "door", "eaves_front_left", "wall_rear_right"},
     "traffic_cone": {"tip", "foot_front_left"},
     "traffic_light": {"red", "amber", "green", "foot"},
     "truck": {"wheel_front_left", "mirror_right", "load_rear_left", "headlight_right"},

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from viewsphere import plugins, zoo
+from viewsphere.zoo.backpack import Backpack, backpack
 from viewsphere.zoo.bollard import Bollard, bollard
 from viewsphere.zoo.bus import Bus, bus
+from viewsphere.zoo.fountain import Fountain, fountain
 from viewsphere.zoo.motorcycle import Motorcycle, motorcycle
+from viewsphere.zoo.shop import Shop, shop
 from viewsphere.zoo.townscape.lettering import lettering
 from viewsphere.zoo.traffic_cone import TrafficCone, traffic_cone
 from viewsphere.zoo.traffic_light import TrafficLight, traffic_light
@@ -18,9 +21,12 @@ from viewsphere.zoo.truck import Truck, truck
 from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
 
 SIZES = {
+    "backpack": ((0.25, 0.5), (0.38, 0.9), (0.25, 0.65)),
     "bollard": ((0.1, 0.6), (0.84, 1.16), (0.1, 0.6)),
     "bus": ((2.4, 3.1), (2.9, 4.8), (9.1, 13.0)),
+    "fountain": ((2.5, 7.2), (1.2, 4.6), (2.5, 7.2)),
     "motorcycle": ((0.65, 1.0), (1.0, 1.6), (1.75, 2.6)),
+    "shop": ((5.39, 8.42), (9.0, 22.0), (8.5, 14.0)),
     "traffic_cone": ((0.2, 0.65), (0.4, 1.55), (0.2, 0.65)),
     "traffic_light": ((0.2, 5.4), (2.8, 6.9), (0.4, 1.5)),
     "truck": ((2.1, 2.8), (1.9, 4.1), (5.5, 10.3)),
@@ -28,11 +34,14 @@ SIZES = {
 """Width, height and length that draws may have, metres."""
 
 MOST = {"bus": 40_000, "motorcycle": 40_000, "truck": 40_000}
-CENTRED = ("bus", "motorcycle", "traffic_cone", "truck")
+CENTRED = ("bus", "fountain", "motorcycle", "traffic_cone", "truck")
 STYLES = {
+    "backpack": {"style": 4, "pockets": 2, "side_pockets": 2, "bottle": 2, "mat": 2},
     "bollard": {"style": 4, "top": 4, "plate": 2, "sides": 2},
     "bus": {"style": 3, "livery": 4, "roof_unit": 4, "door_side": 2, "flush": 2, "split": 2},
+    "fountain": {"style": 3, "sides": 4, "bowls": 3, "jets": 4, "steps": 3, "metal": 2},
     "motorcycle": {"style": 5, "engine": 3, "spokes": 6, "mufflers": 2, "top_box": 2, "panniers": 2},
+    "shop": {"roof": 3, "wall": 3, "storeys": 3, "side_door": 3, "door": 3, "hanging_sign": 3, "bars": 5, "name": 12},
     "traffic_cone": {"foot": 3, "stack": 3, "bands": 6, "light": 2, "dark_foot": 2},
     "traffic_light": {"style": 3, "lit": 3, "sides": 4, "heads": 2, "button": 2, "striped": 2},
     "truck": {"load": 5, "axles": 2, "livery": 4, "visor": 2, "high_roof": 2},
@@ -45,6 +54,7 @@ def test_draws_are_sound_of_real_size_and_differ(family: str) -> None:
     meshes = [drawn(family, seed) for seed in range(4)]
     for mesh in meshes:
         assert_sound(mesh, MOST.get(family, 8_000), least=150)
+        assert mesh.uv0 is None or (np.isfinite(mesh.uv0).all() and all(i.pixels.shape[0] <= 512 for i in mesh.images))
         low, high = mesh.bounds
         assert low[2] == pytest.approx(0, abs=1e-5)
         assert family not in CENTRED or abs((low + high)[:2]).max() / 2 < 0.05 * (high - low)[:2].max()
@@ -75,7 +85,7 @@ def test_draws_cover_all_styles(family: str) -> None:
     for name, kinds in STYLES[family].items():
         counts = {v: sum(getattr(p, name) == v for p in draws) for v in {getattr(p, name) for p in draws}}
         assert len(counts) == kinds and min(counts.values()) >= 3, (name, counts)
-    paints = {p.color for p in draws}
+    paints = {p.wall_color if family == "shop" else p.color for p in draws}
     assert len(paints) > 60
 
 
@@ -199,6 +209,67 @@ def test_a_bollard_has_its_height_and_stands_upright(style: str, top: str) -> No
     np.testing.assert_allclose((mesh.bounds.sum(axis=0) / 2)[:2], 0, atol=1e-6)
     assert part_vertices(mesh, "band")[:, 2].mean() == pytest.approx(0.78 * 0.95)
     assert outward_share(mesh) > 0.995
+
+
+@pytest.mark.parametrize("style", ["school", "hiking", "roll_top", "flap"])
+def test_a_backpack_has_pockets_in_front_and_straps_behind(style: str) -> None:
+    p = Backpack(style=style, bottle=True)
+    mesh = backpack(p)
+    body = part_vertices(mesh, "body")
+    assert np.ptp(body[:, 2]) == pytest.approx(p.height, abs=0.01) and np.ptp(body[:, 0]) == pytest.approx(p.width, rel=0.06)
+    assert part_vertices(mesh, "pocket")[:, 1].max() < 0 < part_vertices(mesh, "strap_left")[:, 1].min()
+    assert part_vertices(mesh, "strap_left")[:, 0].min() > 0 > part_vertices(mesh, "strap_right")[:, 0].max()
+    assert part_vertices(mesh, "handle")[:, 2].max() > 0.95 * p.height
+    own = {"hiking": {"belt", "lid"}, "roll_top": {"lid", "buckle"}, "flap": {"lid", "buckle"}}.get(style, {"zip"})
+    assert own | {"bottle", "side_pocket"} <= set(mesh.parts)
+    assert not {"bottle", "side_pocket"} & set(backpack(replace(p, side_pockets=False)).parts)
+    assert ("mat" in backpack(replace(p, mat=True)).parts) == (style == "hiking")
+
+
+@pytest.mark.parametrize("roof", ["flat", "pitched", "mansard"])
+def test_a_shop_fits_between_its_neighbours(roof: str) -> None:
+    p = Shop(roof=roof, width=6.5, depth=9.5, storeys=4, dormers=True, chimneys=(1, -1), hanging_sign="round", balconies=0.5)
+    mesh = shop(p)
+    np.testing.assert_allclose(mesh.bounds[:, 0], (-p.width / 2, p.width / 2), atol=0.005)
+    wall = part_vertices(mesh, "wall")
+    np.testing.assert_allclose(wall.max(axis=0), (p.width / 2, p.depth / 2, p.height), atol=1e-4)
+    np.testing.assert_allclose(wall.min(axis=0), (-p.width / 2, -p.depth / 2, 0), atol=1e-4)
+    sides = part_vertices(mesh, "party_wall")
+    np.testing.assert_allclose(np.ptp(sides, axis=0)[0], p.width, atol=1e-4)
+    front = -p.depth / 2 + 0.2
+    for part in ("sign", "shop_window", "shop_door", "pilaster", "awning"):
+        corners = (
+            part_vertices(mesh, part) if part != "sign" else part_vertices(mesh, "sign")[part_vertices(mesh, "sign")[:, 1] < 0]
+        )
+        assert corners[:, 1].max() < front and corners[:, 2].max() < p.ground + 0.1, part
+    assert part_vertices(mesh, "balcony")[:, 2].min() > p.ground - 0.2
+    assert {"chimney", "hanging_sign", "cornice", "goods", "door"} <= set(mesh.parts)
+    assert ("dormer" in mesh.parts) == (roof != "flat")
+
+
+def test_a_shop_has_what_was_asked_for_and_bears_its_name() -> None:
+    plain = Shop(awning=0.0, balconies=0.0, side_door=0, chimneys=(), painted=False, surrounds=False, courses=False)
+    bare = shop(plain)
+    assert not {"awning", "balcony", "chimney", "painted_sign", "surround", "course", "hanging_sign"} & set(bare.parts)
+    assert part_vertices(bare, "door_frame")[:, 1].min() > 0  # the yard's alone
+    a, b = (part_vertices(shop(replace(plain, name=name)), "sign") for name in ("CAFE", "PHARMACY"))
+    assert len(a) < len(b)
+    tall = shop(replace(plain, storeys=5))
+    assert len(part_vertices(tall, "window_frame")) > 1.5 * len(part_vertices(bare, "window_frame"))
+
+
+@pytest.mark.parametrize("style", ["tiers", "jets", "column"])
+@pytest.mark.parametrize("sides", [0, 6])
+def test_a_fountains_water_stays_in_its_basin(style: str, sides: int) -> None:
+    p = Fountain(style=style, sides=sides, steps=2)
+    mesh = fountain(p)
+    basin, jet = part_vertices(mesh, "basin"), part_vertices(mesh, "jet")
+    assert np.abs(basin[:, 1]).max() == pytest.approx(p.radius + 0.05, abs=0.01)
+    assert basin[:, 2].max() == pytest.approx(0.28 + p.wall)
+    assert np.hypot(*jet[:, :2].T).max() < p.radius - p.rim and jet[:, 2].max() > basin[:, 2].max() + 0.3
+    assert jet[:, 2].min() > 0.28 + p.wall - 0.3
+    assert ("bowl" in mesh.parts) == (style != "jets") and ("spout" in mesh.parts) == (style != "tiers")
+    assert "step" not in fountain(replace(p, steps=0)).parts
 
 
 def test_lettering_covers_each_cell_of_its_letters_once() -> None:
