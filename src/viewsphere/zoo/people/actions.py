@@ -261,7 +261,9 @@ class _Body:
         s = self._s
         down = _unit(np.array([sign * np.sin(np.radians(away)), 0.0, -np.cos(np.radians(away))]))
         hang = _between(_unit(s[f"{prefix}Elbow"] - s[f"{prefix}Shoulder"]), down)
-        self._turns[JOINTS.index(f"{prefix}Shoulder")] = product(_about(0, -ahead), hang)
+        low = _about(1, sign * 8.0)  # shoulders of hanging arms are lower than those of the bind pose
+        self._turns[JOINTS.index(f"{prefix}Collar")] = low
+        self._turns[JOINTS.index(f"{prefix}Shoulder")] = product(low.T, product(_about(0, -ahead), hang))
         lower = product(hang, _unit(s[f"{prefix}Wrist"] - s[f"{prefix}Elbow"])[:, None])[:, 0]
         straight = _between(lower, down)
         fold = product(_about(2, -sign * inward), product(_about(0, -bend), straight))

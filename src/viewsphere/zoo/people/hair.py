@@ -77,19 +77,20 @@ def hairline(head: Head, style: Style) -> Field:
             forehead = forehead - 0.012
         burn = -0.005 if style in ("short", "crop", "side", "curls") else 0.0
         front = forehead - z
-        beside = np.where(x > 0.045, burn - z, front)
+        temple = np.clip((x - 0.038) / 0.022, 0, 1)
+        beside = front + temple * (burn - z - front)
         edge = -0.048 + 0.0 * x
         share = np.clip((edge - y) / 0.018 + 0.5, 0, 1)
         face = np.minimum(np.where(share > 0, front * share + beside * (1 - share), beside), 0.05)
         nape = {"bob": -0.13, "long": -0.25, "ponytail": -0.085, "bun": -0.080}.get(style, -0.075)
         behind = nape - z
-        ear = 0.0 if style in ("bob", "long") else 1.0
-        around = ear * (0.026 - np.sqrt((y - 0.014) ** 2 + np.clip(np.abs(z + 0.014) - 0.016, 0, 1) ** 2)) * (x > 0.045)
+        ear = 0.026 - np.sqrt((y - 0.014) ** 2 + np.clip(np.abs(z + 0.014) - 0.016, 0, 1) ** 2)
+        around = np.where((x > 0.045) & (style not in ("bob", "long")), ear, -1.0)
         back = np.clip((y + 0.020) / 0.02, 0, 1)
         if style in ("bob", "long"):
             back = np.clip((y + 0.012) / 0.012, 0, 1)
         value = face * (1 - back) + behind * back
-        return np.where(around > value, around, value) * s
+        return np.maximum(around, value) * s
 
     return value
 

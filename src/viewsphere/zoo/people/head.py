@@ -45,7 +45,7 @@ class Head:
     def skull(self) -> Field:
         """Cranium and jaw without features."""
         s, f = self.size, self.face
-        jaw = 0.043 + 0.004 * f.jaw + 0.003 * self.male
+        jaw = 0.039 + 0.0035 * f.jaw + 0.0065 * self.male
         low = -0.077 - 0.004 * f.length
         return joined(
             0.030 * s,
@@ -61,8 +61,9 @@ class Head:
             0.016 * s,
             self.skull(),
             self._ball((0, -0.079, chin), (0.016 + 0.003 * self.male, 0.010, 0.012)),
-            mirror(self._ball((0.041, -0.060, -0.024), (0.020, 0.020, 0.017))),
-            self._ball((0, -0.0775, 0.0205 + 0.001 * f.brow), (0.046, 0.013 + 0.003 * self.male, 0.0105)),
+            mirror(self._ball((0.041, -0.059, -0.024), (0.020, 0.020, 0.017))),
+            mirror(self._ball((0.033, -0.050, -0.052), (0.024, 0.026, 0.028))),
+            self._ball((0, -0.0775, 0.0205 + 0.001 * f.brow), (0.044 + 0.003 * self.male, 0.0095 + 0.0055 * self.male, 0.0100)),
         )
         hollow = mirror(self._ball((0.0325, -0.0990, 0.002), (0.0175, 0.0150, 0.0115)))
         skull = without(skull, hollow, 0.012 * s)
@@ -72,12 +73,12 @@ class Head:
         return joined(0.006 * s, joined(0.010 * s, lids, self._nose(), self._lips()), mirror(self._ear()))
 
     def _nose(self) -> Field:
-        s, n = self.size, self.face.nose
-        tip = (0, -0.1085 - 0.004 * n, -0.0345 - 0.003 * n)
+        s, n, small = self.size, self.face.nose, 0.88 + 0.12 * self.male
+        tip = (0, -0.085 - (0.0225 + 0.004 * n) * small, -0.0340 - 0.003 * n)
         bridge = limb(
-            self.at(0, -0.0815, 0.012), self.at(*tip), ((0, 0.0062 * s), (0.6, 0.0075 * s), (1, (0.0092 + 0.0012 * n) * s))
+            self.at(0, -0.0815, 0.012), self.at(*tip), ((0, 0.0060 * s), (0.6, 0.0072 * small * s), (1, (0.0090 + 0.0012 * n) * small * s))
         )
-        wing = mirror(self._ball((0.0108 + 0.001 * n, -0.0965, -0.0365), (0.0070, 0.0095, 0.0068)))
+        wing = mirror(self._ball(((0.0106 + 0.001 * n) * small, -0.0960, -0.0362), (0.0068 * small, 0.0092, 0.0064)))
         return joined(0.008 * s, bridge, wing)
 
     def _lips(self) -> Field:

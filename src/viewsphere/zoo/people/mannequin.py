@@ -136,7 +136,7 @@ def _painted(q: Float, skin: Float, locks: Float, head: Head) -> Float:
     ):
         color *= 1 + share * spread(center, radii) * (np.array(tone) - 1)
     lips = spread((0.0, -0.092, -0.0655), (0.0255, 0.012, 0.0115))
-    color += np.minimum(2 * lips, 1) * (skin * (0.86, 0.56, 0.54) - color)
+    color += np.minimum(1.6 * lips, 0.85) * (skin * (0.84, 0.62, 0.60) - color)
     brow_z = 0.0215 - 0.40 * np.maximum(x - 0.042, 0) + 0.03 * (x - 0.02)
     brow = np.clip(1.6 - np.abs(z - brow_z) / (0.0036 + 0.0012 * head.male), 0, 1) * ((x > 0.011) & (x < 0.056) & (y < -0.04))
     color += 0.85 * brow[:, None] * (0.7 * locks + 0.1 * skin - color)
