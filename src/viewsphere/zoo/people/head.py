@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from viewsphere.zoo.people.build import Build
 from viewsphere.zoo.people.fields import Field, ball, grown, joined, limb, mirror, without
 from viewsphere.zoo.people.skeleton import Skeleton
-from viewsphere.zoo.shapes.solids import Float, Solid, lathe, moved, turned
+from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, moved, turned
 
 
 @dataclass(frozen=True)
@@ -74,9 +73,12 @@ class Head:
 
     def _nose(self) -> Field:
         s, n, small = self.size, self.face.nose, 0.88 + 0.12 * self.male
+        thick = (0.0090 + 0.0012 * n) * small * s
         tip = (0, -0.085 - (0.0225 + 0.004 * n) * small, -0.0340 - 0.003 * n)
         bridge = limb(
-            self.at(0, -0.0815, 0.012), self.at(*tip), ((0, 0.0060 * s), (0.6, 0.0072 * small * s), (1, (0.0090 + 0.0012 * n) * small * s))
+            self.at(0, -0.0815, 0.012),
+            self.at(*tip),
+            ((0, 0.0060 * s), (0.6, 0.0072 * small * s), (1, thick)),
         )
         wing = mirror(self._ball(((0.0106 + 0.001 * n) * small, -0.0960, -0.0362), (0.0068 * small, 0.0092, 0.0064)))
         return joined(0.008 * s, bridge, wing)
@@ -100,21 +102,17 @@ class Head:
     def eyes(self) -> tuple[Solid, Solid, Solid]:
         """White, iris and pupil of both eyes, which look ahead."""
         r = 0.0125 * self.size
-        edges = np.radians((0.0, 11.0, 28.0, 180.0))
         out = list[Solid]()
-        for k, (a, b) in enumerate(pairwise(edges)):
-            angle = np.linspace(b, a, 10 if k == 2 else 3)
-            lift = 1.006 - 0.003 * k  # each lies on the next
-            profile = np.stack([lift * r * np.sin(angle), lift * r * np.cos(angle)], axis=1)
+        for k, reach in enumerate(np.radians((180.0, 28.0, 11.0))):
+            angle = np.linspace(reach, 0, 13 if k == 0 else 4)
+            lift = 1 + 0.003 * k  # each lies on the one before
+            profile = lift * r * np.stack([np.sin(angle), np.cos(angle)], axis=1)
+            profile = np.concatenate([[(0.0, profile[0, 1])], profile])  # a flat back closes it
+            profile[-1, 0] = 0.0
             one = turned(lathe(profile, 18), 0, np.pi / 2)
-            pair = [moved(one, self.eye * (side, 1, 1)) for side in (1, -1)]
-            out.append(
-                Solid(
-                    np.concatenate([p.vertices for p in pair]),
-                    np.concatenate([pair[0].triangles, pair[1].triangles + len(pair[0].vertices)]),
-                )
-            )
-        return out[2], out[1], out[0]
+            out.append(join(*(moved(one, self.eye * (side, 1, 1)) for side in (1, -1))))
+        white, iris, pupil = out
+        return white, iris, pupil
 
 
 def head_of(b: Build, s: Skeleton, face: Face) -> Head:

@@ -69,6 +69,11 @@ class Tailor:
         return share * self.build.height
 
     @property
+    def _ease(self) -> float:
+        """How far the legs of the bottom are from the skin, metres."""
+        return {"trousers": 0.009, "shorts": 0.014, "skirt": 0.0}[self.outfit.bottom]
+
+    @property
     def arm(self) -> Float:
         """Unit vector along the left upper arm."""
         return _unit(self.skeleton["L_Elbow"] - self.skeleton["L_Shoulder"])
@@ -93,7 +98,8 @@ class Tailor:
             rows[below, k] += hang * np.maximum(0.97 * chest[k] - rows[below, k], 0)
         body = joined(0.04 * h, flesh.torso(b, s), trunk(rows))
         sleeve = flesh.arm(b, s, 0.004 if o.sleeve < 1.5 else 0.003)
-        body = joined(0.028 * h, body, mirror(sleeve))
+        thighs = mirror(flesh.leg(b, s, self._ease + 0.004))
+        body = joined(0.028 * h, joined(0.02 * h, body, thighs), mirror(sleeve))
         cloth = grown(body, lambda p: o.loose + self._folds(p) + 0.012 * np.clip((0.58 * h - p[:, 2]) / (0.07 * h), 0, 1))
         if o.top == "jacket":
             collar = limb(
@@ -141,7 +147,7 @@ class Tailor:
             return self._skirt(waist)
         hips = grown(trunk(waist), 0.003)
         hem = 0.035 * h if o.bottom == "trousers" else 0.0
-        legs = mirror(flesh.leg(b, s, 0.009 if o.bottom == "trousers" else 0.016, hem))
+        legs = mirror(flesh.leg(b, s, self._ease, hem))
         cloth = grown(joined(0.020 * h, hips, legs), lambda p: 0.003 + 0.8 * self._folds(p))
         wide = float(s["L_Hip"][0]) + 0.10 * h
         solid = surface(cloth, (steps(-wide, wide, CELL), steps(-0.16 * h, 0.16 * h, CELL), steps(-0.03, 0.66 * h, 0.017)))
