@@ -60,7 +60,7 @@ def hair(head: Head, style: Style, phase: float) -> Solid | None:
         field = joined(
             0.008 * s, field, grown(ball(head.at(0, 0.098, 0.085), 0.034 * s), lambda p: _strands(head, p, style, phase) * s)
         )
-    solid = surface(field, cells(head.at(-0.14, -0.15, low - 0.04), head.at(0.14, 0.2, 0.17), 0.0072))
+    solid = surface(field, cells(head.at(-0.14, -0.15, low - 0.04), head.at(0.14, 0.2, 0.17), 0.0092))
     return opened(solid, line(solid.vertices), 0.0, 0.003)
 
 

@@ -66,9 +66,9 @@ def _head(b: Build, s: Skeleton, head: Head) -> Solid:
     bust = within(flesh.torso(b, s), ball(s["Neck"] + (0, 0, -0.03 * h), np.array((0.085, 0.085, 0.060)) * h), 0.003)
     whole = joined(0.020 * h, head.field(), joined(0.02 * h, neck(b, s, head), bust))
     (_, y, z), k = head.center.tolist(), head.size
-    x = steps(-0.105 * h, 0.105 * h, 0.012, (-0.058 * k, 0.058 * k, 0.0042))
-    deep = steps(-0.115 * h, 0.115 * h, 0.012, (y - 0.118 * k, y - 0.060 * k, 0.0042))
-    high = steps(0.74 * h, h + 0.012, 0.012, (z - 0.092 * k, z + 0.030 * k, 0.0039))
+    x = steps(-0.105 * h, 0.105 * h, 0.016, (-0.058 * k, 0.058 * k, 0.0052))
+    deep = steps(-0.115 * h, 0.115 * h, 0.016, (y - 0.118 * k, y - 0.060 * k, 0.0048))
+    high = steps(0.74 * h, h + 0.012, 0.016, (z - 0.092 * k, z + 0.030 * k, 0.0045))
     return surface(whole, (x, deep, high))
 
 
@@ -85,9 +85,9 @@ def _arms(b: Build, s: Skeleton, outfit: Outfit) -> Solid:
     turn = np.stack([along, np.array([0.0, 1.0, 0.0]), np.cross(along, (0.0, 1.0, 0.0))])
     begin, r = float(((at - wrist) * along).sum()), 0.062 * b.height / 1.75
     axes = (
-        steps(begin - 0.07, 0.135 * b.height, 0.017, (-0.01, 0.13 * b.height, 0.0062)),
-        steps(-1.25 * r, 1.25 * r, 0.0062),
-        steps(-r, r, 0.0060),
+        steps(begin - 0.07, 0.135 * b.height, 0.022, (-0.01, 0.13 * b.height, 0.0070)),
+        steps(-1.25 * r, 1.25 * r, 0.0068),
+        steps(-r, r, 0.0066),
     )
     solid = surface(lambda q: whole(wrist + _combined(turn, q)), axes)
     return both_sides(Solid(wrist + _combined(turn, solid.vertices), solid.triangles))
@@ -104,8 +104,8 @@ def _legs(b: Build, s: Skeleton, outfit: Outfit) -> Solid:
     top = float(hip[2] + max(outfit.leg - 0.35, 0.25) * (knee[2] - hip[2]))
     whole = within(flesh.leg(b, s), plane((0, 0, top), (0, 0, 1)), 0.002)
     r = 0.09 * b.height
-    across = steps(float(hip[0]) - r, float(hip[0]) + r, 0.0085), steps(-r, r, 0.0085)
-    return both_sides(surface(whole, (*across, steps(float(ankle[2]) - 0.06, top + 0.03, 0.016))))
+    across = steps(float(hip[0]) - r, float(hip[0]) + r, 0.011), steps(-r, r, 0.011)
+    return both_sides(surface(whole, (*across, steps(float(ankle[2]) - 0.06, top + 0.03, 0.022))))
 
 
 def _tints(mesh: Mesh, head: Head, looks: Looks) -> np.ndarray:

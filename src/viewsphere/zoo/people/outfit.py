@@ -20,7 +20,7 @@ from viewsphere.zoo.shapes.solids import Float, Solid, both_sides
 Top = Literal["t_shirt", "shirt", "jumper", "jacket"]
 Bottom = Literal["trousers", "shorts", "skirt"]
 
-CELL = 0.0145
+CELL = 0.019
 """Metres of a quad of cloth."""
 
 
@@ -150,7 +150,7 @@ class Tailor:
         legs = mirror(flesh.leg(b, s, self._ease, hem))
         cloth = grown(joined(0.020 * h, hips, legs), lambda p: 0.003 + 0.8 * self._folds(p))
         wide = float(s["L_Hip"][0]) + 0.10 * h
-        solid = surface(cloth, (steps(-wide, wide, CELL), steps(-0.16 * h, 0.16 * h, CELL), steps(-0.03, 0.66 * h, 0.017)))
+        solid = surface(cloth, (steps(-wide, wide, CELL), steps(-0.16 * h, 0.16 * h, CELL), steps(-0.03, 0.66 * h, 0.021)))
         end = self._end_of_leg()
         solid = opened(solid, solid.vertices[:, 2] - 0.575 * h, 0.0, 0.002)
         return opened(solid, end - solid.vertices[:, 2], 0.03, 0.003)
@@ -194,7 +194,7 @@ class Tailor:
         rim = 0.0125 * k
         shoe = grown(upper, lambda p: np.where(p[:, 2] < rim, 0.0022, 0.0) + 0.001)
         shoe = within(shoe, plane((0, 0, 0.0), (0, 0, -1)), 0.004)
-        solid = surface(shoe, cells(at(-0.06, -0.16, -0.02), at(0.06, 0.07, 0.09), 0.0095))
+        solid = surface(shoe, cells(at(-0.06, -0.16, -0.02), at(0.06, 0.07, 0.09), 0.0115))
         solid = opened(solid, solid.vertices[:, 2] - 0.052 * k, 0.012, 0.003)
         low, high = cut(solid, solid.vertices[:, 2] - rim)
         return both_sides(high), both_sides(low)
