@@ -81,7 +81,7 @@ def test_of_what_cannot_move_nothing_is_said_and_blender_is_not_asked(write, mon
         assert not any("may move" in line for line in report.suggestions)
 
 
-def test_without_blender_an_animated_file_is_told_to_need_it(monkeypatch, tmp_path):
+def test_an_animated_gltf_file_needs_no_blender_and_a_damaged_animation_is_told(monkeypatch, tmp_path):
     def none():
         raise MissingExtraError("no Blender")
 
@@ -89,6 +89,11 @@ def test_without_blender_an_animated_file_is_told_to_need_it(monkeypatch, tmp_pa
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
     leaf(tmp_path / "leaf.gltf", {"Walk": 1, "Wave": 0.5})
     report = describe(tmp_path / "leaf.gltf")
+    assert (report.animation.first, report.animation.last, report.animation.fps) == (0, 24, 24)
+    assert [clip.name for clip in report.animation.clips] == ["Walk", "Wave"]
+    text = (tmp_path / "leaf.gltf").read_text()
+    (tmp_path / "leaf.gltf").write_text(text.replace('"input": 2', '"input": 99'))
+    report = describe(tmp_path / "leaf.gltf")
     assert report.animation is None
     (said,) = [line for line in report.suggestions if "may move" in line]
-    assert "animated and compressed glTF files are read by Blender, found none" in said
+    assert "expected an index below 4, found 99" in said

@@ -42,9 +42,13 @@ BATCH = 32
 """Most frames of a file that are read at once."""
 
 
+Build = Callable[[ModelSpec], Mesh | Path]
+"""Makes the mesh of a source that begins with `zoo:`, or the file of one that moves."""
+
+
 def load_normalised(
     spec: ModelSpec,
-    build: Callable[[ModelSpec], Mesh] | None = None,
+    build: Build | None = None,
     folder: Path | None = None,
     step: TimeStep | None = None,
 ) -> Mesh:
@@ -54,15 +58,15 @@ def load_normalised(
 
 def load(
     spec: ModelSpec,
-    build: Callable[[ModelSpec], Mesh] | None = None,
+    build: Build | None = None,
     folder: Path | None = None,
     step: TimeStep | None = None,
 ) -> tuple[Mesh, FileFacts]:
     """The model in object axes and metres at a time step (None: as it rests), and what its file says of itself; from the cache
     when it holds them.
 
-    `build` makes the mesh of a source that begins with `zoo:` (in object axes, metres); such meshes are
-    normalised too but neither cached nor made in another process. `folder` is the cache's, by default
+    `build` makes the mesh of a source that begins with `zoo:` (in object axes, metres), or a file that is read in its place;
+    such meshes are normalised too but neither cached nor made in another process. `folder` is the cache's, by default
     `cache_folder()`. A damaged entry is built again; a cache that cannot be written is no error. Read back, every
     array is equal bit for bit. Raises ModelError as the readers do and when reading takes too long or too much.
     """
@@ -71,7 +75,10 @@ def load(
         whole, facts = load(spec.whole, build, folder, None if frame is None else TimeStep(frame=frame))
         return taken(whole, spec, step), facts
     if spec.source.startswith(ZOO):
-        raw, facts = load_zoo(spec, build)
+        built = _built(spec, build)
+        if isinstance(built, Path):
+            return load(in_file(spec, built), None, folder, step)
+        raw, facts = built, _zoo_facts(spec, built)
         return normalise(raw, facts, spec), placed(raw, facts, spec)
     path, inside = split_source(Path(spec.source))
     folder = folder or cache_folder()
@@ -96,13 +103,17 @@ def frame_of(spec: ModelSpec, step: TimeStep | None) -> int | None:
     return spec.rest if step is None else step.frame
 
 
-def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = None) -> None:
-    """Put what the cache lacks of an animated model at these frames into it: the file is opened once for many.
+def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = None, build: Build | None = None) -> None:
+    """Put what the cache lacks of an animated model at these frames into it: the file is opened once for many. `build` makes
+    the file of a source that begins with `zoo:`.
 
     Raises ModelError as `load` does; a cache that cannot be written is no error.
     """
     folder = folder or cache_folder()
     spec = spec if spec.parts is None else spec.whole
+    if spec.source.startswith(ZOO):
+        built = _built(spec, build)
+        spec = in_file(spec, built) if isinstance(built, Path) else spec
     path, inside = split_source(Path(spec.source))
     lacking: dict[int, str] = {}
     with suppress(OSError):
@@ -161,14 +172,26 @@ def _aside(folder: Path) -> Generator[Path]:
         yield place
 
 
-def load_zoo(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None) -> tuple[Mesh, FileFacts]:
-    """A procedural model and its facts; ModelError when there is nothing to build it with."""
+def in_file(spec: ModelSpec, file: Path) -> ModelSpec:
+    """The specification of a model of the zoo as that of the file which it is in."""
+    return spec.model_copy(update={"source": str(file)})
+
+
+def _built(spec: ModelSpec, build: Build | None) -> Mesh | Path:
+    """A procedural model; ModelError when there is nothing to build it with."""
     if build is None:
         raise ModelError(f"{spec.source}: no builder for procedural models was given")
-    mesh, family = build(spec), spec.source.removeprefix(ZOO)
+    try:
+        return build(spec)
+    except OSError as error:
+        raise ModelError(f"{spec.source}: expected to write its file into the cache ({error}); set VIEWSPHERE_CACHE") from None
+
+
+def _zoo_facts(spec: ModelSpec, mesh: Mesh) -> FileFacts:
+    family = spec.source.removeprefix(ZOO)
     known = plugins.family(family) if family in plugins.families() else None
     points = part_points(mesh, getattr(known, "KEYPOINTS", {}), getattr(known, "SKELETON", ()))
-    return mesh, FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0, size=extents(mesh), keypoints=points)
+    return FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0, size=extents(mesh), keypoints=points)
 
 
 def cache_folder() -> Path:

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.deforming import DeformingMesh
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.assets.rigged import Clip, RiggedModel, quaternions
 from viewsphere.assets.runs import Run, runs
 from viewsphere.codecs.png_tiff import encode_png
 
 WRAP_CODES = {"clamp": 33071, "mirror": 33648, "repeat": 10497}
 NEAREST, LINEAR, LINEAR_MIPMAP_LINEAR = 9728, 9729, 9987
-FLOAT, UINT32 = 5126, 5125
+FLOAT, UINT32, UINT8 = 5126, 5125, 5121
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 BODY_PARTS = "body_parts"
@@ -58,6 +59,30 @@ def deforming_glb_bytes(model: DeformingMesh, names: Mapping[int, str], seconds:
         parts += [{"name": writer.meshes[i]["name"], "mesh": i} for i in own]
     writer.animate([seconds[frame] for frame in model.meshes])
     return writer.packed(steps + parts, len(steps))
+
+
+def rigged_glb_bytes(model: RiggedModel) -> bytes:
+    """GLB of a rigged model whose first joint alone has none above it: a node with the skin for each part, then one for each
+    joint, and its animations in their order, with a key at each of their times. At rest it stands as `model.rest` says. Equal
+    models give equal bytes.
+    """
+    writer = _Writer({}, skinned=model)
+    writer.add_mesh(model.mesh)
+    first, rest = len(writer.meshes), quaternions(model.rest.turns)
+    nodes: list[Object] = [{"name": part["name"], "mesh": i, "skin": 0} for i, part in enumerate(writer.meshes)]
+    for i, (name, above) in enumerate(zip(model.joints, model.above, strict=True)):
+        own = [first + k for k, other in enumerate(model.above) if other == i]
+        place = model.rest.root if above < 0 else model.places[i] - model.places[above]
+        said: Object = {"children": own} if own else {}
+        nodes.append({"name": name, **said, "translation": _y_up(place).tolist(), "rotation": rest[i].tolist()})
+    for name, clip in model.clips.items():
+        writer.clip(name, clip, first)
+    return writer.packed(nodes, first + 1)
+
+
+def _y_up(places: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Places (..., 3) of axes with z up in those of glTF."""
+    return (places[..., [0, 2, 1]] * (1.0, 1.0, -1.0) + 0.0).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +159,7 @@ class _Writer:
     animations: list[Object] = field(default_factory=list[Object])
     images: list[Image] = field(default_factory=list[Image])
     cameras: list[Object] = field(default_factory=list[Object])
+    skinned: RiggedModel | None = None
     last: Mesh | None = None
     first_image: int = 0
     first_material: int = 0
@@ -164,6 +190,9 @@ class _Writer:
             "POSITION": self.accessor(mesh.vertices[at][:, turned] * signs, "VEC3", bounded=True),
             "NORMAL": self.accessor(mesh.normals[at][:, turned] * signs, "VEC3"),
         }
+        if self.skinned is not None:
+            attributes["JOINTS_0"] = self.accessor(self.skinned.vertex_joints[at].astype(np.uint8), "VEC4")
+            attributes["WEIGHTS_0"] = self.accessor(self.skinned.vertex_weights[at].astype(np.float32), "VEC4")
         for name, array, kind in (
             ("TEXCOORD_0", mesh.uv0, "VEC2"),
             ("TEXCOORD_1", mesh.uv1, "VEC2"),
@@ -200,6 +229,25 @@ class _Writer:
             channels.append({"sampler": i, "target": {"node": i, "path": "scale"}})
         self.animations.append({"name": "time steps", "samplers": samplers, "channels": channels})
 
+    def skin(self, model: RiggedModel, first: int) -> Object:
+        """The skin of a model whose joints are the nodes from `first` on."""
+        binds = np.tile(np.eye(4, dtype=np.float32), (len(model.joints), 1, 1))
+        binds[:, 3, :3] = -_y_up(model.places)  # column by column
+        inverse = self.accessor(binds.reshape(-1, 16), "MAT4", target=None)
+        return {"joints": [first + i for i in range(len(model.joints))], "inverseBindMatrices": inverse}
+
+    def clip(self, name: str, clip: Clip, first: int) -> None:
+        """An animation that turns all joints, which are the nodes from `first` on, and moves the first of them."""
+        times = self.keys(np.array(clip.seconds, np.float32).reshape(-1, 1), "SCALAR")
+        turns = np.array([pose.turns for pose in clip.poses])
+        outputs = [(0, "translation", self.keys(_y_up(np.array([pose.root for pose in clip.poses])), "VEC3"))]
+        outputs += [(i, "rotation", self.keys(quaternions(turns[:, i]), "VEC4")) for i in range(turns.shape[1])]
+        samplers: list[Object] = [{"input": times, "output": output} for _, _, output in outputs]
+        channels: list[Object] = [
+            {"sampler": i, "target": {"node": first + node, "path": path}} for i, (node, path, _) in enumerate(outputs)
+        ]
+        self.animations.append({"name": name, "samplers": samplers, "channels": channels, "extras": dict(clip.extras)})
+
     def keys(self, rows: NDArray[np.float32], kind: str) -> int:
         """An accessor of an animation's key frames."""
         return self.accessor(rows, kind, bounded=kind == "SCALAR", target=None)
@@ -215,14 +263,14 @@ class _Writer:
 
     def accessor(self, rows: NDArray[Any], kind: str, bounded: bool = False, target: int | None = ARRAY_BUFFER) -> int:
         """Put an array into the file; `target` says what reads it, if it is no index; None: nothing of glTF."""
-        is_float = rows.dtype == np.float32
-        data = np.ascontiguousarray(rows, "<f4" if is_float else "<u4")
-        content = kind, bounded, is_float, target, hashlib.sha256(data.tobytes()).digest()
+        is_float, is_byte = rows.dtype == np.float32, rows.dtype == np.uint8
+        data = np.ascontiguousarray(rows, "<f4" if is_float else "u1" if is_byte else "<u4")
+        content = kind, bounded, is_float, is_byte, target, hashlib.sha256(data.tobytes()).digest()
         if self.known is not None and content in self.known:
             return self.known[content]
         entry: Object = {
-            "bufferView": self.view(data.tobytes(), target if is_float or target is None else ELEMENT_ARRAY_BUFFER),
-            "componentType": FLOAT if is_float else UINT32,
+            "bufferView": self.view(data.tobytes(), target if is_float or is_byte or target is None else ELEMENT_ARRAY_BUFFER),
+            "componentType": FLOAT if is_float else UINT8 if is_byte else UINT32,
             "count": len(rows),
             "type": kind,
         }
@@ -339,6 +387,7 @@ class _Writer:
                     "bufferView": self.view(encode_png(image.pixels)),
                 }
             )
+        skins = [] if self.skinned is None else [self.skin(self.skinned, len(self.meshes))]
         root: Object = {
             "asset": {"version": "2.0", "generator": "viewsphere"},
             "scene": 0,
@@ -352,6 +401,7 @@ class _Writer:
         }
         optional = {"images": images, "samplers": self.samplers, "textures": self.textures, "animations": self.animations}
         optional["cameras"] = self.cameras
+        optional["skins"] = skins
         root |= {name: value for name, value in optional.items() if value}
         if self.extensions:
             root["extensionsUsed"] = sorted(self.extensions)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.cache import ZOO, load
+from viewsphere.assets.cache import ZOO, Build, in_file, load
 from viewsphere.assets.load import PICTURE_SUFFIXES
-from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.mesh import Material
 from viewsphere.assets.normalise import axes
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.timeline import Timeline, animation_of
@@ -62,16 +61,16 @@ class ModelReport:
     suggestions: tuple[str, ...]
 
 
-def describe(source: Path | ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None) -> ModelReport:
+def describe(source: Path | ModelSpec, build: Build | None = None) -> ModelReport:
     """Read a model and report what is in it; a path is read with default settings.
 
-    `build` makes the mesh of a `zoo:` source. Raises ModelError as reading and normalising do.
+    `build` makes the mesh of a `zoo:` source, or its file. Raises ModelError as reading and normalising do.
     """
     spec = source if isinstance(source, ModelSpec) else _default_spec(source)
     mesh, facts = load(spec, build)
     low, high = mesh.bounds
     width, length, height = (float(x) for x in high - low)
-    animation, problems = _animation(spec)
+    animation, problems = _animation(spec, build)
     traits = traits_of(spec, mesh, facts)
     is_file = not spec.source.startswith(ZOO)
     back = np.linalg.inv(facts.object_from_file) if is_file else np.eye(4)
@@ -112,10 +111,11 @@ def _default_spec(path: Path) -> ModelSpec:
     return ModelSpec(key=path.stem, source=str(path.absolute()), category="model", category_id=1)
 
 
-def _animation(spec: ModelSpec) -> tuple[Timeline | None, tuple[str, ...]]:
+def _animation(spec: ModelSpec, build: Build | None) -> tuple[Timeline | None, tuple[str, ...]]:
     """When the file's animations begin and end, and why that is not known."""
     if spec.source.startswith(ZOO):
-        return None, ()
+        built = None if build is None else build(spec)
+        return _animation(in_file(spec, built), None) if isinstance(built, Path) else (None, ())
     try:
         return animation_of(Path(spec.source), spec.confined), ()
     except ModelError as error:

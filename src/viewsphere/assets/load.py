@@ -16,7 +16,8 @@ from viewsphere.errors import ModelError
 SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")
 BLENDER_SUFFIXES = ("abc", "blend", "fbx", "usd", "usda", "usdc", "usdz")
 """Suffixes of formats that only Blender reads."""
-ANIMATED_SUFFIXES = (*BLENDER_SUFFIXES, "glb", "gltf")
+GLTF = ("glb", "gltf")
+ANIMATED_SUFFIXES = (*BLENDER_SUFFIXES, *GLTF)
 PICTURE_SUFFIXES = ("bmp", "jpeg", "jpg", "png", "tif", "tiff", "webp")
 
 KNOWN = {
@@ -81,19 +82,39 @@ def load_frames(
     clip: str | None = None,
     fps: float | None = None,
 ) -> Iterator[tuple[Mesh, FileFacts]]:
-    """A model file's meshes at its first frame, then at each of the ascending `frames`; Blender opens the file once.
+    """A model file's meshes at its first frame, then at each of the ascending `frames`; the file is opened once, by Blender
+    unless it is a glTF file that this package reads by itself.
 
     `clip` names the animation that is played, where the file has several; `fps` is how many frames make a second, None for
     what the file says.
 
     Otherwise as `load_model`; ModelError for files that cannot move.
     """
-    check_animated(path)
+    suffix = check_animated(path)
     file, inside = split_source(path)
+    folder = ModelFolder(file, confined, inside, shown, clip, fps)
+    with np.errstate(all="ignore"):
+        yield from _gltf_frames(folder, frames) if suffix in GLTF else _frames_via_blender(folder, frames)
+
+
+def _frames_via_blender(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
     from viewsphere.assets.via_blender import read_frames
 
-    with np.errstate(all="ignore"):
-        yield from read_frames(ModelFolder(file, confined, inside, shown, clip, fps), frames)
+    return read_frames(folder, frames)
+
+
+def _gltf_frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
+    """A glTF file's meshes; by Blender where it is compressed in a way that only Blender reads."""
+    from viewsphere.assets.gltf import read_gltf_frames
+    from viewsphere.assets.gltf.document import ForBlenderError
+
+    read = read_gltf_frames(folder.copy(), frames)
+    try:
+        yield next(read)
+    except ForBlenderError:
+        yield from _frames_via_blender(folder, frames)
+        return
+    yield from read
 
 
 def check_animated(path: Path) -> str:
@@ -119,7 +140,7 @@ def check_source(path: Path) -> str:
 
 
 def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, FileFacts]:
-    if suffix in {"glb", "gltf"}:
+    if suffix in GLTF:
         return _read_gltf(folder, node)
     if suffix in BLENDER_SUFFIXES:
         from viewsphere.assets.via_blender import read_via_blender

@@ -1,8 +1,10 @@
-"""A file's timeline, asked from Blender; answers are cached until the file, or a file that it names, changes."""
+"""A file's timeline: that of a glTF file is read here, all others are asked from Blender. Answers are cached until the file, or
+a file that it names, changes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +12,10 @@ from typing import Any
 
 from viewsphere.assets.cache import kept
 from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.gltf.animation import timeline
 from viewsphere.assets.gltf.document import Document, ForBlenderError
 from viewsphere.assets.inside import split_source
-from viewsphere.assets.load import ANIMATED_SUFFIXES, check_animated
+from viewsphere.assets.load import ANIMATED_SUFFIXES, GLTF, check_animated
 from viewsphere.assets.via_blender import asked, read_named, remember_layers, started
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import ModelError
@@ -82,8 +85,22 @@ class Blenders:
         """The file's timeline while the animation `clip` plays, by default the first one, in frames of which `fps` make a
         second, by default as many as the file says.
         """
-        told = self.told(path, confined, "timeline", {"clip": clip, "fps": fps})
+        file = split_source(path)[0]
+        if check_animated(file) in GLTF:
+            told = kept(file, f"timeline here {clip} {fps}", lambda: self._of_gltf(file, confined, clip, fps))
+        else:
+            told = self.told(path, confined, "timeline", {"clip": clip, "fps": fps})
         return Timeline(told["first"], told["last"], told["fps"], told["moves"], tuple(Clip(**clip) for clip in told["clips"]))
+
+    def _of_gltf(
+        self, file: Path, confined: bool, clip: str | None, fps: float | None
+    ) -> tuple[dict[str, Any], Sequence[Path]]:
+        """The timeline of a glTF file, by Blender where only Blender can read it, and which files say it."""
+        folder = ModelFolder(file, confined)
+        try:
+            return timeline(Document.read(folder), clip, fps), folder.files
+        except ForBlenderError:
+            return self.told(file, confined, "timeline", {"clip": clip, "fps": fps}), [file]
 
     def _asked(self, folder: ModelFolder, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
         place = folder.model.parent.resolve(), folder.confined
@@ -116,7 +133,7 @@ def animation_of(path: Path, confined: bool) -> Timeline | None:
 def _may_move(folder: ModelFolder) -> bool:
     """Whether the format has animations and, of glTF, whose JSON is read here, the file has."""
     kind = folder.model.suffix[1:].lower()
-    if kind not in ("glb", "gltf"):
+    if kind not in GLTF:
         return kind in ANIMATED_SUFFIXES
     try:
         return bool(list(Document.read(folder).root.items("animations")))

@@ -17,7 +17,7 @@ from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Positive
 from viewsphere.recipe.draws import CountDrawn, Drawn, is_random
-from viewsphere.recipe.motion import MOTION, MotionField, has_clip
+from viewsphere.recipe.motion import MOTION, MotionField
 from viewsphere.recipe.time import RATE, STEPS, Frames, Rate, Steps
 from viewsphere.recipe.values import OrShort, shape_of
 
@@ -120,8 +120,8 @@ class ModelEntry(Brief):
     )
     frames: Frames | None = Field(
         default=None,
-        description="time steps of an animated file (abc, blend, fbx, glb, gltf, usd): all, a list of frames, or {first, last, "
-        "step}. Without it, the file as at its first frame",
+        description="time steps of zoo:person or an animated file (abc, blend, fbx, glb, gltf, usd): all, a list of frames, or "
+        "{first, last, step}. Without it, the file as at its first frame",
     )
     clip: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
@@ -204,12 +204,8 @@ class ModelEntry(Brief):
             raise ValueError(f"expected a category, such as car; found none (only zoo families have one of their own){zoo}")
         if self.up and self.forward and self.up[1] == self.forward[1]:
             raise ValueError(f"expected up and forward along different axes; found {self.up} and {self.forward}")
-        if families and self.frames is not None:
-            raise ValueError("expected a file for frames; found the zoo, whose models do not move")
         if families and self.sidecar is not None:
             raise ValueError("expected a file for sidecar; found the zoo, whose models say what there is to say")
-        if families and has_clip(self.motion):
-            raise ValueError("expected a file for the motion clip; found the zoo, whose models have no clips")
         if self.frames is None and self.poses != "each":
             raise ValueError(f"expected frames, for poses: {self.poses}; found none")
         if self.scale == "real_size" and self.real_size is None and not families:

@@ -24,6 +24,7 @@ from viewsphere.model.thing import TimeStep
 from viewsphere.run.stages import Stages, model_files
 from viewsphere.store import ModelInfo, PlanRecord, Store
 from viewsphere.store.manifest import Manifest
+from viewsphere.zoo import build_zoo_model
 
 Steps = dict[int, TimeStep]
 """Time steps by the frames of their model's file, ascending."""
@@ -56,10 +57,10 @@ class Models:
         known, wanted = self.store.model_info(spec.key), _with_rest(spec, steps)
         self._check_key(spec)
         credit = credit or (known and known.credit)
-        if known is not None and trusted and spec.source.startswith("zoo:") and credit == known.credit:
+        if known is not None and trusted and not wanted and spec.source.startswith("zoo:") and credit == known.credit:
             return
         if wanted:
-            read_ahead(spec, wanted)
+            read_ahead(spec, wanted, build=build_zoo_model)
         if known is not None:
             self._compare(spec, known, wanted)
             held = _steps(known)
@@ -67,7 +68,7 @@ class Models:
                 return
             wanted = _with_rest(spec, chain(held.values(), wanted.values()))
             if wanted:
-                read_ahead(spec, wanted)
+                read_ahead(spec, wanted, build=build_zoo_model)
         target = self.store.model_folder(spec.key)
         self._write(spec, wanted, credit, self.store.aside(target) if known is None else self.store.replacing(target))
 
@@ -77,7 +78,7 @@ class Models:
         """
         wanted = _with_rest(spec, steps)
         if wanted:
-            read_ahead(spec, wanted)
+            read_ahead(spec, wanted, build=build_zoo_model)
         place = self.store.aside(self.store.model_folder(spec.key), again=True)
         self._write(spec, wanted, self._credit_of(spec.key, credit), place)
 

@@ -140,7 +140,7 @@ class Stages:
         for spec in specs:
             frames = {step.frame for step in planned.steps_of(spec)}
             if frames and spec.rest is not None:
-                read_ahead(spec, frames | {spec.rest})
+                read_ahead(spec, frames | {spec.rest}, build=build_zoo_model)
 
     def check_distances(self, planned: Plan, subject: str) -> None:
         """Raise RecipeError if a pose's camera would stand inside what stands in a subject's frames."""

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from viewsphere.assets.timeline import Blenders, Timeline
-from viewsphere.errors import RecipeError, each
+from viewsphere.errors import each
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.thing import TimeStep
-from viewsphere.recipe.models import ZOO, ModelEntry
+from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.motion import MotionEntry, Motions, has_clip, listed
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.sampling.motion import Start, mover
 from viewsphere.sampling.seeds import generator
-from viewsphere.sampling.time_steps import animation, resting
+from viewsphere.sampling.time_steps import animated_file, animation, resting
 
 
 def with_clips(
@@ -75,6 +74,4 @@ def _is_drawn(entry: MotionEntry) -> bool:
 
 
 def _timeline(spec: ModelSpec, entry: ModelEntry, field: str, blenders: Blenders) -> Timeline:
-    if spec.source.startswith(ZOO):
-        raise RecipeError(f"{field}: expected a file for clip, which plays its animation; found {spec.source}")
-    return animation(Path(spec.source), spec.confined, entry.clip, field, blenders, entry.fps)
+    return animation(animated_file(spec, field), spec.confined, entry.clip, field, blenders, entry.fps)

@@ -15,10 +15,11 @@ from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.model.instant import Moment, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.recipe.models import ModelEntry
+from viewsphere.recipe.models import ZOO, ModelEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.time import Frames, Steps, chosen_frames
 from viewsphere.sampling.viewpoints import Poses, RepeatedPoses
+from viewsphere.zoo import file_of
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ def _model_steps(
     spec: ModelSpec, entry: ModelEntry, where: str, blenders: Blenders
 ) -> tuple[Timeline, tuple[tuple[int, Moment], ...]]:
     assert entry.frames is not None
-    return _steps(Path(spec.source), entry.confined, entry.frames, where, blenders, entry.clip, entry.fps)
+    return _steps(animated_file(spec, f"{where}.frames"), entry.confined, entry.frames, where, blenders, entry.clip, entry.fps)
 
 
 def _scene_frames(recipe: Recipe) -> Frames | None:
@@ -201,6 +202,23 @@ def _steps(
         found = f"{beyond[0]}" if beyond else "none of them"
         raise RecipeError(f"{where}.frames: expected frames of {line.first} to {line.last}, as {path} has; found {found}")
     return line, tuple((frame, Moment(frame=frame, seconds=line.seconds(frame))) for frame in chosen)
+
+
+def animated_file(spec: ModelSpec, field: str) -> Path:
+    """The file of a model that is to move; raises RecipeError, which begins with the field, for one of the zoo that stays."""
+    if not spec.source.startswith(ZOO):
+        return Path(spec.source)
+    try:
+        file = file_of(spec)
+    except OSError as error:
+        raise RecipeError(
+            f"{field}: {spec.source}: expected to write its file into the cache ({error}); set VIEWSPHERE_CACHE"
+        ) from None
+    if file is None:
+        raise RecipeError(
+            f"{field}: expected a file, or a family that moves, such as zoo:person; found {spec.source}, which does not move"
+        )
+    return file
 
 
 def animation(

@@ -2,15 +2,21 @@
 
 A family is one module of this package, named as its file: `NAME(...)` builds a Mesh from parameters and `NAME_random(rng)`
 draws the parameters; `NAME_sized(rng, (width, height, length))`, where a family has it, draws those that its size leaves open.
-`HOME` says where its members are found, `KEYPOINTS` are its named points by its parts, and `SKELETON` lines between them.
-Sub-packages hold the parts that families are built from.
+`HOME` says where its members are found, `KEYPOINTS` are its named points by its parts, and `SKELETON` lines between them. A
+family that moves has `CLIPS`, names of animations, and builds a RiggedModel: from there on it is a GLB file in the cache, read
+and played as any other. Sub-packages hold the parts that families are built from.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+import hashlib
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from viewsphere import plugins
+from viewsphere.aside import aside, temporary
+from viewsphere.caches import cache_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -18,6 +24,8 @@ if TYPE_CHECKING:
 
     from viewsphere.assets.mesh import Mesh
     from viewsphere.model.model_spec import ModelSpec
+
+ZOO = "zoo:"
 
 Home = Literal["table", "floor", "street", "garden", "water", "place"]
 """Where a family is found; `place`: it is a place's ground or building, not a thing in it."""
@@ -41,19 +49,84 @@ def families() -> tuple[str, ...]:
 
 
 def build(family: str, rng: np.random.Generator) -> Mesh:
-    """A random member of the family; the same generator state gives the same bytes.
+    """A random member of the family, as it rests; the same generator state gives the same bytes.
 
     Raises UserError for an unknown family, with the nearest known one.
     """
+    made = _built(family, rng)
+    if not clips_of(family):
+        return made
+    from viewsphere.assets.glb import rigged_glb_bytes
+    from viewsphere.assets.load import load_model
+    from viewsphere.assets.normalise import normalise
+    from viewsphere.model.model_spec import ModelSpec
+
+    with temporary("zoo") as place:
+        file = place / f"{family}.glb"
+        file.write_bytes(rigged_glb_bytes(made))
+        raw, facts = load_model(file)
+    spec = ModelSpec(key=family, source=ZOO + family, category=family, category_id=0, centring="as_is")
+    return normalise(raw, facts, spec)
+
+
+def build_zoo_model(spec: ModelSpec) -> Mesh | Path:
+    """The procedural model that a `zoo:family` source names, drawn from its seed, and built to the size that it asks for: its
+    mesh, or the file of one that moves.
+    """
+    import numpy as np
+
+    file = file_of(spec)
+    if file is not None:
+        return file
+    family, rng = spec.source.removeprefix(ZOO), np.random.default_rng(spec.seed)
+    return build(family, rng) if spec.size is None else getattr(plugins.family(family), f"{family}_sized")(rng, spec.size)
+
+
+def clips_of(family: str) -> tuple[str, ...]:
+    """Names of the animations of a family, none of those that stay as they are; raises UserError for an unknown family."""
+    return getattr(plugins.family(family), "CLIPS", ())
+
+
+def file_of(spec: ModelSpec) -> Path | None:
+    """The GLB file of a model of a family that moves, made unless the cache has it; None for all others.
+
+    Raises UserError for an unknown family, and OSError where neither the cache nor the system's folder for such files can be
+    written.
+    """
+    import numpy as np
+
+    family = spec.source.removeprefix(ZOO)
+    if not spec.source.startswith(ZOO) or not clips_of(family):
+        return None
+    file = cache_of("zoo") / f"{family}-{_digest(family)}-{spec.seed}.glb"
+    if not file.is_file():
+        from viewsphere.assets.glb import rigged_glb_bytes
+
+        data = rigged_glb_bytes(_built(family, np.random.default_rng(spec.seed)))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with aside(file.parent, "building-") as place:
+            (place / file.name).write_bytes(data)
+            (place / file.name).replace(file)
+    return file
+
+
+def _built(family: str, rng: np.random.Generator) -> Any:
     return getattr(plugins.family(family), f"{family}_random")(rng)
 
 
-def build_zoo_model(spec: ModelSpec) -> Mesh:
-    """The procedural model that a `zoo:family` source names, drawn from its seed, and built to the size that it asks for."""
-    import numpy as np
+def _digest(family: str) -> str:
+    """Of the sources that a family's file is made by, and of what else it is made of."""
+    also = getattr(plugins.family(family), "made_of", None)
+    return hashlib.sha256(f"{_sources()} {also() if also else ''}".encode()).hexdigest()[:20]
 
-    family, rng = spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed)
-    return build(family, rng) if spec.size is None else getattr(plugins.family(family), f"{family}_sized")(rng, spec.size)
+
+@cache
+def _sources() -> str:
+    own = Path(__file__).parent
+    digest = hashlib.sha256()
+    for source in [*sorted(own.rglob("*.py")), *(own.with_name("assets") / name for name in ("glb.py", "rigged.py"))]:
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
 
 
 def rooms_of(spec: ModelSpec) -> tuple[NDArray[np.float64], ...]:
@@ -63,9 +136,9 @@ def rooms_of(spec: ModelSpec) -> tuple[NDArray[np.float64], ...]:
     """
     import numpy as np
 
-    if not spec.source.startswith("zoo:"):
+    if not spec.source.startswith(ZOO):
         return ()
-    module = plugins.family(spec.source.removeprefix("zoo:"))
+    module = plugins.family(spec.source.removeprefix(ZOO))
     if not hasattr(module, "rooms"):
         return ()
     return module.rooms(module.draw(np.random.default_rng(spec.seed)))

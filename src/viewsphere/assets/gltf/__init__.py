@@ -5,7 +5,11 @@ https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
 from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.gltf.animation import Posed, posed, timeline
 from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.keypoints import read_keypoints
 from viewsphere.assets.gltf.material import read_materials
@@ -22,9 +26,25 @@ def read_gltf(folder: ModelFolder, node: str | None = None) -> tuple[Mesh, FileF
     are repeated. One part a node, named by the node or its mesh; points as `read_keypoints` has them. Raises ModelError
     for a file that breaks the specification in a way that affects the mesh, or requires an extension that this reader lacks.
     """
+    return _built(Document.read(folder), node, {})
+
+
+def read_gltf_frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
+    """The file as `read_gltf` gives it at the first frame of the animation that `folder.clip` names (None: of what moves each
+    node first), then at each of the `frames`, of which `folder.fps` make a second. Raises ModelError as there, and for
+    a clip that the file does not have.
+    """
     document = Document.read(folder)
-    worlds = world_matrices(document, node)
-    pieces = read_pieces(document, worlds)
+    line = timeline(document, folder.clip, folder.fps)
+    for frame in (line["first"], *frames):
+        at_frame = replace(document, folder=folder.copy())
+        yield _built(at_frame, None, posed(document, folder.clip, frame / line["fps"]))
+
+
+def _built(document: Document, node: str | None, now: Posed) -> tuple[Mesh, FileFacts]:
+    folder = document.folder
+    worlds = world_matrices(document, node, now)
+    pieces = read_pieces(document, worlds, now)
     materials = read_materials(document, {piece.material for piece in pieces})
     facts = FileFacts(
         folder.model, folder.model.suffix[1:].lower(), "+y", "+z", 1.0, keypoints=read_keypoints(document, worlds)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from viewsphere.assets.gltf.animation import Posed
 from viewsphere.assets.gltf.document import DRACO, Document, ForBlenderError
 from viewsphere.assets.gltf.field import Field
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
@@ -20,8 +22,9 @@ from viewsphere.model.keypoints import is_name
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
-def read_pieces(document: Document, worlds: Mapping[int, Float]) -> list[Primitive]:
-    """The triangles of nodes, whose `worlds` are as `world_matrices` gives them, node by node, transforms applied.
+def read_pieces(document: Document, worlds: Mapping[int, Float], now: Posed = MappingProxyType({})) -> list[Primitive]:
+    """The triangles of nodes, whose `worlds` are as `world_matrices` gives them, node by node, transforms applied. What an
+    animation makes of nodes `now` takes the place of what they say.
 
     What is scaled to nothing is not drawn (glTF 2.0, section 3.5.3).
     """
@@ -36,7 +39,8 @@ def read_pieces(document: Document, worlds: Mapping[int, Float]) -> list[Primiti
         mesh = node.integer("mesh")
         entry = document.root.at("meshes", mesh)
         part = _unused(node.text("name") or entry.text("name") or f"node{index}", parts)
-        weights = tuple(_weights(node) or _weights(entry))
+        moved_weights = now.get(index, {}).get("weights")
+        weights = tuple(_weights(node) or _weights(entry) if moved_weights is None else moved_weights.tolist())
         if "skin" in node or any(weights):
             local = _primitives(document, entry, weights, _skin(document, node, worlds))
         else:
@@ -61,9 +65,9 @@ def _unused(name: str, taken: dict[str, int]) -> str:
     return unique
 
 
-def world_matrices(document: Document, below: str | None = None) -> dict[int, Float]:
+def world_matrices(document: Document, below: str | None = None, now: Posed = MappingProxyType({})) -> dict[int, Float]:
     """Node-to-world matrices (4, 4) of the default scene, parents first, in file order; or those of what is `below` a node of a
-    name, which is the world then.
+    name, which is the world then. What an animation makes of nodes `now` takes the place of what they say.
     """
     root = document.root
     nodes = root.items("nodes")
@@ -82,7 +86,7 @@ def world_matrices(document: Document, below: str | None = None) -> dict[int, Fl
         if index in worlds:
             raise document.folder.error(f"nodes[{index}] is reached twice: expected a tree, found a cycle or a shared child")
         node = root.at("nodes", index)
-        worlds[index] = compose(parent, _local_matrix(node))
+        worlds[index] = compose(parent, _local_matrix(node, now.get(index, {})))
         stack.extend((child, worlds[index], depth + 1) for child in reversed(_indices(node, "children")))
     return worlds
 
@@ -108,13 +112,15 @@ def _weights(entry: Field) -> list[float]:
     return list(entry.numbers("weights", count, ()))
 
 
-def _local_matrix(node: Field) -> Float:
+def _local_matrix(node: Field, now: Mapping[str, Float]) -> Float:
     if "matrix" in node:
         return np.array(node.numbers("matrix", 16, ())).reshape(4, 4).T
+
+    def said(name: str, empty: tuple[float, ...]) -> Float:
+        return np.array([now[name] if name in now else node.numbers(name, len(empty), empty)])
+
     return _compose(
-        np.array([node.numbers("translation", 3, (0.0, 0.0, 0.0))]),
-        np.array([node.numbers("rotation", 4, (0.0, 0.0, 0.0, 1.0))]),
-        np.array([node.numbers("scale", 3, (1.0, 1.0, 1.0))]),
+        said("translation", (0.0, 0.0, 0.0)), said("rotation", (0.0, 0.0, 0.0, 1.0)), said("scale", (1.0, 1.0, 1.0))
     )[0]
 
 

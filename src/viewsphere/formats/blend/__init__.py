@@ -43,7 +43,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.store import Dataset
 from viewsphere.urls import here
-from viewsphere.zoo import build
+from viewsphere.zoo import build_zoo_model
 
 ENGINE = "cycles"
 """The engine that builds and saves the scenes."""
@@ -233,7 +233,7 @@ class StoredModels:
     def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> Mesh:
         """The normalised mesh; raises StoreError for a model that the store has lost, ModelError for a file of scenery."""
         if (spec, step) not in self.keys:
-            return load_normalised(spec, _from_zoo, step=step)
+            return load_normalised(spec, build_zoo_model, step=step)
         key, own = self.keys[spec, step]
         model = self.dataset.store.model_info(key)
         info = model and next((one for one in (model, *model.steps) if one.key == own), None)
@@ -243,7 +243,3 @@ class StoredModels:
             if info.node is None:
                 return load_normalised(_spec(own, str(file)))
             return normalise(*load_model(file, node=info.node), _spec(own, str(file)))
-
-
-def _from_zoo(spec: ModelSpec) -> Mesh:
-    return build(spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed))

@@ -1,0 +1,78 @@
+"""RiggedModel: a mesh that joints bend, and what it does, as a GLB file that any reader of glTF plays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """How joints are turned: `turns` (J, 3, 3) about each joint, in the axes of the joint above it, which are those of the mesh
+    in the bind pose; `root` (3,) is where the first joint is, metres.
+    """
+
+    turns: Float
+    root: Float
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """An animation: a pose at each of some `seconds`, and what else is said of it, plain data for a file's `extras`."""
+
+    seconds: tuple[float, ...]
+    poses: tuple[Pose, ...]
+    extras: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+
+@dataclass(frozen=True, eq=False)
+class RiggedModel:
+    """A mesh in its bind pose (object axes, metres) and its rig: names and `places` (J, 3) of joints, the joint above each
+    (-1: none; parents first), the joints (V, 4) that move each vertex, and their weights (V, 4), which sum to 1. `rest` is how
+    the model stands where no animation is played.
+    """
+
+    mesh: Mesh
+    joints: tuple[str, ...]
+    above: tuple[int, ...]
+    places: Float
+    vertex_joints: NDArray[np.int64]
+    vertex_weights: Float
+    rest: Pose
+    clips: Mapping[str, Clip]
+
+    def posed(self, pose: Pose) -> Float:
+        """Where the joints are (J, 3) in a pose."""
+        return joints_at(self.places, self.above, pose)[:, :3, 3]
+
+
+def joints_at(places: Float, above: tuple[int, ...], pose: Pose) -> Float:
+    """Matrices (J, 4, 4) of joints in the mesh's axes: how each is turned, and where it is."""
+    found = list[Float]()
+    for i, parent in enumerate(above):
+        if parent < 0:
+            found.append(rigid(pose.turns[i], pose.root))
+        else:
+            found.append(compose(found[parent], rigid(pose.turns[i], places[i] - places[parent])))
+    return np.array(found)
+
+
+def quaternions(turns: Float) -> NDArray[np.float32]:
+    """Quaternions (N, 4), x, y, z, w, of rotations (N, 3, 3) that follow one another: no sign changes on the way. In glTF's
+    axes, in which (x, y, z) is (x, z, -y).
+    """
+    found = np.array([quaternion_from_matrix(turn) for turn in turns])
+    for i in range(1, len(found)):
+        if float((found[i] * found[i - 1]).sum()) < 0:
+            found[i] = -found[i]
+    w, x, y, z = found.T
+    return np.stack([x, z, -y, w], axis=1).astype(np.float32)
