@@ -362,14 +362,14 @@ def alternatives(value: Any) -> Iterator[Any]:
         yield value
 
 
-def _range(value: Any) -> Any:
+def ranged(value: Any) -> Any:
     """[low, high] as what it is short for."""
     return {"uniform": value} if isinstance(value, (list, tuple)) else value
 
 
 CountDrawn = Annotated[
     Drawn[Count],
-    BeforeValidator(_range),
+    BeforeValidator(ranged),
     OrShort({"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 2, "maxItems": 2}),
 ]
 """A whole number above 0; [low, high] is short for a uniform one."""

@@ -109,6 +109,11 @@ class JitterEntry(PerFrame):
     )
     tilt_deg: Coordinate = Field(default=0.0, description="degrees")
     target: PointDrawn = Field(default=(0.0, 0.0, 0.0), description="metres, [x, y, z]: added to what the camera looks at")
+    off_center: Drawn[tuple[Coordinate, Coordinate]] = Field(
+        default=(0.0, 0.0),
+        description="[x, y]: how far right of the picture's middle, and below it, that is which the camera looks at, as "
+        "shares of the picture's width and height; at 0.5 it is at the edge",
+    )
 
 
 def _of(name: str) -> BeforeValidator:

@@ -91,7 +91,7 @@ Scale = Annotated[
 class ModelEntry(Brief):
     """Some models of one category, treated alike."""
 
-    UNSAID = ("motion", "fps", "sidecar", "symmetries", "keypoints", "color", "material")
+    UNSAID = ("motion", "fps", "sidecar", "symmetries", "keypoints", "color", "material", "labels")
 
     source: Annotated[
         tuple[Annotated[str, Field(min_length=1)], ...],
@@ -161,6 +161,11 @@ class ModelEntry(Brief):
         default=None, description="what captions call the models' colour, instead of what their surfaces say"
     )
     material: Word | None = Field(default=None, description="what captions call the models' material: wooden")
+    labels: Literal["own", "background"] | None = Field(
+        default=None,
+        description="own (the default), or background: models that scenes.distractors puts among the others, drawn and not "
+        "labelled",
+    )
     confined: bool = Field(
         default=True, strict=True, description="whether paths inside model files have to stay in the model's folder"
     )
@@ -172,6 +177,11 @@ class ModelEntry(Brief):
     def families(self) -> tuple[str, ...]:
         """The zoo families of this entry; empty for an entry of files."""
         return tuple(s.removeprefix(ZOO) for s in self.source if s.startswith(ZOO))
+
+    @property
+    def is_labelled(self) -> bool:
+        """Whether its models are objects of the data set, no distractors."""
+        return self.labels != "background"
 
     @property
     def credit(self) -> Credit | None:
@@ -208,6 +218,8 @@ class ModelEntry(Brief):
             raise ValueError("expected a file for sidecar; found the zoo, whose models say what there is to say")
         if self.frames is None and self.poses != "each":
             raise ValueError(f"expected frames, for poses: {self.poses}; found none")
+        if not self.is_labelled and self.frames is not None:
+            raise ValueError("expected no frames beside labels: background; found some: distractors do not play their files")
         if self.scale == "real_size" and self.real_size is None and not families:
             raise ValueError("expected real_size to be set, for scale: real_size; found none")
         return self

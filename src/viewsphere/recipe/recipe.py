@@ -47,11 +47,12 @@ from viewsphere.recipe.tracks import TracksEntry
 from viewsphere.recipe.values import OrShort, shape_of
 from viewsphere.recipe.variations import VariationsField, check_alike, varied
 from viewsphere.recipe.viewpoints import Viewpoints
+from viewsphere.recipe.wanted import WantedEntry
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames", "keep_annotations_above"}
 """Fields of a recipe that change neither a picture nor a label, as the credits of its models do not."""
 
-LATER = {"scenes", "time", "rig", "tracks", "variations", "min_visibility", "empty"}
+LATER = {"scenes", "time", "rig", "tracks", "variations", "min_visibility", "wanted", "empty"}
 """Fields that recipes once did not have: without them a recipe has the digest that it had then."""
 
 LATER_FIELDS: dict[tuple[str, ...], Any] = {
@@ -61,6 +62,8 @@ LATER_FIELDS: dict[tuple[str, ...], Any] = {
     ("scenes", "orientation"): "upright",
     ("scenes", "balance"): "models",
     ("scenes", "on"): None,
+    ("scenes", "distractors"): 0,
+    ("scene", "jitter", "off_center"): [0.0, 0.0],
     ("files", "shots"): "files",
     ("annotations",): [],
     ("labels",): {},
@@ -172,6 +175,11 @@ class Recipe(Shown, Frozen):
         default=None,
         description="least visibility of the frame's model (of random scenes: of each model); where it is less, the random "
         "viewpoint, and company that is drawn per_frame, are drawn again",
+    )
+    wanted: WantedEntry | None = Field(
+        default=None,
+        description="{visibility: [0.3, 0.6], truncation: [0.2, 0.5]}: between which shares these labels of the frame's model "
+        "shall lie; where they do not, what is random in the frame is drawn again",
     )
     keep_annotations_above: Annotated[Number, Field(ge=0, lt=1)] | None = Field(
         default=None, description="exports leave out annotations of objects whose visibility is not above this; by default none"

@@ -7,10 +7,16 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Count, Number
-from viewsphere.recipe.draws import CountDrawn, Distribution, span
+from viewsphere.model.numbers import Count, Natural, Number
+from viewsphere.recipe.draws import CountDrawn, Distribution, Drawn, ranged, span
 from viewsphere.recipe.layout import LAYOUT, ON, ORIENTATION, Layout, OnField, Orientation, Spot, placer_of, spots_of
 from viewsphere.recipe.values import OrShort
+
+CountOrNone = Annotated[
+    Drawn[Natural],
+    BeforeValidator(ranged),
+    OrShort({"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 2, "maxItems": 2}),
+]
 
 
 class ScenesEntry(Frozen):
@@ -21,6 +27,11 @@ class ScenesEntry(Frozen):
     objects: CountDrawn = Field(
         default=cast(int, Distribution(uniform=(2, 5))),
         description="how many models stand in each: a number, [low, high] or a distribution",
+    )
+    distractors: CountOrNone = Field(
+        default=0,
+        description="how many models with labels: background are put among them, each any number of times: a number, "
+        "[low, high] or a distribution",
     )
     repeat: bool = Field(default=False, description="whether a model may be there more than once")
     views: Count | None = Field(

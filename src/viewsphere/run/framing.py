@@ -15,6 +15,7 @@ from viewsphere.labels import Sight
 from viewsphere.labels.visibility import LABEL as VISIBILITY
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.wanted import WantedEntry
 from viewsphere.run.stages import Stages
 from viewsphere.store import Dataset
 from viewsphere.truth.geometry import Geometry
@@ -40,13 +41,14 @@ class Framing:
 
         Shots of several frames differ by their instants alone, whatever these's tries: the best of each are put together.
         """
-        shot, least = take(()), self.recipe.min_visibility
-        if least is None:
+        shot, least, wanted = take(()), self.recipe.min_visibility, self.recipe.wanted
+        if wanted is None and least is None:
             return shot
+        enough = 0.0 if wanted is not None or least is None else least
         ring = Ring(shot.scene.ground is not None, shot.label_alpha)
         best = [(self._seen(shot, i, ring), shot) for i in range(len(shot.instants))]
         for number in range(1, MOST_TRIES):
-            hidden = [i for i, (seen, _) in enumerate(best) if seen < least]
+            hidden = [i for i, (seen, _) in enumerate(best) if seen < enough]
             if not hidden:
                 break
             shot = take([number if i in hidden else 0 for i in range(len(best))])
@@ -56,16 +58,20 @@ class Framing:
         return best[0][1].model_copy(update={"instants": instants})
 
     def _seen(self, shot: Shot, instant: int, ring: Ring) -> float:
-        """The least visibility of what has to be seen in a frame; -1 where its camera is inside of something."""
+        """How good a frame is: the least visibility of what has to be seen in it, or, below 0, how much it misses what is
+        wanted; far below where its camera is inside of something.
+        """
         wanted = shot.targets(self.recipe.scenes is not None)
         if not all(thing.at(instant).is_there for thing in wanted):
-            return 1.0
+            return 1.0 if self.recipe.wanted is None else 0.0
         if not self.stages.is_free(shot, instant):
-            return -1.0
+            return -10.0
         views = ShotViews(shot, lambda i: self._geometry(shot, i, ring))
         view = views.view(instant, 0)
         sight = Sight(view.geometry, view.camera, view.visibility)
-        return min(VISIBILITY.compute(sight, thing.id - 1)["visibility"] for thing in wanted)
+        labels = [VISIBILITY.compute(sight, thing.id - 1) for thing in wanted]
+        visibility, truncation = min(o["visibility"] for o in labels), max(o["truncation"] for o in labels)
+        return visibility if self.recipe.wanted is None else -self.recipe.wanted.miss(visibility, truncation)
 
     def _geometry(self, shot: Shot, instant: int, ring: Ring) -> Geometry:
         """The triangles that stages of all engines have at an instant."""
@@ -74,6 +80,19 @@ class Framing:
             return tuple(self.stages.model(thing.model, thing.step) for thing in shot.things_at(at))
 
         return ring.at(shot.things_at(instant), meshes(instant), shot_floor(shot, meshes))
+
+
+def missed_frames(dataset: Dataset, wanted: WantedEntry, together: bool) -> tuple[int, float]:
+    """How many frames of a data set are not as wanted, and how far the farthest is from it; empty ones do not count."""
+    misses: list[float] = []
+    for key, places in dataset.shots():
+        shot = dataset.store.labelled(key)
+        ids = {thing.id for thing in shot.targets(together)} if shot else set[int]()
+        for sample in dataset.samples_of(key, places):
+            own = [o for o in sample.objects if o.id in ids]
+            if own:
+                misses.append(wanted.miss(min(o.visibility for o in own), max(o.truncation for o in own)))
+    return sum(miss > 0 for miss in misses), max(misses, default=0.0)
 
 
 def hidden_frames(dataset: Dataset, least: float, together: bool) -> int:

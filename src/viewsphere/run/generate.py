@@ -20,7 +20,7 @@ from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_for
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.executors import Crew, Job, Listed, Outcome, hired
 from viewsphere.run.exporting import export, is_out_of_date, is_written
-from viewsphere.run.framing import MOST_TRIES, hidden_frames
+from viewsphere.run.framing import MOST_TRIES, hidden_frames, missed_frames
 from viewsphere.run.opening import check_formats, commit, prepare, to_append, to_render
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.pulse import heard, watched
@@ -209,11 +209,18 @@ def _others(wanted: Iterable[FormatEntry], store: Store) -> tuple[FormatEntry, .
 def _hidden(store: Store, portion: Portion) -> Iterator[str]:
     """A warning that counts the recipe's frames in which less of their models is seen than it asks for."""
     recipe, part = portion.plan.recipe, portion.part
-    least = recipe.min_visibility
-    if least is None:
+    least, wanted = recipe.min_visibility, recipe.wanted
+    if least is None and wanted is None:
         return
     own = Dataset(store.root, Choice(frames=((part.first, part.first + part.frames),)))
-    if count := hidden_frames(own, least, recipe.scenes is not None):
+    if wanted is not None:
+        count, farthest = missed_frames(own, wanted, recipe.scenes is not None)
+        if count:
+            yield (
+                f"warning: wanted: {count:,} of {len(own):,} frames are not as wanted, the best of {MOST_TRIES} draws each; "
+                f"the farthest is {farthest:.2g} beside: ask for wider shares, or for more that is random"
+            )
+    elif least is not None and (count := hidden_frames(own, least, recipe.scenes is not None)):
         yield (
             f"warning: min_visibility: {count:,} of {len(own):,} frames show less than {least:g} of their models, the "
             f"best of {MOST_TRIES} draws each: ask for less, or for less around the models"

@@ -15,7 +15,7 @@ from viewsphere.labels import Needs, channels, labels, on_request
 from viewsphere.model.channel import MATERIAL_PASSES, PASSES, PICTURES
 from viewsphere.model.mistakes import nearest, one_of, read_options
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.draws import alternatives, is_random, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.rig import SensorList
 from viewsphere.recipe.scenes import ScenesEntry
@@ -30,16 +30,39 @@ Said = TypeVar("Said")
 
 def check_redraws(recipe: Recipe) -> None:
     """Something can be drawn again where too little is seen of a model; only still pictures may be empty."""
-    for name in ("min_visibility", "empty") if recipe.time is not None else ():
+    for name in ("min_visibility", "wanted", "empty") if recipe.time is not None else ():
         if getattr(recipe, name) is not None:
             raise RecipeError(f"{name}: expected none beside time, as it is about single pictures; found one: leave it out")
     company = recipe.scene.company
+    if recipe.wanted is not None and recipe.min_visibility is not None:
+        raise RecipeError("wanted: expected wanted or min_visibility; found both: write wanted: {visibility: [0.3, 1]}")
+    jitter = recipe.scene.jitter
     is_redrawn = isinstance(recipe.viewpoints, Sphere | Normal | Jitter) or (company and company.draw == "per_frame")
-    if recipe.min_visibility is not None and not is_redrawn:
+    is_redrawn = is_redrawn or (jitter.draw == "per_frame" and is_random(jitter))
+    for name in ("min_visibility", "wanted"):
+        if getattr(recipe, name) is not None and not is_redrawn:
+            raise RecipeError(
+                f"{name}: expected something to draw again, viewpoints of kind sphere, normal or jitter, scene.jitter or "
+                f"scene.company.draw: per_frame; found viewpoints of kind {recipe.viewpoints.kind} and nothing drawn for each "
+                "frame"
+            )
+
+
+def check_distractors(recipe: Recipe) -> None:
+    """There are models to be told from distractors, and distractors where some are asked for, and only there."""
+    unlabelled = [i for i, entry in enumerate(recipe.models) if not entry.is_labelled]
+    asked = span(recipe.scenes.distractors)[1] if isinstance(recipe.scenes, ScenesEntry) else 0
+    if len(unlabelled) == len(recipe.models):
         raise RecipeError(
-            "min_visibility: expected something to draw again, viewpoints of kind sphere, normal or jitter or "
-            f"scene.company.draw: per_frame; found viewpoints of kind {recipe.viewpoints.kind} and nothing drawn for each frame"
+            "models[0].labels: expected models that are labelled beside distractors; found none: leave labels out"
         )
+    if unlabelled and not asked:
+        raise RecipeError(
+            f"models[{unlabelled[0]}].labels: expected scenes.distractors beside background, how many are put among the "
+            "others; found none: set scenes: {count: 100, distractors: [1, 5]}"
+        )
+    if asked and not unlabelled:
+        raise RecipeError("scenes.distractors: expected models with labels: background; found none")
 
 
 def check_names(recipe: Recipe) -> None:

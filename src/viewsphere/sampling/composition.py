@@ -139,17 +139,30 @@ class Composition(Sendable):
         return (spec, *companions(self.recipe.seed, spec, self.groups[spec.key], count, names))
 
     def targets(
-        self, spec: ModelSpec, pose: str | None, box_of: BoxOf, again: Names = (), memory: Remembering = unremembered
+        self,
+        spec: ModelSpec,
+        pose: str | None,
+        box_of: BoxOf,
+        again: Names = (),
+        memory: Remembering = unremembered,
+        seen_from: tuple[float, float] | None = None,
     ) -> tuple[Thing, ...]:
         """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room. `again`
-        names another draw of where company stands.
+        names another draw of where company stands; `seen_from`: azimuth and elevation, degrees, of the frame's camera.
         """
         own = standing(box_of(spec))
-        company = self.company(spec, pose, box_of, own, again, memory)
+        company = self.company(spec, pose, box_of, own, again, memory, seen_from)
         return still((spec,), [own]) if company is None else still((spec, *company.members), [own, *company.poses])
 
     def company(
-        self, spec: ModelSpec, pose: str | None, box_of: BoxOf, own: Matrix4, again: Names, memory: Remembering
+        self,
+        spec: ModelSpec,
+        pose: str | None,
+        box_of: BoxOf,
+        own: Matrix4,
+        again: Names,
+        memory: Remembering,
+        seen_from: tuple[float, float] | None = None,
     ) -> Laid | None:
         """What is placed beside a frame's model that stands there; None where nothing is."""
         entry = self.recipe.scene.company
@@ -159,7 +172,7 @@ class Composition(Sendable):
         taken = ((shape(spec, box_of), own),)
         keep = partial(memory, remembered_as(entry, cast, ("company", spec.key, *names)))
         free, moves = self.free_floor(spec.key, pose), self.recipe.time is not None
-        room = Room(free, entry.gap, entry.spots, taken, "scene.company", memory=keep, moves=moves)
+        room = Room(free, entry.gap, entry.spots, taken, "scene.company", seen_from=seen_from, memory=keep, moves=moves)
         rng = partial(generator, self.recipe.seed, "layout", *names)
         return laid(entry.layout, entry.orientation, cast, room, box_of, rng)
 

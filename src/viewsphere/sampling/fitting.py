@@ -20,7 +20,7 @@ FITTING = "appended frames have to fit those that are there; choose another outp
 RIG = "rig"
 """Name of the setting that only recipes with several sensors have."""
 
-SHOWN = ("min_visibility", "empty")
+SHOWN = ("min_visibility", "wanted", "empty")
 """Names of the settings that say what pictures show of their models; only recipes that ask for it have them."""
 
 LOOK = "the engine's program"
@@ -63,7 +63,7 @@ def settings(planned: Plan) -> Settings:
     value |= {
         "camera": lens.model_dump(mode="json"),
         **({} if planned.own_rig is None else {RIG: planned.own_rig.model_dump(mode="json")}),
-        **{name: getattr(recipe, name) for name in SHOWN if getattr(recipe, name) is not None},
+        **recipe.model_dump(mode="json", include=set(SHOWN), exclude_none=True),
         "viewpoints.target": viewpoints.get("target", recipe.viewpoints.target),
         "viewpoints.bins": viewpoints.get("bins"),
         "scene's images": [file.rpartition("/")[2] for files in (planned.images, *planes) for file in files],

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import random_rotation, rigid
 from viewsphere.model.mistakes import one_of, read_options
 from viewsphere.model.model_spec import ModelSpec
@@ -146,8 +147,9 @@ def is_slow(layout: Layout) -> bool:
 
 
 def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
-    """A model's shape for a placer."""
-    return Shape(box_of(spec), partial(_vertices, spec), partial(_surface, spec))
+    """A model's shape for a placer. Boxes are known of the data set's own models; others are read for theirs."""
+    box = box_of(spec) if spec.category_id else _box(spec)
+    return Shape(box, partial(_vertices, spec), partial(_surface, spec))
 
 
 def _module(layout: Layout, field: str) -> tuple[Placer, tuple[Any, ...]]:
@@ -163,6 +165,11 @@ def _module(layout: Layout, field: str) -> tuple[Placer, tuple[Any, ...]]:
     if given:
         raise RecipeError(f"{where}: expected no options, {name} has none; found {', '.join(given)}")
     return module, ()
+
+
+def _box(spec: ModelSpec) -> Float:
+    vertices = _vertices(spec)
+    return box_vertices(vertices.min(axis=0), vertices.max(axis=0))
 
 
 def _vertices(spec: ModelSpec) -> Float:

@@ -66,7 +66,7 @@ def count_models(recipe: Recipe) -> int:
         families = _families(recipe, index)
         return len(families) * _count(recipe, index) if families else len(_files(recipe, index))
 
-    return sum(each(count, range(len(recipe.models))))
+    return sum(each(count, (i for i, entry in enumerate(recipe.models) if entry.is_labelled)))
 
 
 def model_specs(recipe: Recipe) -> tuple[ModelSpec, ...]:
@@ -96,7 +96,7 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             seed=int(generator(recipe.lasting_seed, found.source, found.key).integers(2**63)) if found.in_zoo else None,
             category=category,
             supercategory=entry.supercategory,
-            category_id=ids[category],
+            category_id=ids[category] if entry.is_labelled else 0,
             up=entry.up,
             forward=entry.forward,
             unit=None if entry.unit is None else unit_metres(entry.unit),
@@ -130,7 +130,7 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
                     f"found {entry.supercategory!r}"
                 )
 
-    each(add, range(len(recipe.models)))
+    each(add, (i for i, entry in enumerate(recipe.models) if entry.is_labelled))
     return tuple(result.values())
 
 

@@ -29,6 +29,7 @@ from viewsphere.sampling.checks import (
     check_all_frames,
     check_blend,
     check_catcher,
+    check_distractors,
     check_frames,
     check_listed,
     check_materials,
@@ -46,6 +47,7 @@ from viewsphere.sampling.engine_digest import engine_options, script_digest
 from viewsphere.sampling.filling import filled
 from viewsphere.sampling.models import categories, left_out, numbered_specs
 from viewsphere.sampling.motion import check_motions
+from viewsphere.sampling.off_center import off_center
 from viewsphere.sampling.pictures import check_pictures, proportions, scene_pictures
 from viewsphere.sampling.recipe_warnings import hidden_background, hidden_by_exposure, no_light, out_of_view, too_small
 from viewsphere.sampling.rigs import rig_of
@@ -278,7 +280,8 @@ class Plan(Shown, Stock):
             stock = self._under[variation]
         stock = stock.trying(dict(zip(poses, tries, strict=True))) if any(tries) else stock
         with self.recipe.located():
-            shot = filled(self.sampler.shot(stock, subject, poses, box_of, key, first), self.recipe.scenes is not None)
+            made = self.sampler.shot(stock, subject, poses, box_of, key, first)
+            shot = off_center(stock, subject, filled(made, self.recipe.scenes is not None))
             if variation:
                 named = {"variation": variation, "sequence": shot.sequence and under(shot.sequence, variation)}
                 shot = shot.model_copy(update=named)
@@ -305,6 +308,7 @@ class Plan(Shown, Stock):
         planes = () if self.composition is None else self.composition.images
         images = [Path(i).name for files in (self.images, *planes) for i in files]
         value = [self.recipe.digest, models, self.pose_list.digest, images, self.shot_frames]
+        value += [spec.model_dump(mode="json") | {"source": Path(spec.source).name} for spec, _ in self.distractors]
         value += [] if self.blend is None else [self.blend.digest]
         script = script_digest(self.recipe)
         value += [] if script is None else [script]
@@ -339,7 +343,10 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         rig = rig_of(recipe, lens(recipe, views))
         check_frames(recipe, views)
-        numbered = numbered_specs(recipe)
+        found = numbered_specs(recipe)
+        numbered = tuple((spec, number) for spec, number in found if spec.category_id)
+        distractors = tuple((spec, number) for spec, number in found if not spec.category_id)
+        check_distractors(recipe)
         specs, timings, views = timed(recipe, numbered, views)
         lines: tuple[Timeline | None, ...] = (None,) * len(specs)
         if recipe.time is not None:
@@ -363,6 +370,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
             own_rig=rig,
             entries=tuple(number for _, number in numbered),
             timelines=lines,
+            distractors=distractors,
             tracks=tracks_of(recipe, rig or Rig.of(lens(recipe, views))),
         )
         check_all_frames(recipe, planned.frames, planned.factors)

@@ -104,10 +104,14 @@ class Scenes:
             return concrete(entry, image=self._file("textures", entry.images, ("materials", str(number), "images"), names))
         return concrete(entry, image=None if entry.image is None else self.pictures["image", entry.image][0])
 
+    def jitter(self, model: str, name: str) -> JitterEntry:
+        """What is added to a pose, everything drawn."""
+        entry = self.recipe.scene.jitter
+        return drawn(entry, self._rng_of(draw_names(entry.draw, model, name)), ("jitter",))
+
     def jittered(self, pose: Viewpoint, model: str, name: str) -> Viewpoint:
         """The pose moved at random; it keeps its index. One without a target of its own keeps to the models' centre."""
-        entry = self.recipe.scene.jitter
-        by = drawn(entry, self._rng_of(draw_names(entry.draw, model, name)), ("jitter",))
+        by = self.jitter(model, name)
         azimuth = pose.azimuth_deg + by.azimuth_deg
         elevation = min(max(pose.elevation_deg + by.elevation_deg, -90.0), 90.0)
         target = None if pose.target is None else tuple(a + b for a, b in zip(pose.target, by.target, strict=True))

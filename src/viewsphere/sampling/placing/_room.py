@@ -32,7 +32,8 @@ class Room:
     and the recipe's field that asks for all this, which messages begin with.
 
     `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it; `clearance`: metres
-    of air above, None where it has no end; `memory`: keeps what is simulated; `moves`: whether it is asked how things came
+    of air above, None where it has no end; `seen_from`: azimuth and elevation, degrees, of the camera, where one is
+    known; `memory`: keeps what is simulated; `moves`: whether it is asked how things came
     to where they stand, too.
     """
 
@@ -43,6 +44,7 @@ class Room:
     field: str = "scene.company"
     below: float = 0.0
     clearance: float | None = None
+    seen_from: tuple[float, float] | None = None
     memory: Memory = forgetful
     moves: bool = False
 

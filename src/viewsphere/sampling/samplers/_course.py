@@ -19,7 +19,7 @@ from viewsphere.sampling.composition import BoxOf, center, center_of_all, still
 from viewsphere.sampling.motion import Lane, Start, mover
 from viewsphere.sampling.placing import standing
 from viewsphere.sampling.samplers._moving import Moving
-from viewsphere.sampling.samplers._random import scene_around, scene_laid, scene_things
+from viewsphere.sampling.samplers._random import scene_around, scene_distractors, scene_laid, scene_things
 from viewsphere.sampling.samplers._stock import Stock
 from viewsphere.sampling.scenery import SceneryPiece
 from viewsphere.sampling.seeds import Names, generator
@@ -91,9 +91,11 @@ def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
         things = stock.composition.things(subject, targets, around, box_of, piece_moved)
     ways = target_ways(stock, subject, around, box_of)
     if stock.recipe.scenes is not None:
-        around_them = scene_around(stock, subject, around, box_of)
-        things, pieces = (*things, *around_them), [*pieces, *[None] * len(around_them)]
-    own = [target_moving(stock, thing, i, names, lanes, way) for (i, thing), way in zip(enumerate(targets), ways, strict=True)]
+        among, beneath = scene_distractors(stock, subject, around, box_of), scene_around(stock, subject, around, box_of)
+        own_ways = zip(among, ways[len(targets) :], strict=True)
+        moving = [_distractor_moving(stock, thing, way, (*names, str(i)), lanes) for i, (thing, way) in enumerate(own_ways)]
+        things, pieces = (*things, *among, *beneath), [*pieces, *moving, *[None] * len(beneath)]
+    own = [target_moving(stock, thing, i, names, lanes, way) for (i, thing), way in zip(enumerate(targets), ways, strict=False)]
     made = Course(stock.repainted(things, subject, start), (*own, *pieces), focus, None)
     return replace(made, rig=_rig(stock, made, subject, start, lanes, box_of))
 
@@ -109,7 +111,7 @@ def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) 
 
 
 def target_ways(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Way | None, ...]:
-    """How each target of a sequence came to where it is placed, None for one that was put there at once."""
+    """How each target of a sequence, and then each distractor, came to where it is placed; None: it was put there at once."""
     if stock.recipe.scenes is not None:
         made = scene_laid(stock, subject, pose, box_of)
         return tuple(way.at for way in made.ways) or (None,) * len(made.members)
@@ -137,6 +139,13 @@ def target_moving(
 def piece_moving(stock: Stock, thing: Thing, piece: SceneryPiece, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
     """What moves a piece of scenery in the sequence of these names; None where it stands still."""
     return _moving(stock, thing, piece.motion, piece.field, (*names, piece.name), lanes)
+
+
+def _distractor_moving(stock: Stock, thing: Thing, way: Way | None, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
+    """What moves a model that is not labelled; None where it stands still."""
+    number = {spec.key: number for spec, number in stock.distractors}[thing.model.key]
+    motions, field = stock.recipe.models[number].motion, f"models[{number}].motion"
+    return _moving(stock, thing, motions, field, (*names, "distractor", thing.model.key), lanes, way)
 
 
 def _moving(

@@ -106,7 +106,8 @@ def scene_split(stock: Stock, subject: str) -> str:
 @lru_cache(maxsize=4)
 def scene_laid(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
     """The models of a scene as its layout places them; the last ones are kept."""
-    recipe, entry, models = stock.recipe, scenes_entry(stock.recipe), scene_cast(stock, subject)
+    recipe, entry = stock.recipe, scenes_entry(stock.recipe)
+    models = (*scene_cast(stock, subject), *_distractors(stock, subject))
     free = None if stock.composition is None else stock.composition.free_floor(subject, pose)
     stand = surface(stock, subject, pose)
     if stand is not None:
@@ -131,8 +132,23 @@ def scene_laid(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> L
 
 def scene_things(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """The models of a scene where they stand; raises RecipeError where there is no room."""
-    made = scene_laid(stock, subject, pose, box_of)
-    return still(made.members, made.poses)
+    made, cast = scene_laid(stock, subject, pose, box_of), scene_cast(stock, subject)
+    return still(cast, made.poses[: len(cast)])
+
+
+def scene_distractors(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+    """The models of a scene that are not labelled, where they stand."""
+    made, count = scene_laid(stock, subject, pose, box_of), len(scene_cast(stock, subject))
+    placed = zip(made.members[count:], made.poses[count:], strict=True)
+    return tuple(Thing(id=0, model=spec, motion=Motion.still(at), scenery=True) for spec, at in placed)
+
+
+def _distractors(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
+    entry, models = scenes_entry(stock.recipe), [spec for spec, _ in stock.distractors]
+    if not models:
+        return ()
+    count = drawn(entry.distractors, lambda path: generator(stock.recipe.seed, *path, subject), ("scenes", "distractors"))
+    return mixed(stock.recipe.seed, models, count, (subject, "distractors"), repeat=True)
 
 
 def scene_around(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:

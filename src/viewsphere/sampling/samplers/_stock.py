@@ -61,6 +61,7 @@ class Stock(Sendable):
     timelines: tuple[Timeline | None, ...] = ()  # of each model, the animation of its file that it plays in sequences
     tries: Mapping[int, int] = field(default_factory=dict[int, int])  # poses of which something is drawn again: the how manieth
     untried: Stock | None = None  # the same without these tries
+    distractors: tuple[tuple[ModelSpec, int], ...] = ()  # models that are not labelled, and the numbers of their entries
     memory: Remembering = unremembered  # of what is simulated
     variation: str = ""  # of the recipe's, that this is the light and the finish of
     sequence_numbers: tuple[int, ...] = ()  # of each viewpoint of sequences, a data set's number; none where it has the same
@@ -227,9 +228,14 @@ class Stock(Sendable):
             view = view.model_copy(update={"target": target})
         if not self.scenes.is_jittered:
             return view
-        flickers = self.recipe.time is not None and self.recipe.scene.jitter.draw == "per_frame"
-        name = self.pose_list.name if flickers else self.pose_list.place
-        return self.scenes.jittered(view, subject, name(view.index))
+        return self.scenes.jittered(view, subject, self.jitter_name(view.index))
+
+    def jitter_name(self, pose: int) -> str:
+        """What the jitter of a pose is drawn for, where it is drawn for each frame: its name, and its try."""
+        is_per_frame = self.recipe.scene.jitter.draw == "per_frame"
+        name = self.pose_list.name if self.recipe.time is not None and is_per_frame else self.pose_list.place
+        again = self.tries.get(pose) if is_per_frame else None
+        return f"{name(pose)} try {again}" if again else name(pose)
 
     def instant(self, subject: str, view: Viewpoint, target: Vector | None, focus: Vector, split: str, number: int) -> Instant:
         """The instant of a subject and a viewpoint; the camera looks at `target` unless the viewpoint has its own, and where

@@ -90,7 +90,8 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     things, target = (Thing(id=1, model=spec),), None
     if stock.composition is not None:
         again = stock.layout_names(poses[0])
-        targets = stock.composition.targets(spec, stock.scene_pose(poses[0]), box_of, again, stock.memory)
+        from_there = _seen_from(stock, subject, poses)
+        targets = stock.composition.targets(spec, stock.scene_pose(poses[0]), box_of, again, stock.memory, from_there)
         things = stock.composition.things(subject, targets, stock.scene_pose(poses[0]), box_of)
         target = stock.composition.center(targets, box_of)
     things = stock.repainted(things, subject, poses[0])
@@ -104,6 +105,14 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     )
     instants = [stock.instant(subject, view, target, focus, part, i) for i, view, part in views]
     return stock.finished(key, first, placed, scene, instants)
+
+
+def _seen_from(stock: Stock, subject: str, poses: Sequence[int]) -> tuple[float, float] | None:
+    """Azimuth and elevation of the camera of a shot's only pose; None where shots have several."""
+    if not stock.recipe.scene.is_moved_each_frame or isinstance(stock.pose_list, TimedPoses):
+        return None
+    view = stock.viewpoint(subject, stock.view(stock.pose_list, poses[0]), None)
+    return view.azimuth_deg, view.elevation_deg
 
 
 def _target(stock: Stock, first: Thing, run: Run, target: Vector | None, box_of: BoxOf) -> Vector | None:

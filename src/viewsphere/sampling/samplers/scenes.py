@@ -23,6 +23,7 @@ from viewsphere.sampling.samplers._random import (
     check_scene_models,
     scene_around,
     scene_cast,
+    scene_distractors,
     scene_names,
     scene_split,
     scene_things,
@@ -100,7 +101,7 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     middle = center_of_all(things, box_of)
     if stock.composition is not None:
         things = stock.composition.things(subject, things, pose, box_of)
-    things += scene_around(stock, subject, pose, box_of)
+    things += scene_distractors(stock, subject, pose, box_of) + scene_around(stock, subject, pose, box_of)
     views = stock.pose_list.drawn_for(subject)
     instants = [
         stock.instant(subject, stock.view(views, pose), middle, middle, split(stock, subject, pose), i)

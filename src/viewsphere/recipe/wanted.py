@@ -1,0 +1,40 @@
+"""What frames shall show of their models."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, model_validator
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import shown
+from viewsphere.recipe.values import Interval
+
+
+def _shares(value: tuple[float, float]) -> tuple[float, float]:
+    if value[0] < 0 or value[1] > 1:
+        raise ValueError(f"expected shares of 0 to 1; found {shown(value)}")
+    return value
+
+
+Shares = Annotated[Interval, AfterValidator(_shares)]
+
+
+class WantedEntry(Frozen):
+    """Shares [low, high] in which the labels of these names of a frame's model shall lie; of random scenes those of the model
+    of which least is seen, and of the one of which most is cut off.
+    """
+
+    visibility: Shares | None = Field(default=None, description="how much of it is seen: [0.3, 0.6]")
+    truncation: Shares | None = Field(default=None, description="how much of it lies outside of the picture: [0.2, 0.5]")
+
+    @model_validator(mode="after")
+    def _check(self) -> WantedEntry:
+        if self.visibility is None and self.truncation is None:
+            raise ValueError("expected visibility or truncation; found neither")
+        return self
+
+    def miss(self, visibility: float, truncation: float) -> float:
+        """How far a frame is from what is wanted, the sum of both shares' distances; 0 where it is as wanted."""
+        pairs = ((self.visibility, visibility), (self.truncation, truncation))
+        return sum(max(ends[0] - value, value - ends[1], 0.0) for ends, value in pairs if ends is not None)
