@@ -12,7 +12,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Length, Portion
 from viewsphere.model.scene import Color, Effects, Picture, Srgb
 from viewsphere.model.substance import Substance
-from viewsphere.recipe import finish, light, surface
+from viewsphere.recipe import finish, light, surface, weather
 from viewsphere.recipe.draws import drawn, is_random
 from viewsphere.recipe.entries import Entry, concrete, entry_of, pictures_of, words_of
 
@@ -177,7 +177,7 @@ def test_what_is_drawn_may_be_beyond_no_limit_of_the_scene():
 
 
 def test_all_parts_of_a_scene_have_an_entry():
-    entries = [kind for module in (finish, light, surface) for kind in vars(module).values() if isinstance(kind, type)]
+    entries = [kind for module in (finish, light, surface, weather) for kind in vars(module).values() if isinstance(kind, type)]
     derived = {kind.part for kind in entries if issubclass(kind, Entry) and kind is not Entry}
     parts = {kind for kind in vars(scene).values() if isinstance(kind, type) and issubclass(kind, Frozen)}
     assert parts - derived == {

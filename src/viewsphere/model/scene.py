@@ -7,12 +7,16 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
 from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
 from viewsphere.model.substance import Substance
+from viewsphere.model.weather import Fog, Rain, Snow, Wet
+
+WEATHER = ("fog", "rain", "snow", "wet")
+"""Fields of a scene that say what its weather is."""
 
 Vector = tuple[float, float, float]
 Row = tuple[float, float, float, float]
@@ -273,7 +277,8 @@ def _floor(value: Any) -> Any:
 
 
 class Scene(Frozen):
-    """Light, ground and finish; None for `sun` or `ground` means there is none. `blend` has its own light and ground.
+    """Light, ground, finish and weather; None for `sun`, `ground` or weather means there is none. `blend` has its own light and
+    ground.
 
     `floor`: how high the ground is; a number alone is the most. Without one the ground lies below all that is placed, at any
     instant of the shot; where what moves is cut into several shots, it has one height only by a floor.
@@ -286,3 +291,18 @@ class Scene(Frozen):
     floor: Annotated[Floor | None, BeforeValidator(_floor)] = None
     finish: Finish = Finish()
     blend: BlendScene | None = None
+    fog: Fog | None = None
+    rain: Rain | None = None
+    snow: Snow | None = None
+    wet: Wet | None = None
+
+    @property
+    def weather(self) -> bool:
+        """Whether there is any."""
+        return any(getattr(self, name) is not None for name in WEATHER)
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without weather where there is none, so that records of such scenes are what they were before."""
+        found: dict[str, Any] = handler(self)
+        return {name: value for name, value in found.items() if value is not None or name not in WEATHER}

@@ -41,6 +41,7 @@ from viewsphere.recipe.light import SKY_SUFFIXES, GradientEntry, HdriSky, Hemisp
 from viewsphere.recipe.scenery import CompanyEntry, CompanyField, Draw, PlaceEntry, PlaceField, PlaneEntry, PlanesField
 from viewsphere.recipe.surface import GroundEntry, GroundField, MaterialEntry
 from viewsphere.recipe.values import OrShort, pair
+from viewsphere.recipe.weather import FogField, RainField, SnowField, WetField, check_weather
 
 LARGEST_IMAGE = 16384
 OF_FILE = ("place", "sun", "sky", "ground")
@@ -222,6 +223,16 @@ class SceneEntry(Frozen):
     )
     effects: EffectsEntry = Field(default=EffectsEntry(), description="blur, noise and more of what cameras do to pictures")
     jitter: JitterEntry = Field(default=JitterEntry(), description="what is added to every viewpoint's numbers")
+    fog: Drawn[FogField] = Field(default="off", description="off, visibility in metres, or a mapping of visibility and height")
+    rain: Drawn[RainField] = Field(
+        default="off", description="off, millimetres an hour, or a mapping of rate, wind, exposure and clouds"
+    )
+    snow: Drawn[SnowField] = Field(
+        default="off", description="snow that falls: off, millimetres of water an hour, or a mapping as of rain"
+    )
+    wet: Drawn[WetField] = Field(
+        default="auto", description="off, auto (as rain makes it), how wet from 0 to 1, or a mapping of amount and puddles"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> SceneEntry:
@@ -237,6 +248,7 @@ class SceneEntry(Frozen):
                     "colours from a background: choose another, or give a background"
                 )
         self._check_blend()
+        check_weather(self.rain, self.snow)
         return self
 
     def _check_blend(self) -> None:

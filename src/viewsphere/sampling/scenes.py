@@ -44,6 +44,7 @@ from viewsphere.sampling.pictures import Kind, Pictures
 from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.seeds import Names, scene_generators, share
 from viewsphere.sampling.sun import sun_position
+from viewsphere.sampling.weather import weathered
 
 PARTS = tuple(Finish.model_fields)
 """The parts of a finish, which have their names in a recipe's scene, too."""
@@ -155,13 +156,14 @@ class Scenes:
         def scene(names: Names, names_of_finish: tuple[Names, ...]) -> Scene:
             entry, rng_of = self.recipe.scene, self._rng_of(names)
             sun, sky = drawn(entry.sun, rng_of, ("sun",)), self._sky(drawn(entry.sky, rng_of, ("sky",)), names)
-            return Scene(
+            made = Scene(
                 sun=_sun(sun, sky),
                 sky=sky.model_copy(update={"strength": 0.0}) if isinstance(sky, Daylight) and is_night(sun) else sky,
                 lights=_lights(entry.lights, rng_of),
                 ground=self._ground(drawn(entry.ground, rng_of, ("ground",)), rng_of),
                 finish=self._finish(names_of_finish, ()) if names_of_finish else Finish(),
             )
+            return weathered(made, entry, rng_of, lambda use: int(share(self.recipe.seed, "weather", use, *names) * 2**32))
 
         return scene
 

@@ -59,7 +59,7 @@ def sky_pictures(sky: AnySky, sun: Sun | None, lights: Sequence[AnyLight], has_g
         turn_deg, seen = 0.0, picture + _halo(sun_light(sky, sun), sine)
     lighting = _with_even(picture, even)
     if not has_ground:
-        below = even[1] + SURROUNDINGS * _received(lighting, sine, sun_light(sky, sun))
+        below = even[1] + SURROUNDINGS * received(lighting, sun_light(sky, sun))
         lighting = np.where((sine > 0)[:, None, None], lighting, below).astype(np.float32)
     return SkyPictures(lighting, seen, turn_deg)
 
@@ -107,8 +107,10 @@ def _with_even(picture: Float32, even: Float) -> Float32:
     return lighting
 
 
-def _received(lighting: Float32, sine: Float, sun: Distant | None) -> Float:
-    """Radiance (3,) of a white level floor lit by the upper half of a picture and by the sun."""
-    weight = np.maximum(sine, 0) * np.sqrt(1 - sine**2) * (2 * math.pi / HEIGHT)
+def received(lighting: Float32, sun: Distant | None) -> Float:
+    """Radiance (3,) of a white level floor lit by the upper half of a picture (H, W, 3) and by the sun."""
+    height = len(lighting)
+    sine = np.sin((0.5 - (np.arange(height) + 0.5) / height) * np.pi)
+    weight = np.maximum(sine, 0) * np.sqrt(1 - sine**2) * (2 * math.pi / height)
     up = weight @ lighting.mean(axis=1, dtype=np.float64)
     return up if sun is None else up + np.array(sun.irradiance) * sun.direction[2] / math.pi

@@ -16,6 +16,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.shapes.solids import moved
 
+HOME = "floor"
+
 KEYPOINTS = {
     "handle": At("handle", (0, 0, 1)),
     "pocket": At("pocket", (0, -1, 0)),

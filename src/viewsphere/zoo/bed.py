@@ -32,6 +32,8 @@ from viewsphere.zoo.shapes.resting import Surface
 from viewsphere.zoo.shapes.rods import rod
 from viewsphere.zoo.shapes.solids import Solid, join, lathe, moved, turned
 
+HOME = "floor"
+
 KEYPOINTS = {
     **sided("mattress_foot", "mattress", (1, -1, 1)),
     **sided("mattress_head", "mattress", (1, 1, 1)),

@@ -14,6 +14,8 @@ from viewsphere.zoo.shapes.paint import Color, coated, linear, metal
 from viewsphere.zoo.shapes.rods import ring_of
 from viewsphere.zoo.shapes.solids import Float, lathe, moved, rounded_box
 
+HOME = "street"
+
 KEYPOINTS = {"top": At("cap|post", (0, 0, 1)), "foot": At("foot|post", (0, 0, -1))}
 SKELETON = (("top", "foot"),)
 

@@ -17,6 +17,8 @@ from viewsphere.zoo.shapes.rods import shifted
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, grid, join, loft
 from viewsphere.zoo.townscape.surfaces import cuboid
 
+HOME = "table"
+
 KEYPOINTS = {
     "cover": At("cover"),
     "spine": At("spine|cover"),

@@ -21,6 +21,8 @@ from viewsphere.zoo.shapes.rods import ring_of
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, join, lathe, moved, tube
 from viewsphere.zoo.townscape.surfaces import cuboid
 
+HOME = "table"
+
 KEYPOINTS = {
     "top": At("cap|body", (0, 0, 1)),
     "shoulder": At("label", (0, 0, 1)),

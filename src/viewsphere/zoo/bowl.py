@@ -18,6 +18,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, linear, metal
 from viewsphere.zoo.shapes.solids import curve, lathe
 
+HOME = "table"
+
 KEYPOINTS = {"rim": At("rim", (0, 0, 1)), "base": At("body", (0, 0, -1))}
 SKELETON = (("base", "rim"),)
 

@@ -16,6 +16,8 @@ from viewsphere.zoo.shapes.paint import Color, linear
 from viewsphere.zoo.shapes.solids import Float, Solid, join, loft, moved, turned
 from viewsphere.zoo.townscape.surfaces import cuboid
 
+HOME = "floor"
+
 KEYPOINTS = {
     f"{level}_{end}_{side}": At(
         "walls", (1 if side == "left" else -1, -1 if end == "front" else 1, 1 if level == "top" else -1)

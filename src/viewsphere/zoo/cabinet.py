@@ -19,6 +19,8 @@ from viewsphere.zoo.shapes.paint import linear
 from viewsphere.zoo.shapes.resting import Surface
 from viewsphere.zoo.shapes.solids import join
 
+HOME = "floor"
+
 KEYPOINTS = {
     **sided("top_front", "worktop|top", (1, -1, 1)),
     **sided("top_rear", "worktop|top", (1, 1, 1)),

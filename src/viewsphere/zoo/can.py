@@ -18,6 +18,8 @@ from viewsphere.zoo.shapes.paint import Color, metal
 from viewsphere.zoo.shapes.rods import washer
 from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, moved, superellipse
 
+HOME = "table"
+
 KEYPOINTS = {
     "top": At("lid", (0, 0, 1)),
     "base": At("base", (0, 0, -1)),

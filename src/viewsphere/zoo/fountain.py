@@ -14,6 +14,8 @@ from viewsphere.zoo.shapes.paint import Color, coated, linear
 from viewsphere.zoo.shapes.rods import copies, ring_of, turns
 from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, loft, moved, tube
 
+HOME = "garden"
+
 KEYPOINTS = {
     "top": At("finial|jet", (0, 0, 1)),
     "basin_front": At("basin", (0, -1, 1)),

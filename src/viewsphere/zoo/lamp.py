@@ -18,6 +18,8 @@ from viewsphere.zoo.shapes.paint import Color, linear
 from viewsphere.zoo.shapes.rods import aimed, ring_of, rod, shifted
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, flipped, grid, join, lathe, moved, superellipse, tube
 
+HOME = "floor"
+
 KEYPOINTS = {
     "foot": At("base|leg", (0, 0, -1)),
     "bulb": At("bulb"),

@@ -16,6 +16,8 @@ from viewsphere.zoo.shapes.paint import Color, coated, linear, metal
 from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, moved, tube, turned
 from viewsphere.zoo.townscape.surfaces import cuboid
 
+HOME = "table"
+
 KEYPOINTS = {
     **sided("base_front", "base", (1, -1, 0)),
     **sided("base_rear", "base", (1, 1, 0)),

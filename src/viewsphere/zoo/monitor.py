@@ -18,6 +18,8 @@ from viewsphere.zoo.shapes.rods import bezier, shifted
 from viewsphere.zoo.shapes.solids import Float, Solid, both_sides, join, lathe, loft, moved, tube, turned
 from viewsphere.zoo.townscape.surfaces import cuboid
 
+HOME = "table"
+
 KEYPOINTS = {
     **sided("screen_top", "screen", (1, 0, 1)),
     **sided("screen_bottom", "screen", (1, 0, -1)),

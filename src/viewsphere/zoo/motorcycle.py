@@ -17,6 +17,8 @@ from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.shapes.rods import shifted
 from viewsphere.zoo.shapes.solids import moved
 
+HOME = "street"
+
 KEYPOINTS = {
     "wheel_front": At("wheel_front_hub"),
     "wheel_rear": At("wheel_rear_hub"),

@@ -18,6 +18,8 @@ from viewsphere.zoo.shapes.paint import Color, linear, metal
 from viewsphere.zoo.shapes.rods import bezier, shifted, swept
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, lathe, moved, rounded_box, superellipse, tube, turned
 
+HOME = "table"
+
 KEYPOINTS = {
     "rim": At("body", (0, 0, 1)),
     "base": At("body", (0, 0, -1)),

@@ -11,6 +11,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, linear
 from viewsphere.zoo.shapes.solids import Solid, join, moved, rounded_box
 
+HOME = "place"
+
 THICKNESS = 0.05
 """Of a board, as a share of the box's shortest side."""
 

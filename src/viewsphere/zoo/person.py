@@ -18,6 +18,8 @@ from viewsphere.zoo.people.skeleton import JOINTS, PARENTS, skeleton
 from viewsphere.zoo.people.weights import weights
 from viewsphere.zoo.shapes.paint import Color
 
+HOME = "street"
+
 CLIPS = ("walk", "run", "stand", "sit")
 """Its animations; the first is what is played where none is named."""
 

@@ -11,6 +11,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, linear
 from viewsphere.zoo.shapes.solids import join, moved, rounded_box
 
+HOME = "place"
+
 TOPS: tuple[Color, ...] = ((0.76, 0.59, 0.41), (0.66, 0.48, 0.3), (0.33, 0.23, 0.155), (0.9, 0.89, 0.86), (0.6, 0.61, 0.62))
 
 BOARD = 0.03

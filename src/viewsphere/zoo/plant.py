@@ -20,6 +20,8 @@ from viewsphere.zoo.shapes.paint import Color, linear
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, lathe, moved
 from viewsphere.zoo.townscape.surfaces import finished, waves
 
+HOME = "table"
+
 KEYPOINTS = {
     "pot_rim": At("pot", (0, 0, 1)),
     "pot_base": At("pot", (0, 0, -1)),

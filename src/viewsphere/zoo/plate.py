@@ -17,6 +17,8 @@ from viewsphere.zoo.shapes.paint import Color, linear
 from viewsphere.zoo.shapes.rods import smooth
 from viewsphere.zoo.shapes.solids import Float, lathe
 
+HOME = "table"
+
 KEYPOINTS = {
     "rim_front": At("rim", (0, -1, 0)),
     "rim_rear": At("rim", (0, 1, 0)),

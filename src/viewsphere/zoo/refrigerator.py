@@ -20,6 +20,8 @@ from viewsphere.zoo.shapes.resting import Surface
 from viewsphere.zoo.shapes.rods import rod
 from viewsphere.zoo.shapes.solids import Solid, join, lathe, moved, rounded_box, tube, turned
 
+HOME = "floor"
+
 KEYPOINTS = {
     **sided("top_front", "body", (1, -1, 1)),
     **sided("top_rear", "body", (1, 1, 1)),

@@ -16,6 +16,8 @@ from viewsphere.zoo.shapes.paint import Color, linear
 from viewsphere.zoo.shapes.rods import circle
 from viewsphere.zoo.shapes.solids import Float, Solid, join, loft, tube
 
+HOME = "floor"
+
 KEYPOINTS = {
     **sided("corner_front", "pile", (1, -1, 1)),
     **sided("corner_rear", "pile", (1, 1, 1)),

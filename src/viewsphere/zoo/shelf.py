@@ -19,6 +19,8 @@ from viewsphere.zoo.shapes.resting import Surface
 from viewsphere.zoo.shapes.rods import rod
 from viewsphere.zoo.shapes.solids import join
 
+HOME = "floor"
+
 KEYPOINTS = {
     **sided("top_front", "upright", (1, -1, 1)),
     **sided("top_rear", "upright", (1, 1, 1)),

@@ -14,6 +14,8 @@ from viewsphere.zoo.townscape import terrace
 from viewsphere.zoo.townscape.masonry import Bars
 from viewsphere.zoo.townscape.surfaces import finished
 
+HOME = "place"
+
 KEYPOINTS = {
     **sided("wall_front", "wall", (1, -1, -1)),
     **sided("eaves_front", "wall", (1, -1, 1)),

@@ -18,6 +18,8 @@ from viewsphere.zoo.shapes.assembly import Piece
 from viewsphere.zoo.shapes.resting import Surface
 from viewsphere.zoo.shapes.solids import Float, Solid, both_sides, join, lathe, loft, moved, turned
 
+HOME = "floor"
+
 KEYPOINTS = {
     **sided("seat_front", "seat_cushion", (1, -1, 1)),
     **sided("seat_rear", "seat_cushion", (1, 1, 1)),

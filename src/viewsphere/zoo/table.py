@@ -20,6 +20,8 @@ from viewsphere.zoo.shapes.resting import Surface, shrunk
 from viewsphere.zoo.shapes.rods import circle
 from viewsphere.zoo.shapes.solids import Float, Solid, join, superellipse
 
+HOME = "floor"
+
 KEYPOINTS = {
     **sided("top_front", "top", (1, -1, 1)),
     **sided("top_rear", "top", (1, 1, 1)),

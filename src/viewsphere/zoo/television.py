@@ -21,6 +21,8 @@ from viewsphere.zoo.shapes.rods import circle, rod
 from viewsphere.zoo.shapes.sheets import sheet
 from viewsphere.zoo.shapes.solids import join, lathe, loft, moved, rounded_box, tube, turned
 
+HOME = "table"
+
 KEYPOINTS = {
     **sided("screen_top", "screen", (1, 0, 1)),
     **sided("screen_bottom", "screen", (1, 0, -1)),

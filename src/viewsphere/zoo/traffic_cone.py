@@ -13,6 +13,8 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, lamp, linear
 from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, loft, moved, rounded_box, superellipse, turned
 
+HOME = "street"
+
 KEYPOINTS = {
     "tip": At("cone", (0, 0, 1)),
     **sided("foot_front", "foot", (1, -1, -1)),

@@ -16,6 +16,8 @@ from viewsphere.zoo.shapes.sheets import sheet
 from viewsphere.zoo.shapes.solids import Solid, join, lathe, moved, rounded_box, tube, turned
 from viewsphere.zoo.townscape.surfaces import cuboid
 
+HOME = "street"
+
 KEYPOINTS = {
     "red": At("lamp_red", (0, -1, 0)),
     "amber": At("lamp_amber", (0, -1, 0)),

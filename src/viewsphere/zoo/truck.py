@@ -16,6 +16,8 @@ from viewsphere.zoo.coachwork.wheels import Wheel
 from viewsphere.zoo.shapes.assembly import assemble
 from viewsphere.zoo.shapes.paint import Color, linear, metal
 
+HOME = "street"
+
 KEYPOINTS = {
     **sided("wheel_front", "wheel_front_{}_rim", (1, 0, 0)),
     **sided("wheel_rear", "wheel_rear_{}_rim", (1, 0, 0)),

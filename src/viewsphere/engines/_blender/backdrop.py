@@ -55,7 +55,7 @@ class Backdrop:
         if is_open:
             return shown
         out = np.ones_like(shown)
-        out[..., :3] = shown[..., :3] + (1 - shown[..., 3:]) * self._seen(directions)
+        out[..., :3] = shown[..., :3] + (1 - shown[..., 3:]) * self.seen(directions)
         return out
 
     def _left(self, away: Float, rise: Float, camera: Camera, triangle: NDArray[np.int32]) -> Float32:
@@ -69,7 +69,7 @@ class Backdrop:
         left[_widened((triangle >= 0) & (triangle < self.ground)) & (triangle < self.ground)] = 1
         return left.astype(np.float32)
 
-    def _seen(self, directions: Float) -> Float32:
+    def seen(self, directions: Float) -> Float32:
         """The sky's radiance (H, W, 3) in unit directions of the world, bilinear."""
         sky, turn = self.sky.seen, np.radians(self.sky.turn_deg)
         height, width, _ = sky.shape

@@ -25,6 +25,7 @@ from viewsphere.engines._blender.requests import Request, kinds_of, materials_re
 from viewsphere.engines._blender.scripts import script_request
 from viewsphere.engines._blender.sweeping import Sweeping
 from viewsphere.engines._blender.texels import Kind, Levels
+from viewsphere.engines._blender.veiling import lay_sky, veil
 from viewsphere.engines._passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.imaging.background import display_background, shows_sky
@@ -222,7 +223,13 @@ class CyclesStage:
         finish = self.shot.finish(instant).with_background(name == "rgba")
         background = display_background(finish.background, camera.width, camera.height)
         is_open = not shows_sky(finish.background)
+        fog = self.shot.scene.fog
+        is_open = is_open or fog is not None  # whose sky is laid behind things that it has veiled
         rendered = arranged.painted(camera, is_open, visibility, Sweeping(self.shot, instant, sensor), wanted)
+        if fog is not None:
+            veil(rendered["picture"], fog, camera, arranged.geometry)
+            if shows_sky(finish.background):
+                lay_sky(rendered["picture"], fog, camera, arranged.sky)
         focus, owner = np.array(self.shot.instants[instant].focus), arranged.geometry.triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
         return rendered | {name: finished(rendered["picture"], background, finish, seen)}
@@ -286,12 +293,15 @@ class Arrangement:
         colors = self._radiance(camera, True, clip, sweeping)
         return self.backdrop.behind(colors, camera, visibility, is_open)
 
-    @cached_property
+    @property
     def backdrop(self) -> Backdrop | None:
         """The sky and the ground's fading, for Workbench, which has neither; None otherwise."""
-        if self.options.renderer != "workbench" or self.shot.scene.blend is not None:
-            return None
-        return Backdrop.of(self.shot, self.geometry)
+        return self.sky if self.options.renderer == "workbench" else None
+
+    @cached_property
+    def sky(self) -> Backdrop | None:
+        """The sky and the ground's fading; None where the scene is a user's own."""
+        return None if self.shot.scene.blend is not None else Backdrop.of(self.shot, self.geometry)
 
     def _radiance(
         self, camera: Camera, is_open: bool, clip: Clip = (NEAREST, FARTHEST), sweeping: Sweeping | None = None

@@ -14,7 +14,9 @@ from viewsphere.engines.raster.occlusion import Occlusion
 from viewsphere.engines.raster.records import Float32, Int32, PictureRays, Surfaces, Textures
 from viewsphere.engines.raster.samples import Layer, Marks, Samples, differs_behind, edge_samples, layers
 from viewsphere.geometry.camera import inverse_camera_matrix
+from viewsphere.imaging.air import Air
 from viewsphere.model.camera import Camera
+from viewsphere.model.weather import Fog
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility, lens_rays
 
@@ -63,23 +65,26 @@ def paint(
     has_sky: bool,
     radiance: Float32,
     split: Float32 = NO_SPLIT,
+    fog: Fog | None = None,
 ) -> None:
-    """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the covered share of the pixel.
+    """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the covered share of the pixel, as seen through
+    `fog`.
 
     Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, else 0. `split`, if it is not empty,
     is filled with the parts of this light, (H * W, 6 or 9) float32 as `kernels_split` has them; it must be 0 before.
     """
     view = view_of(baked, camera)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    stack = _shade(baked, camera, view, visibility, triangle, depth, radiance, split)
+    air = None if fog is None else Air.of(fog, camera)
+    stack = _shade(baked, camera, view, visibility, triangle, depth, radiance, split, air=air)
     if has_sky:
-        sky_behind(view, baked.surrounding, radiance)
+        _lay_sky(view, baked.surrounding, radiance, air)
     if not antialias:
         return
     behind = differs_behind(visibility, stack, baked.owner, baked.geometry.triangle_normals, radiance)
     samples = edge_samples(baked.geometry, camera, visibility, baked.owner, behind)
     if samples is not None:
-        _smooth(baked, camera, visibility, samples, behind, has_sky, radiance, split)
+        _smooth(baked, camera, visibility, samples, behind, has_sky, radiance, split, fog)
 
 
 def materials(baked: Baked, camera: Camera, visibility: Visibility) -> Float32:
@@ -104,6 +109,7 @@ def _smooth(
     has_sky: bool,
     radiance: Float32,
     split: Float32,
+    fog: Fog | None,
 ) -> None:
     """Set edge pixels to the mean of their samples. Samples are shaded only if they look like no centre of a pixel around, or
     lie in pixels marked in `behind`.
@@ -122,10 +128,11 @@ def _smooth(
     )
     view = view_of(baked, camera, own)
     colors, parts = np.empty((len(at), 4), np.float32), np.zeros((len(at) if len(split) else 0, split.shape[1]), np.float32)
-    _shade(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own)
+    air = None if fog is None else Air.of(fog, camera, _rays(camera, own))
+    _shade(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
     if has_sky:
         colors[~is_own, 3] = 1  # the sky need not be looked up for these
-        sky_behind(view, baked.surrounding, colors)
+        _lay_sky(view, baked.surrounding, colors, air)
     if len(split):
         kernels_split.average_split(samples.pixels, like, colors, radiance, parts, split)
     glints, means = kernels_paint.average_samples(samples.pixels, like, colors, radiance)
@@ -162,9 +169,10 @@ def _shade(
     radiance: Float32,
     split: Float32,
     samples: Samples | None = None,
+    air: Air | None = None,
 ) -> list[Layer]:
     """Fill `radiance` (S, 4) with what the samples show, surfaces behind see-through ones first, and `split` with its parts,
-    if it is not empty. Returns the layers.
+    if it is not empty; each surface is seen through the air before it. Returns the layers.
     """
     solid, ground = np.empty((2, len(triangle)), np.int32)
     materials = baked.surfaces.material, np.zeros(len(baked.surfaces.looks) + 1, np.uint64)
@@ -174,13 +182,36 @@ def _shade(
     # Layers are listed also where a solid surface is in front: a decal may lie on that surface.
     pixels = None if samples is None else samples.pixels
     stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
-    for layer in stack:
+    reached = depth.copy()  # 1/depth up to which light has come
+    for i, layer in enumerate(stack):
+        if air is not None and i > 0:
+            on = layer.slot
+            air.veil(radiance, air.depth(reached[on], on) - air.depth(layer.inverse_depth, on), on)
+        reached[layer.slot] = layer.inverse_depth
         behind, behind_depth = triangle.copy(), depth.copy()
         behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
         is_ground = baked.kind[layer.triangle] == kernels_paint.FLOOR
         for which in (False, True):
             _shade_some(baked, view, layer.slot[is_ground == which], which, behind, behind_depth, radiance, split)
+    if air is not None:
+        air.veil(radiance, air.depth(reached))
     return stack
+
+
+def _lay_sky(view: PictureRays, surrounding: Surrounding, radiance: Float32, air: Air | None) -> None:
+    """Lay radiance (S, 4) over the sky as it is seen through the air."""
+    before = None if air is None else radiance.copy()
+    sky_behind(view, surrounding, radiance)
+    if air is not None and before is not None:
+        radiance[:, :3] = before[:, :3] + air.behind(radiance[:, :3] - before[:, :3], before[:, 3])
+
+
+def _rays(camera: Camera, samples: Samples) -> NDArray[np.floating]:
+    """The rays (S, 3) of samples, in the camera's axes."""
+    if len(samples.rays):
+        return samples.rays
+    at = np.column_stack([samples.position, np.ones(len(samples.position))])
+    return at @ inverse_camera_matrix(camera.intrinsics).T
 
 
 def _shade_some(

@@ -81,7 +81,11 @@ class RasterStage:
         if not set(names).isdisjoint(LIGHT_PASSES):
             painted |= self._light(instant, sensor, visibility, names)
             picture = picture_of(names)
-            if picture and Blur(self.arrangements, instant, sensor).count(self.at(instant), visibility) == 1:
+            if (
+                picture
+                and not self.shot.scene.weather
+                and Blur(self.arrangements, instant, sensor).count(self.at(instant), visibility) == 1
+            ):
                 painted[picture] = self._finished(instant, sensor, visibility, picture)  # of the light that was parted
         if not set(names).isdisjoint(MATERIAL_PASSES):
             made = materials(self.baked(instant), self.shot.camera(instant, sensor), visibility)
@@ -131,14 +135,15 @@ class RasterStage:
 
         def paint_moment(arranged: Arranged, camera: Camera, seen: Visibility, light: Float32) -> None:
             baked = bake(self._pack(arranged), self.shot.scene, self.options, self._shades)
-            paint(baked, camera, seen, is_smooth, has_sky, light)
+            paint(baked, camera, seen, is_smooth, has_sky, light, fog=self.shot.scene.fog)
 
         count = blur.count(self.at(instant), visibility)
         if count > 1:
             self._baked.clear()  # what is packed is written over
             blur.paint(count, paint_moment, radiance)
         else:
-            paint(self.baked(instant), self.shot.camera(instant, sensor), visibility, is_smooth, has_sky, radiance)
+            now, camera = self.baked(instant), self.shot.camera(instant, sensor)
+            paint(now, camera, visibility, is_smooth, has_sky, radiance, fog=self.shot.scene.fog)
 
     def _canvas(self, pixels: int) -> Float32:
         """Room for the light of a picture, the same one every time: fresh memory costs as much as the sky."""

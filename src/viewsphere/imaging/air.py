@@ -1,0 +1,71 @@
+"""The air between things and the camera: Koschmieder's law (1924), in scene-linear light, with range along the ray.
+
+I = J exp(-d) + A (1 - exp(-d)): J is the light of a surface, A that of the air. d, the optical depth of the ray, is in closed
+form: extinction times range, or, of air that is e times thinner every `height` metres above z = 0, its integral.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.model.camera import Camera
+from viewsphere.model.weather import Fog
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+
+LEVEL = 1e-6
+"""A rise, over a fog's height, of a ray that is as good as level."""
+
+OPAQUE = 80.0
+"""Optical depth of what has no end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Air:
+    """The air along rays from one eye. stretch (N,): metres of range for a metre of their depth (see `truth.Visibility`); rise
+    (N,): sine of their elevation.
+    """
+
+    fog: Fog
+    eye: float
+    stretch: Float32
+    rise: Float32
+
+    @classmethod
+    def of(cls, fog: Fog, camera: Camera, rays: NDArray[np.floating] | None = None) -> Air:
+        """The air before a camera, along rays (N, 3) of its axes, by default those of its pixels' centres."""
+        ray = np.nan_to_num(pixel_rays(camera.intrinsics).reshape(-1, 3) if rays is None else rays)
+        length = np.sqrt((ray * ray).sum(axis=1))
+        rise = (ray @ camera.R[:, 2]) / np.maximum(length, 1e-12)
+        return cls(fog, float(camera.center[2]), length.astype(np.float32), rise.astype(np.float32))
+
+    def depth(self, inverse: Float32, which: NDArray[np.integer] | slice = slice(None)) -> Float32:
+        """Optical depth (n,) of rays, by their numbers, from the eye to what has this 1/depth there; 0 is the sky."""
+        with np.errstate(divide="ignore", over="ignore"):
+            away = self.stretch[which] / inverse
+            if self.fog.height is None:
+                return np.minimum(away * self.fog.extinction, OPAQUE).astype(np.float32)
+            begin = self.fog.extinction * np.exp(-min(max(self.eye / self.fog.height, -80.0), 80.0))
+            rate = (self.rise[which] / self.fog.height).astype(np.float64)
+            level = np.abs(rate) < LEVEL
+            climbed = np.clip(np.where(level, 0.0, rate) * np.where(np.isinf(away), 1e9, away), -60, 700)
+            bent = -np.expm1(-climbed) / np.where(level, 1.0, rate)
+            return np.minimum(begin * np.where(level, away, bent), OPAQUE).astype(np.float32)
+
+    def veil(self, radiance: Float32, depth: Float32, which: NDArray[np.integer] | slice = slice(None)) -> None:
+        """Dim light (N, 4), premultiplied, by an optical depth, and lay the air's own over what is covered, in place."""
+        through = np.exp(-depth)
+        light = radiance[which]
+        color = np.array(self.fog.color, np.float32)
+        light[:, :3] = light[:, :3] * through[:, None] + (light[:, 3] * (1 - through))[:, None] * color
+        radiance[which] = light
+
+    def behind(self, sky: Float32, alpha: Float32) -> Float32:
+        """The light (N, 3) that the sky's (N, 3) becomes, where `alpha` (N,) of it is hidden already."""
+        through = np.exp(-self.depth(np.zeros(len(sky), np.float32)))
+        return sky * through[:, None] + ((1 - alpha) * (1 - through))[:, None] * np.array(self.fog.color, np.float32)

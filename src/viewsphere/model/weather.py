@@ -1,0 +1,67 @@
+"""The concrete weather of a scene: what lies in the air between things and the camera, what falls, and what water lies."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Length, Portion
+
+Amount = Annotated[float, Field(strict=True, ge=0, le=1e6)]
+Light = tuple[Amount, Amount, Amount]
+Speed = Annotated[float, Field(strict=True, ge=-60, le=60)]
+
+CONTRAST = 3.912
+"""Optical depth at which a black thing keeps 2 % of its contrast with the horizon: Koschmieder's visibility (1924)."""
+
+
+class Fog(Frozen):
+    """Air that scatters: light from a thing falls by e to the -`extinction` times its range, and the air's own takes its place.
+
+    With a `height` the air is as said at z = 0, and e times clearer every so many metres above.
+    """
+
+    visibility: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
+        default=200.0, description="metres at which a black thing keeps 2 % of its contrast"
+    )
+    height: Length | None = Field(
+        default=None, description="metres up to which it is e times thinner: ground fog; by default it has no end"
+    )
+    color: Light = Field(
+        default=(0.8, 0.8, 0.8), description="radiance of the fog itself: linear [r, g, b]; by default what sun and sky make it"
+    )
+
+    @property
+    def extinction(self) -> float:
+        """Optical depth of a metre, at z = 0."""
+        return CONTRAST / self.visibility
+
+
+class Falling(Frozen):
+    """What all that falls has."""
+
+    rate: Annotated[float, Field(strict=True, gt=0, le=200)] = Field(default=10.0, description="millimetres of water an hour")
+    wind: tuple[Speed, Speed] = Field(default=(0.0, 0.0), description="[x, y] in metres a second, by which it is carried")
+    exposure: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        default=0.01, description="seconds for which a picture is exposed to it, where time has no shutter: longer streaks"
+    )
+    color: Light = Field(default=(0.8, 0.8, 0.8), description="radiance of what falls: linear [r, g, b]; by default the sky's")
+    seed: int = Field(default=0, ge=0, description="of where each drop or flake is")
+
+
+class Rain(Falling):
+    """Drops by Marshall and Palmer 1948, as fast as Garg and Nayar 2007 have them."""
+
+
+class Snow(Falling):
+    """Flakes by Gunn and Marshall 1958, which drift down at about a metre a second."""
+
+
+class Wet(Frozen):
+    """Water on what faces up, and in hollows of the ground."""
+
+    amount: Portion = Field(default=1.0, description="0 dry, 1 soaked: darker, and a film that mirrors")
+    puddles: Portion = Field(default=0.3, description="share of level ground under water")
+    seed: int = Field(default=0, ge=0, description="of where puddles are")

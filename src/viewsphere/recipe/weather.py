@@ -1,0 +1,90 @@
+"""The weather of a recipe's scene: fog, rain, snow that falls, and wet ground. Its numbers may be drawn."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag
+
+from viewsphere.model.mistakes import at
+from viewsphere.model.numbers import Portion
+from viewsphere.model.weather import Fog, Rain, Snow, Wet
+from viewsphere.recipe.draws import Drawn, span
+from viewsphere.recipe.entries import entry_of
+from viewsphere.recipe.values import OrShort, shape_of
+
+HEAVY = {"rain": 7.6, "snow": 2.5}
+"""Millimetres of water an hour from which on meteorologists call rain, and snow, heavy."""
+
+
+class FogEntry(entry_of(Fog, optional=("color",))):
+    """Air that scatters light."""
+
+
+class RainEntry(entry_of(Rain, without=("seed",), optional=("color",))):
+    """Rain that falls, under a sky that it covers, onto what it wets."""
+
+    clouds: Drawn[Portion] = Field(default=1.0, description="share of the sky that it covers: 1 hides the sun")
+
+
+class SnowEntry(entry_of(Snow, without=("seed",), optional=("color",))):
+    """Snow that falls, under a sky that it covers."""
+
+    clouds: Drawn[Portion] = Field(default=1.0, description="share of the sky that it covers: 1 hides the sun")
+
+
+class WetEntry(entry_of(Wet, without=("seed",))):
+    """Water on what faces up; rain brings it by itself."""
+
+
+def _short(name: str, words: tuple[str, ...]) -> BeforeValidator:
+    """A number, or a range of numbers, as a mapping of the field that matters most."""
+
+    def read(value: Any) -> Any:
+        if value is False:
+            return "off"
+        is_number = isinstance(value, (int, float, list, tuple)) and not isinstance(value, bool)
+        if isinstance(value, str) and value not in words:
+            raise ValueError(f"expected {', '.join(words)}, a number ({name}), or a mapping; found {value!r}")
+        return {name: value} if is_number else value
+
+    return BeforeValidator(read)
+
+
+Off = Annotated[Literal["off"], Tag("text")]
+FogField = Annotated[
+    Annotated[FogEntry, Tag("mapping")] | Off,
+    Discriminator(shape_of),
+    _short("visibility", ("off",)),
+    OrShort({"type": ["number", "array"]}),
+]
+RainField = Annotated[
+    Annotated[RainEntry, Tag("mapping")] | Off,
+    Discriminator(shape_of),
+    _short("rate", ("off",)),
+    OrShort({"type": ["number", "array"]}),
+]
+SnowField = Annotated[
+    Annotated[SnowEntry, Tag("mapping")] | Off,
+    Discriminator(shape_of),
+    _short("rate", ("off",)),
+    OrShort({"type": ["number", "array"]}),
+]
+WetField = Annotated[
+    Annotated[WetEntry, Tag("mapping")] | Annotated[Literal["off", "auto"], Tag("text")],
+    Discriminator(shape_of),
+    _short("amount", ("auto", "off")),
+    OrShort({"type": ["number", "array"]}),
+]
+
+
+def check_weather(rain: object, snow: object) -> None:
+    """Raise ValueError for rain and snow that are both heavy, which no air is warm and cold enough for."""
+    if isinstance(rain, RainEntry) and isinstance(snow, SnowEntry):
+        least = {"rain": span(rain.rate)[0], "snow": span(snow.rate)[0]}
+        if all(least[name] >= HEAVY[name] for name in HEAVY):
+            with at("snow"):
+                raise ValueError(
+                    f"expected less than {HEAVY['snow']:g} mm/h beside heavy rain (from {HEAVY['rain']:g}); found "
+                    f"{least['snow']:g}: sleet has little of one of them"
+                )

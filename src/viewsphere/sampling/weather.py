@@ -1,0 +1,76 @@
+"""A scene under the weather of its recipe: its light as it comes through, and what lies in the air and falls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from viewsphere.model.scene import HemisphereLight, Scene
+from viewsphere.model.weather import CONTRAST, Fog, Rain, Snow, Wet
+from viewsphere.recipe.draws import RngOf, drawn
+from viewsphere.recipe.entries import concrete
+from viewsphere.recipe.scene import SceneEntry
+from viewsphere.recipe.weather import FogEntry, RainEntry, SnowEntry, WetEntry
+from viewsphere.surroundings.falling import extinction
+from viewsphere.surroundings.weather import clouded, floor_light, in_fog
+
+SOAKING = 25.0
+"""Millimetres of rain an hour from which on nothing becomes wetter."""
+
+SeedOf = Callable[[str], int]
+
+
+def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -> Scene:
+    """The scene with the weather of its entry, drawn. `seed_of`: a number for a purpose, on which nothing else depends."""
+    fog, rain, snow, wet = (drawn(getattr(entry, name), rng_of, (name,)) for name in ("fog", "rain", "snow", "wet"))
+    falling = [one for one in (rain, snow) if isinstance(one, (RainEntry, SnowEntry))]
+    if not falling and not isinstance(fog, FogEntry):
+        return scene.model_copy(update=_wet(wet, None, seed_of))
+    clouds = max((one.clouds for one in falling), default=0.0)
+    sun, sky = clouded(scene.sun, scene.sky, clouds)
+    lights, changes = scene.lights, dict[str, Any]()
+    light = floor_light(sun, sky)
+    if isinstance(fog, FogEntry):
+        made: Fog = concrete(fog)
+        sun, sky, spread, light = in_fog(sun, sky, made)
+        lights = lights if spread is None else (*lights, spread)
+        changes["fog"] = made if fog.color else made.model_copy(update={"color": _triple(light)})
+    for one in falling:
+        own: Any = concrete(one, color=one.color or _triple(light + _even(lights)), seed=seed_of("falling"))
+        changes["rain" if isinstance(own, Rain) else "snow"] = own
+    if falling:
+        changes["fog"] = _hazy(changes.get("fog"), [one for one in changes.values() if isinstance(one, (Rain, Snow))], light)
+    return scene.model_copy(update={"sun": sun, "sky": sky, "lights": lights} | changes | _wet(wet, rain, seed_of))
+
+
+def _hazy(fog: Fog | None, falling: list[Rain | Snow], light: np.ndarray[Any, Any]) -> Fog:
+    """The air between drops that are too far away to be told apart, with that of fog."""
+    more = sum(map(extinction, falling))
+    if fog is None:
+        return Fog(visibility=CONTRAST / more, color=_triple(light))
+    if fog.height is not None:
+        return fog  # thicker than rain below, and seen through above
+    return fog.model_copy(update={"visibility": CONTRAST / (fog.extinction + more)})
+
+
+def _wet(entry: object, rain: object, seed_of: SeedOf) -> dict[str, Wet]:
+    """Water on the ground, in a scene's field: as it is said, else what rain brings."""
+    if isinstance(entry, WetEntry):
+        return {"wet": concrete(entry, seed=seed_of("puddles"))}
+    if entry == "off" or not isinstance(rain, RainEntry):
+        return {}
+    soaked = min(rain.rate / SOAKING, 1.0)
+    return {"wet": Wet(amount=0.6 + 0.4 * soaked, puddles=0.5 * soaked, seed=seed_of("puddles"))}
+
+
+def _even(lights: tuple[Any, ...]) -> np.ndarray[Any, Any]:
+    found = [np.array(light.color) * light.strength for light in lights if isinstance(light, HemisphereLight)]
+    return sum(found, np.zeros(3))
+
+
+def _triple(light: np.ndarray[Any, Any]) -> tuple[float, float, float]:
+    """Light as numbers of a record, which are the same on all processors."""
+    r, g, b = (float(f"{value:.6g}") for value in np.maximum(light, 0).tolist())
+    return r, g, b
