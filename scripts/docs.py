@@ -325,7 +325,33 @@ def escaped(line: str) -> str:
     return "`".join(part if i % 2 else part.replace("<", "&lt;") for i, part in enumerate(parts))
 
 
+MATERIALS = re.compile(r"(<!-- materials, written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
+
+
+def materials_page() -> str:
+    """The hand-written page with a table of all materials, as they are unless drawn."""
+    heads = ("material", "what it is", "in sentences", "repeats after, m", "mean linear colour", "roughness", "draws")
+    text = f"\n| {' | '.join(heads)} |\n{'|---' * len(heads)}|\n"
+    for name in plugins.names("materials"):
+        module = plugins.load("materials", name)
+        made, (told, *_) = getattr(module, name)(None, 256), (inspect.getdoc(module) or "").splitlines()
+        color = " ".join(f"{share:.2f}" for share in made.color.mean(axis=(0, 1)).tolist())
+        draws, _, _ = (inspect.getdoc(module.draw) or "").partition("\n")
+        row = (
+            f"`{name}`",
+            told.rstrip("."),
+            module.WORD,
+            f"{made.metres:g}",
+            color,
+            f"{made.roughness.mean():.2f}",
+            draws.rstrip("."),
+        )
+        text += f"| {' | '.join(row)} |\n"
+    return MATERIALS.sub(lambda found: found[1] + text, (DOCS / "materials.md").read_text("utf-8"))
+
+
 PAGES = {
+    "materials.md": materials_page,
     "limits.md": limits_page,
     "format-list.md": formats_page,
     "cli.md": cli_page,

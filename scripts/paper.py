@@ -1,4 +1,6 @@
-"""The pictures of docs/paper.md, made anew from the recipes, and those of docs/gallery.md that sheets.py does not make."""
+"""The pictures of docs/paper.md, made anew from the recipes, those of docs/gallery.md that sheets.py does not make, and
+that of docs/materials.md.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from viewsphere import Recipe, render
+from viewsphere import Recipe, plugins, render
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.labels._paint import PALETTE
 from viewsphere.model.camera import Camera, Intrinsics
@@ -466,8 +468,31 @@ def engines() -> None:
     save("cycles_chairs.jpg", np.concatenate(tiles).repeat(2, axis=0).repeat(2, axis=1))
 
 
+def materials() -> None:
+    """Each material as the ground under a chair, and as what a chair on a floor of slabs is made of, three materials a row."""
+    tiles = []
+    for name in plugins.names("materials"):
+        for scene in ({"ground": {"material": name}}, {"ground": "on", "materials": [{"texture": name}]}):
+            made_of = Recipe(
+                name="materials",
+                seed=7,
+                models=[{"source": "zoo:chair"}],
+                viewpoints={"azimuth": 30, "elevation": 22, "distance": {"fill": 0.85}},
+                camera={"size": [320, 240], "fov_deg": 30},
+                scene={"sun": {"azimuth_deg": 100, "elevation_deg": 55}, **scene},
+            )
+            picture = Image.fromarray(next(iter(render(made_of))).rgb)
+            if len(tiles) % 2 == 0:
+                ImageDraw.Draw(picture).text((8, 6), name, fill="white", stroke_width=2, stroke_fill="black", font_size=22)
+            tiles.append(np.asarray(picture))
+    save("materials.jpg", grid(tiles, 6))
+
+
 PICTURES: dict[str, Callable[[], None]] = {
-    **{f.__name__: f for f in (neighbourhood, car, bike, chair, boat, hairdryer, fig1, fig2, fig3, street, chairs, engines)},
+    **{
+        f.__name__: f
+        for f in (neighbourhood, car, bike, chair, boat, hairdryer, fig1, fig2, fig3, street, chairs, engines, materials)
+    },
     "zoo_car": partial(family, "car"),
     "zoo_bicycle": partial(family, "bicycle", 50),
     "zoo_chair": partial(family, "chair"),

@@ -141,6 +141,16 @@ def test_a_channel_that_needs_its_neighbours_is_refused_for_still_pictures(label
         plan(small_recipe(channels=["rgb", "borders"]))
 
 
+def test_a_material_is_one_file(monkeypatch):
+    install(monkeypatch, "dots", "viewsphere.materials", EXAMPLES["dots"])
+    assert "dots" in plugins.names("materials")
+    scene = {"ground": {"material": "dots"}, "materials": [{"texture": "dots"}]}
+    dotted, plain = (next(iter(render(small_recipe(scene=own)))) for own in (scene, {"ground": "on"}))
+    assert np.array_equal(dotted.instances, plain.instances)
+    for seen in (dotted.instances > 0, dotted.instances == 0):
+        assert np.abs(dotted.rgb[seen].astype(int) - plain.rgb[seen]).mean() > 5
+
+
 @pytest.mark.usefixtures("csv_boxes")
 def test_a_format_is_one_file(small_dataset, tmp_path):
     assert "csv_boxes" in plugins.names("formats")

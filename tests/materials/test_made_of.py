@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from small import ROOT
 from viewsphere.assets.box_mapping import box_mapped
 from viewsphere.assets.looks import looks_of, words
 from viewsphere.assets.mesh import Material
@@ -13,6 +14,7 @@ from viewsphere.assets.primitive import face_normals
 from viewsphere.assets.repaint import textured
 from viewsphere.assets.srgb import linear
 from viewsphere.assets.substance import pictures_of
+from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.materials import metres, surface
@@ -21,6 +23,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.substance import Substance
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scene import EngineEntry
 from viewsphere.sampling.plan import plan
 from viewsphere.surroundings.ground import ground_albedo, ground_material, only_scatters
 from viewsphere.zoo import build
@@ -200,3 +203,35 @@ def test_sentences_say_what_a_model_is_made_of(chair):
     assert words(looks, (Repaint(texture=BRICK),))[1] == "brick"
     assert words(looks, (Repaint(texture=WOOD),))[1] == "wooden"
     assert words(looks, (Repaint(texture=Substance(name="grass", size=128)),))[0] == "green"
+
+
+@pytest.mark.slow
+def test_the_recipe_of_materials_makes_a_data_set_that_passes(tmp_path):
+    views = {"azimuth": 35, "elevation": 18, "distance": {"fill": 0.7}}
+    small = {"camera": {"size": [48, 36], "fov_deg": 35}, "viewpoints": views, "formats": []}
+    recipe = Recipe.load(ROOT / "recipes" / "materials.yaml", small)
+    vs.generate(recipe, tmp_path, workers=0)
+    dataset = vs.open(tmp_path)
+    report = check(dataset, sample=None)
+    assert report.ok, report.findings
+    shots = [dataset.store.shot(key) for key, _ in dataset.shots()]
+    assert len({shot.scene.ground.material.name for shot in shots}) > 3
+    assert len({thing.repaints[0].texture.name for shot in shots for thing in shot.objects}) > 5
+    said = [caption.text for sample in dataset for caption in sample.captions]
+    assert any("metal" in text or "wooden" in text for text in said)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["cycles", "eevee"])
+def test_blenders_engines_show_the_materials_where_raster_does(request, engine):
+    """Bricks below and planks on a chair: as bright within what the engines' light differs by, and in the same places."""
+    request.getfixturevalue("blender" if engine == "cycles" else "drawing")
+    options = {"name": engine, "samples": 16, "denoise": "off"} if engine == "cycles" else {"name": engine, "quality": "draft"}
+    recipe = recipe_of({"material": "brick"}, [{"texture": "planks"}], camera={"size": [160, 120], "fov_deg": 35})
+    recipe = recipe.model_copy(update={"models": recipe.models[:1]})
+    engines = (recipe.engine, EngineEntry(**options))
+    by_raster, by_blender = (next(iter(vs.render(recipe.model_copy(update={"engine": e})))).rgb.astype(float) for e in engines)
+    assert np.abs(by_raster - by_blender).mean() < 10
+    assert np.abs(by_raster.mean(axis=(0, 1)) - by_blender.mean(axis=(0, 1))).max() < 8
+    floor = slice(90, 120)
+    assert np.corrcoef(by_raster[floor].reshape(-1), by_blender[floor].reshape(-1))[0, 1] > 0.8

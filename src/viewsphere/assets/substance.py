@@ -14,8 +14,8 @@ from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.model.substance import Substance
 
-KEPT = 24
-"""Substances whose pictures are kept: 3 MB each of 512 texels a side."""
+KEPT = 8
+"""Substances whose pictures are kept: 3 MB each of 512 texels a side, 13 MB of 1024."""
 
 _LEVELS = 65535
 """Of light, for which sRGB values are looked up: the darkest byte has 20 of them."""

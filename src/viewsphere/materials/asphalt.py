@@ -22,7 +22,7 @@ class Asphalt:
     stone: float = 0.011
     worn: float = 0.5
     cracks: float = 0.2
-    metres: float = 1.6
+    metres: float = 2.4
     seed: int = 0
 
 
@@ -36,15 +36,15 @@ def asphalt(parameters: Asphalt | None = None, size: int = 512) -> Surface:
     large = smooth(0.10, 0.34, coarse.border) * (coarse.chance < 0.28 + 0.3 * p.worn + 0.3 * patches)
     small = smooth(0.08, 0.3, fine.border) * (fine.chance < 0.5)
     crack = _cracks(size, p, patches)
-    bare = np.clip(p.worn + 0.6 * patches, 0.1, 1)
+    bare = np.clip(p.worn + 0.3 * patches, 0.1, 1)
     own = np.where(large > small, (coarse.chance * 7.0) % 1.0, (fine.chance * 5.0) % 1.0).astype(np.float32)
     stones = colored(0.75 * own * own + 0.5 * own * bare, (0.0, p.stones[0]), (1.0, p.stones[1]))
     color = mixed(
-        shaded(p.bitumen, 1 + 0.5 * patches + 0.5 * grit), stones, np.clip(np.maximum(large, 0.7 * small) * bare, 0, 1)
+        shaded(p.bitumen, 1 + 0.25 * patches + 0.5 * grit), stones, np.clip(np.maximum(large, 0.7 * small) * bare, 0, 1)
     )
     height = 0.0012 * large + 0.0007 * small + 0.0004 * grit - 0.004 * crack
     rough = 0.92 - 0.22 * large * bare + 0.05 * grit
-    return Surface(shaded(color, (1 - 0.6 * crack) * (1 + 0.15 * patches)), np.clip(rough, 0.4, 1), height, p.metres)
+    return Surface(shaded(color, (1 - 0.6 * crack) * (1 + 0.1 * patches)), np.clip(rough, 0.4, 1), height, p.metres)
 
 
 def _cracks(size: int, p: Asphalt, patches: Map) -> Map:
@@ -66,6 +66,6 @@ def draw(rng: np.random.Generator) -> Asphalt:
         stone=float(rng.uniform(0.008, 0.014)),
         worn=worn,
         cracks=float(rng.uniform(0.0, 0.4)),
-        metres=float(rng.uniform(1.4, 2.0)),
+        metres=float(rng.uniform(2.2, 3.0)),
         seed=int(rng.integers(2**31)),
     )

@@ -11,8 +11,10 @@ from pydantic import JsonValue
 from viewsphere import plugins
 from viewsphere.recipe.recipe import Recipe
 
-SHARED = tuple(Path(__file__).parents[1] / name for name in ("imaging", "surroundings", "model/scene.py"))
-"""What every engine paints with: what finishes pictures, what is around the targets, and what a scene is if nobody says."""
+SHARED = tuple(Path(__file__).parents[1] / name for name in ("imaging", "materials", "surroundings", "model/scene.py"))
+"""What every engine paints with: what finishes pictures, what is around the targets, materials, and what a scene is if nobody
+says.
+"""
 
 
 @cache

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Map = NDArray[np.float32]
+Map = NDArray[np.floating[Any]]
 """(N, N) float32, row 0 on top."""
 
-Light = NDArray[np.float32]
+Light = NDArray[np.floating[Any]]
 """Linear colour, (N, N, 3) float32, row 0 on top."""
 
 Color = tuple[float, float, float]
