@@ -76,7 +76,8 @@ class Lamp:
     @property
     def extent(self) -> tuple[float, float, float]:
         """Width, depth and height of all of it, metres, at most."""
-        return *(2 * self.shade_radius + (0.32 if self.style == "tripod" else 0.04),) * 2, self.height
+        wide = 2 * self.shade_radius + (0.32 if self.style == "tripod" else 0.04)
+        return wide, wide, self.height
 
 
 @dataclass(frozen=True)

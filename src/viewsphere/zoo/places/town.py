@@ -29,7 +29,7 @@ KINDS: dict[str, Callable[[Any], bool]] = {
 }
 """Which members of a family are of a kind."""
 
-PARKED = 0.55
+PARKED = 0.4
 """Share of the spaces to park in that are taken."""
 
 
@@ -154,7 +154,7 @@ def _terrace(t: _Town, side: Frontage, start: float, stop: float) -> float:
 def _houses(t: _Town, block: Block) -> None:
     """Houses in gardens on the two long sides, hedges along the pavement with gaps before the doors."""
     for side in frontages(block)[1::2]:
-        for along in _spread(side.length, 19.0, 3.0):
+        for along in _spread(side.length, 17.5, 10.5):
             seed, p = t.drawn("house", "plain")
             t.put("house", seed, *side.at(along, PAVED + 6.0 + p.footprint[1] / 2), side.turn_deg, STEP - 0.02)
             door = along + p.door_x
@@ -186,9 +186,7 @@ def _pavement(t: _Town, side: Frontage) -> None:
         t.stand("lamp_post", side, along, 0.55)
     for along in _spread(side.length, 9.5, 12.0):
         if min(abs(along - lamp) for lamp in lamps) > 2.5 and t.rng.random() < 0.6:
-            t.stand(
-                "tree", side, along, 0.75, float(t.rng.uniform(0, 360)), "small", fits=lambda p: p.crown < 4.2 and p.height < 7
-            )
+            t.stand("tree", side, along, 0.75, float(t.rng.uniform(0, 360)), "small")
     for family, inset, chance in (
         ("bench", 2.3, 0.6),
         ("post_box", 0.5, 0.3),
