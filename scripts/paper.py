@@ -432,16 +432,16 @@ def chairs() -> None:
 # The gallery
 
 
-def family(name: str, azimuth: float = 35, fill: float = 0.85) -> None:
+def family(name: str, azimuth: float = 35, fill: float = 0.85, elevation: float = 15, width: int = WIDTH) -> None:
     """Twenty draws of a family."""
     made_of = Recipe(
         name=name,
         models=[{"source": f"zoo:{name}", "count": 20}],
-        viewpoints={"azimuth": azimuth, "elevation": 15, "distance": {"fill": fill}},
+        viewpoints={"azimuth": azimuth, "elevation": elevation, "distance": {"fill": fill}},
         camera={"size": [320, 240], "fov_deg": 30},
         scene={"ground": "on"},
     )
-    save(f"zoo_{name}.jpg", grid([s.rgb for s in render(made_of)], 5))
+    save(f"zoo_{name}.jpg", grid([s.rgb for s in render(made_of)], 5, width))
 
 
 def neighbourhood() -> None:
@@ -463,6 +463,8 @@ def engines() -> None:
     save("cycles_chairs.jpg", np.concatenate(tiles).repeat(2, axis=0).repeat(2, axis=1))
 
 
+HOUSEHOLD = ("mug", "bottle", "bowl", "can", "plate", "book", "box", "laptop", "monitor", "plant")
+
 PICTURES: dict[str, Callable[[], None]] = {
     **{f.__name__: f for f in (neighbourhood, car, bike, chair, boat, hairdryer, fig1, fig2, fig3, street, chairs, engines)},
     "zoo_car": partial(family, "car"),
@@ -470,6 +472,7 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_chair": partial(family, "chair"),
     "zoo_boat": partial(family, "boat", fill=0.65),
     "zoo_hair_drier": partial(family, "hair_drier", 50),
+    **{f"zoo_{name}": partial(family, name, elevation=25, width=940) for name in HOUSEHOLD},
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 
