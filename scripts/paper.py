@@ -437,12 +437,14 @@ def chairs() -> None:
 FURNITURE = ("table", "sofa", "bed", "shelf", "cabinet", "lamp", "refrigerator", "television", "rug")
 
 
-def family(name: str, azimuth: float = 35, fill: float = 0.85, width: int = WIDTH, quality: int = 85) -> None:
+def family(
+    name: str, azimuth: float = 35, fill: float = 0.85, elevation: float = 15, width: int = WIDTH, quality: int = 85
+) -> None:
     """Twenty draws of a family."""
     made_of = Recipe(
         name=name,
         models=[{"source": f"zoo:{name}", "count": 20}],
-        viewpoints={"azimuth": azimuth, "elevation": 15, "distance": {"fill": fill}},
+        viewpoints={"azimuth": azimuth, "elevation": elevation, "distance": {"fill": fill}},
         camera={"size": [320, 240], "fov_deg": 30},
         scene={"ground": "on"},
     )
@@ -488,6 +490,8 @@ def materials() -> None:
     save("materials.jpg", grid(tiles, 6))
 
 
+HOUSEHOLD = ("mug", "bottle", "bowl", "can", "plate", "book", "box", "laptop", "monitor", "plant")
+
 PICTURES: dict[str, Callable[[], None]] = {
     **{
         f.__name__: f
@@ -499,6 +503,7 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_boat": partial(family, "boat", fill=0.65),
     "zoo_hair_drier": partial(family, "hair_drier", 50),
     **{f"zoo_{name}": partial(family, name, width=1200, quality=68) for name in FURNITURE},
+    **{f"zoo_{name}": partial(family, name, elevation=25, width=940) for name in HOUSEHOLD},
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 

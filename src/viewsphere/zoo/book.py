@@ -187,15 +187,15 @@ def book_random(rng: np.random.Generator) -> Mesh:
 
 def draw(rng: np.random.Generator) -> Book:
     """The parameters of a random book."""
-    pose: Pose = ("lying", "standing", "open")[int(rng.choice(3, p=(0.48, 0.3, 0.22)))]
-    binding: Binding = "boards" if pose == "open" or chance(rng, 0.6) else "paper"
+    pose: Pose = ("lying", "standing", "open")[int(rng.choice(3, p=(0.5, 0.25, 0.25)))]
+    binding: Binding = "boards" if pose != "lying" or chance(rng, 0.5) else "paper"
     height = uniform(rng, 0.17, 0.3) if binding == "boards" else uniform(rng, 0.17, 0.235)
     return Book(
         pose=pose,
         binding=binding,
         width=height * uniform(rng, 0.62, 0.78),
         height=height,
-        thickness=uniform(rng, 0.018, 0.05) if binding == "boards" else uniform(rng, 0.012, 0.036),
+        thickness=uniform(rng, *_THICK[pose]) if binding == "boards" else uniform(rng, 0.014, 0.036),
         title=pick(rng, covers.TITLES),
         author=pick(rng, covers.AUTHORS),
         art=pick(rng, (*covers.ARTS,)),
@@ -204,6 +204,9 @@ def draw(rng: np.random.Generator) -> Book:
         seed=seed(rng),
     )
 
+
+_THICK: dict[Pose, tuple[float, float]] = {"lying": (0.018, 0.05), "standing": (0.028, 0.055), "open": (0.018, 0.045)}
+"""A thin book does not stand by itself."""
 
 _COLORS: tuple[tuple[Color, Color, Color], ...] = (
     ((0.12, 0.2, 0.36), (0.75, 0.5, 0.3), (0.95, 0.9, 0.78)),

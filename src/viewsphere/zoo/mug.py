@@ -210,7 +210,7 @@ def draw(rng: np.random.Generator) -> Mug:
     shape: Shape = ("straight", "tapered", "bellied", "flared", "barrel")[int(rng.choice(5, p=(0.36, 0.2, 0.18, 0.12, 0.14)))]
     color, first, second = _GLAZES[int(rng.integers(len(_GLAZES)))]
     enamel = shape in ("straight", "tapered") and rng.random() < 0.2
-    content: Content = ("none", "coffee", "latte", "tea")[int(rng.choice(4, p=(0.24, 0.34, 0.2, 0.22)))]
+    content: Content = ("none", "coffee", "latte", "tea")[int(rng.choice(4, p=(0.16, 0.38, 0.22, 0.24)))]
     names = [*PATTERNS]
     printed = rng.random() < (0.35 if enamel else 0.72)
     return Mug(
