@@ -130,7 +130,11 @@ def bed(parameters: Bed | None = None) -> Mesh:
     fabrics = [c.material(k, n) for k, (c, n) in enumerate(zip(cloths, ("board", "duvet", "linen", "blanket"), strict=True), 1)]
     frame = {"bars": _METALS[p.metal], "upholstered": fabrics[0], "channels": fabrics[0]}.get(p.head, timber.along)
     coats = _Coats(timber, frame, *fabrics)
-    return furnished([*_frame(p, coats), *_headboard(p, coats), *_footboard(p, coats), *_bedding(p, coats, rng)], images)
+    return furnished(
+        [*_frame(p, coats), *_headboard(p, coats), *_footboard(p, coats), *_bedding(p, coats, rng)],
+        images,
+        whole=("pillow", "cushion"),
+    )
 
 
 def _frame(p: Bed, coats: _Coats) -> list[Piece]:
@@ -155,7 +159,7 @@ def _frame(p: Bed, coats: _Coats) -> list[Piece]:
             block((-x, s * (y - 0.02) - 0.02, p.posts - 0.045), (x, s * (y - 0.02) + 0.02, p.posts - 0.005)) for s in (-1, 1)
         ]
         found.append(Piece("post", coats.frame if metal else coats.timber.upright, join(*post, *beams)))
-    legs = [leg(p.leg, a, low + 0.01, 0.07, (np.sign(a[0]) * 0.5, np.sign(a[1]) * 0.5)) for a in at]
+    legs = [leg(p.leg, a, low + 0.01, 0.035 if metal else 0.07, (np.sign(a[0]) * 0.5, np.sign(a[1]) * 0.5)) for a in at]
     return [*found, Piece("leg", coats.frame if metal else coats.timber.upright, join(*legs))]
 
 

@@ -119,7 +119,7 @@ def sofa(parameters: Sofa | None = None) -> Mesh:
     accents = p.accents[0].material(2, "accent"), p.accents[1].material(3, "accent_2")
     coats = _Coats(cover, p.wood.timber(1).upright, accents)
     pieces = [*_base(p, coats), *_seat(p, coats), *_back(p, coats), *_armrests(p, coats), *_legs(p, coats)]
-    return furnished([*pieces, *_loose(p, coats, rng)], images)
+    return furnished([*pieces, *_loose(p, coats, rng)], images, whole=("pillow",))
 
 
 def _side(p: Sofa) -> int:

@@ -50,13 +50,18 @@ class Timber:
     upright: Material
 
 
-def furnished(pieces: Sequence[Piece], images: Sequence[Image], crease_deg: float = 40.0) -> Mesh:
+def furnished(pieces: Sequence[Piece], images: Sequence[Image], crease_deg: float = 40.0, whole: Sequence[str] = ()) -> Mesh:
     """The pieces as one Mesh whose uv are metres, seen from the side that a triangle faces most: from above (x, -y), from the
-    front (x, -z), from the side (y, -z).
+    front (x, -z), from the side (y, -z). Parts named in `whole` are seen from one side, so that their pattern has no seam.
     """
     mesh = assemble(pieces, crease_deg)
     a, b, c = mesh.vertices.astype(np.float64)[mesh.triangles].transpose(1, 0, 2)
-    facing = np.abs(np.cross(b - a, c - a)).argmax(axis=1)
+    area = np.abs(np.cross(b - a, c - a))
+    facing = area.argmax(axis=1)
+    for part in whole:
+        if part in mesh.parts:
+            own = mesh.triangle_part == mesh.parts.index(part)
+            facing[own] = area[own].sum(axis=0).argmax()
     key, index = np.unique(mesh.triangles * 3 + facing[:, None], return_inverse=True)
     vertex, axis = np.divmod(key, 3)
     points = mesh.vertices[vertex]

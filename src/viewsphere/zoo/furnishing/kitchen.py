@@ -12,6 +12,7 @@ from viewsphere.zoo.shapes.assembly import Piece
 from viewsphere.zoo.shapes.paint import linear
 from viewsphere.zoo.shapes.rods import rod
 from viewsphere.zoo.shapes.solids import Solid, join, lathe, moved, rounded_box
+from viewsphere.zoo.townscape.surfaces import cuboid
 
 SINK = (0.46, 0.38, 0.16)
 """Width, depth (y) and depth (z) of a basin, metres."""
@@ -29,7 +30,7 @@ def worktop(
     (x0, y0, z0), (x1, y1, z1) = low, high
     a, b, c, d = basin - SINK[0] / 2, basin + SINK[0] / 2, -SINK[1] / 2, SINK[1] / 2
     parts = [((x0, y0), (a, y1)), ((b, y0), (x1, y1)), ((a, y0), (b, c)), ((a, d), (b, y1))]
-    return [Piece("worktop", coat, join(*(block((*p, z0), (*q, z1), 0.002) for p, q in parts)))]
+    return [Piece("worktop", coat, join(*(cuboid((*p, z0), (*q, z1)) for p, q in parts)))]
 
 
 def sink(x: float, top: float) -> list[Piece]:
