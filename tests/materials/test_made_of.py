@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from animated import let_walk
 from small import ROOT
 from viewsphere.assets.box_mapping import box_mapped
 from viewsphere.assets.looks import looks_of, words
@@ -18,6 +19,7 @@ from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.materials import metres, surface
+from viewsphere.materials.brick import Brick
 from viewsphere.model.scene import Ground
 from viewsphere.model.shot import Shot
 from viewsphere.model.substance import Substance
@@ -197,12 +199,15 @@ def test_mistakes_are_told_in_a_line(scene, told):
     assert "\n" not in str(caught.value)
 
 
-def test_sentences_say_what_a_model_is_made_of(chair):
+def test_sentences_say_what_a_model_is_made_of(chair, monkeypatch):
     looks = looks_of(replace(chair, materials=tuple(Material(m.name, roughness=0.9) for m in chair.materials)))
     assert words(looks)[1] == "matte"
     assert words(looks, (Repaint(texture=BRICK),))[1] == "brick"
     assert words(looks, (Repaint(texture=WOOD),))[1] == "wooden"
     assert words(looks, (Repaint(texture=Substance(name="grass", size=128)),))[0] == "green"
+    brick = Brick(colors=((0.3, 0.03, 0.02),) * 3, rows=16)  # whose joints come back every 8 texels
+    monkeypatch.setattr("viewsphere.materials.brick.draw", lambda rng: brick)
+    assert words(looks, (Repaint(texture=Substance(name="brick", seed=77, size=128)),)) == ("red", "brick")
 
 
 @pytest.mark.slow
@@ -235,3 +240,21 @@ def test_blenders_engines_show_the_materials_where_raster_does(request, engine):
     assert np.abs(by_raster.mean(axis=(0, 1)) - by_blender.mean(axis=(0, 1))).max() < 8
     floor = slice(90, 120)
     assert np.corrcoef(by_raster[floor].reshape(-1), by_blender[floor].reshape(-1))[0, 1] > 0.8
+
+
+def test_labels_of_a_deforming_model_do_not_change(monkeypatch, tmp_path):
+    """The box leans, and loses its lid half-way: what it is made of follows, flow and all else stay."""
+    let_walk(monkeypatch, tmp_path)
+    model = {"source": str(tmp_path / "walker.fbx"), "category": "walker", "motion": {"kind": "clip"}}
+    fields = {
+        "models": [model],
+        "viewpoints": {"azimuth": 30, "elevation": 20, "distance": 4},
+        "time": {"frames": 5, "fps": 2.4},
+        "channels": ["rgb", "instances", "depth", "normals", "flow", "scene_flow", "materials", "triangles"],
+    }
+    plain, made = (list(vs.render(recipe_of("on", own, **fields))) for own in ((), [{"texture": "wood"}]))
+    assert len(plain) == 5
+    for one, other in zip(plain, made, strict=True):
+        for name in fields["channels"][1:]:
+            assert one.channels[name].tobytes() == other.channels[name].tobytes(), name
+        assert not np.array_equal(one.rgb, other.rgb)

@@ -17,6 +17,9 @@ from viewsphere.model.substance import Substance
 KEPT = 8
 """Substances whose pictures are kept: 3 MB each of 512 texels a side, 13 MB of 1024."""
 
+STRIDE = 251
+"""Of the texels that are looked at for a colour: a prime, which no course of bricks keeps step with."""
+
 _LEVELS = 65535
 """Of light, for which sRGB values are looked up: the darkest byte has 20 of them."""
 
@@ -70,7 +73,7 @@ def color_of(substance: Substance) -> str | None:
 
 @lru_cache(maxsize=256)
 def _color(name: str, seed: int, size: int) -> str | None:
-    pixels = _pictures(name, seed, size)[0].pixels[::16, ::16, :3].reshape(-1, 3)
+    pixels = _pictures(name, seed, size)[0].pixels.reshape(-1, 4)[::STRIDE, :3]
     counts = np.bincount(nearest_names(linear(pixels / 255)), minlength=len(NAMES))
     return NAMES[int(counts.argmax())] if 2 * counts.max() > len(pixels) else None
 
