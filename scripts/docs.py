@@ -359,6 +359,7 @@ PAGES = {
     "proofs.md": proofs_page,
     "formats.md": partial(options_page, "formats", "formats.md"),
     "motion.md": partial(options_page, "motions", "motion.md"),
+    "layouts.md": partial(options_page, "placers", "layouts.md"),
     "recipe.md": recipe_page,
     "recipe.schema.json": lambda: (
         json.dumps(schema(channels=tuple(channels()), annotations=tuple(on_request())), indent=1) + "\n"

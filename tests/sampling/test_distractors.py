@@ -33,8 +33,8 @@ def recipe(*models, **changes):
 def test_distractors_are_drawn_and_not_labelled(tmp_path):
     generate(recipe(), tmp_path)
     dataset = vs.Dataset(tmp_path)
-    assert {o.category for sample in dataset for o in sample.objects} == {"post_box"}
-    assert [category.name for category in dataset.plan.categories] == ["post_box"]
+    assert {o.category for sample in dataset for o in sample.objects} == {"post box"}
+    assert [category.name for category in dataset.plan.categories] == ["post box"]
     assert all(len(sample.objects) == 2 for sample in dataset) and len(dataset) == 6
     assert not check(dataset).findings
     counts = set()
@@ -56,7 +56,7 @@ def test_the_labelled_stand_where_they_stand_whoever_else_is_drawn():
 def test_distractors_fall_with_the_others():
     models = [{**entry, "motion": {"kind": "fall"}} for entry in (OWN, OTHER)]
     scenes = {"count": 1, "layout": "fall", "distractors": 2}
-    fields = {"scenes": scenes, "time": {"frames": 3, "fps": 5}, "viewpoints": {"distance": 4}}
+    fields = {"scenes": scenes, "time": {"frames": 3, "fps": 5}, "viewpoints": {"distance": 4}, "shot_frames": 3}
     assert all(len(sample.objects) == 2 for sample in vs.render(recipe(*models, **fields)))
     planned = plan(recipe(*models, **fields))
     assert planned.max_objects == 2 and len(planned.distractors) == 2

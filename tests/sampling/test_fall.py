@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+import trimesh
 
 from resting import deepest, one_more_second, placed, solids, spec
 from small import small_recipe, tree_hash
@@ -15,7 +16,7 @@ from viewsphere.model.mistakes import read_options
 from viewsphere.model.scene import IDENTITY
 from viewsphere.run.generate import generate
 from viewsphere.sampling.physics import Board
-from viewsphere.sampling.placing import Room, footprint
+from viewsphere.sampling.placing import Room, Shape, footprint
 from viewsphere.sampling.plan import plan
 from viewsphere.sampling.seeds import generator
 from viewsphere.store import Simulated
@@ -148,6 +149,33 @@ def test_what_is_simulated_is_kept_and_the_first_counts(tmp_path):
     with pytest.raises(StoreError, match=r"made\.json: expected what was simulated, found .*: remove this file"):
         for name in ("scene-000000", "scene-000001"):
             keep(("scene", name), make)
+
+
+@pytest.mark.slow
+def test_things_fall_into_what_is_concave_where_parts_collide(tmp_path, monkeypatch):
+    """Into a trough that stands there: its hull would close it."""
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
+    whole = trimesh.util.concatenate(
+        [trimesh.creation.box((w, n, h), trimesh.transformations.translation_matrix(at)) for at, (w, n, h) in SIDES]
+    )
+    points, triangles = np.array(whole.vertices), np.array(whole.faces, np.int32)
+    trough = Shape(box_vertices(points.min(axis=0), points.max(axis=0)), lambda: points, lambda: (points, triangles))
+    small, found = solids(2, scale=0.5), []
+    for collide in ("hulls", "parts"):
+        poses = fallen(small, taken=((trough, IDENTITY),), given={"collide": collide, "spread": [0.3, 0.3]})
+        found.append(min(hull[:, 2].min() for hull in placed(small, poses)))
+    assert found[0] > 0.45 or abs(found[0]) < 0.002  # on it, or beside
+    assert 0.02 < found[1] < 0.1  # in it
+    assert len(list((tmp_path / "parts").glob("*.json"))) == 1
+
+
+SIDES = [
+    ((0, 0, 0.025), (0.9, 0.9, 0.05)),
+    ((0.425, 0, 0.25), (0.05, 0.9, 0.5)),
+    ((-0.425, 0, 0.25), (0.05, 0.9, 0.5)),
+    ((0, 0.425, 0.25), (0.9, 0.05, 0.5)),
+    ((0, -0.425, 0.25), (0.9, 0.05, 0.5)),
+]
 
 
 def falling(**changes):

@@ -115,7 +115,7 @@ class Drop:
         places = [self._spheres(i) for i in range(len(self.cast))]
         starts = self._starts(number, range(len(self.cast)), places, [])
         fences = tuple(_fences(self.ground.within, FENCE * max(s.length for s in self.shapes))) if self.ground.within else ()
-        fixed = [(body_of([shape.hull], 1.0), pose) for shape, pose in self.room.taken]
+        fixed = [(body_of(self._parts(shape), 1.0), pose) for shape, pose in self.room.taken]
         world = World(self._bodies, starts, (*self.ground.boards, *fences), self.typical, -self.room.below, fixed)
         if moment == "mid":
             return self._flying(world, number), None
@@ -162,8 +162,10 @@ class Drop:
     def _body(self, slot: int) -> Body:
         spec, shape = self.cast[slot], self.shapes[slot]
         own = drawn(self.options, draws_of(self.rng, str(slot), spec.key))
-        parts = [shape.hull] if own.collide == "hulls" else convex_parts(shape)
-        return body_of(parts, own.density, own.mass, Touch(own.friction, own.restitution))
+        return body_of(self._parts(shape), own.density, own.mass, Touch(own.friction, own.restitution))
+
+    def _parts(self, shape: Shape) -> list[Float]:
+        return [shape.hull] if self.options.collide == "hulls" else convex_parts(shape)
 
     def _spheres(self, slot: int) -> tuple[Float, float]:
         """Middle (3,) and radius of a ball around a thing, its own axes."""
