@@ -103,6 +103,34 @@ def test_small_things_stand_on_what_carries_them(seed: int) -> None:
             assert abs(a.z - b.z) > 0.2 or not overlap(a.rectangle, b.rectangle)
 
 
+@pytest.mark.parametrize("name", ["room", "flat", "table_top"])
+def test_surfaces_are_level_faces_of_furniture(name: str) -> None:
+    pytest.importorskip("embreex")
+    from trimesh import Trimesh
+    from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+    made = place(name, 1)
+    found = {surface.name: surface for surface in made.surfaces}
+    assert len(found) == len(made.surfaces) > 0 and {"table", "shelf", "cabinet"} & found.keys()
+    big = [p for p in made.pieces[1:] if hasattr(plugins.family(p.family), "surfaces")]
+    casters = [
+        (at(p), RayMeshIntersector(Trimesh(m.vertices, m.triangles, process=False)))
+        for p in big
+        for m in [drawn(p.family, p.seed)]
+    ]
+    for surface in made.surfaces:
+        world = np.array(surface.world_from_surface)
+        (w, d), above = surface.size, 0.05 if surface.clearance is None else min(0.05, surface.clearance / 2)
+        u, v = np.meshgrid(np.linspace(-0.45, 0.45, 5) * w, np.linspace(-0.45, 0.45, 5) * d)
+        points = np.stack([u.ravel(), v.ravel(), np.full(25, above)], axis=1) @ world[:3, :3].T + world[:3, 3]
+        heights = np.full(25, -np.inf)
+        for pose, caster in casters:
+            own = (points - pose[:3, 3]) @ pose[:3, :3]
+            hits, rays, _ = caster.intersects_location(own, np.tile((0.0, 0.0, -1.0), (25, 1)), multiple_hits=False)
+            heights[rays] = np.maximum(heights[rays], hits[:, 2] + pose[2, 3])
+        assert np.abs(heights - world[2, 3]).max() < 0.035, surface.name
+
+
 def test_every_kind_of_room_has_what_makes_it_one() -> None:
     found: dict[str, list[set[str]]] = {}
     for seed in range(40):

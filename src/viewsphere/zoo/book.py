@@ -46,6 +46,17 @@ class Book:
     ribbon: bool = False
     seed: int = 0
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        match self.pose:
+            case "standing":
+                return self.thickness + 0.01, self.width + 0.01, self.height + 0.01
+            case "lying":
+                return self.width + 0.02, self.height + 0.07, self.thickness + 0.01
+            case "open":
+                return 2.2 * self.width, self.height + 0.03, self.thickness
+
 
 def book(parameters: Book | None = None) -> Mesh:
     """The book in metres. Lying: cover up, its text read from the front (-Y), spine at -X; standing: spine towards -Y.

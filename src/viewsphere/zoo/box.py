@@ -60,6 +60,12 @@ class Box:
     holes: bool = False
     seed: int = 0
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        flaps = (0.9 * self.width, 1.1 * self.depth, 0.2) if self.style == "open" else (0.03, 0.03, 0.02)
+        return self.width + flaps[0], self.depth + flaps[1], self.height + flaps[2]
+
 
 def box(parameters: Box | None = None) -> Mesh:
     """The box in metres, on z = 0, hollow. Parts: walls, inside, and flap_*, tape, lid and label where it has them."""

@@ -70,6 +70,11 @@ class Laptop:
     show: str = "desktop"
     seed: int = 0
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        return self.width + 0.02, 2.0 * self.depth * (0.7 if self.angle < 118 else 0.82), self.depth + 0.03
+
 
 def laptop(parameters: Laptop | None = None) -> Mesh:
     """The laptop in metres: its user sits at -Y.

@@ -60,6 +60,11 @@ class Monitor:
     show: str = "desktop"
     seed: int = 0
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        return self.width + 0.01, 0.31, self.height + self.lift + 0.07
+
 
 def monitor(parameters: Monitor | None = None) -> Mesh:
     """The monitor in metres: its screen faces -Y. Parts: housing, bezel, screen, lamp, vents, mount, neck, foot, cable."""

@@ -40,6 +40,13 @@ POTS: dict[Pot, tuple[tuple[float, float], ...]] = {
 """Radii over the height, shares of the largest and of the whole."""
 
 
+SPREAD = {
+    **{"ficus": 1.05, "rubber": 0.8, "snake": 0.6, "fern": 2.25, "rosette": 2.55},
+    **{"aloe": 1.4, "cactus": 0.85, "hearts": 2.05, "palm": 1.3},
+}
+"""How wide each habit grows, times its reach, at most."""
+
+
 @dataclass(frozen=True)
 class Plant:
     """Parameters of a potted plant; metres, colours sRGB 0..1.
@@ -60,6 +67,12 @@ class Plant:
     matte: bool = True
     saucer: bool = True
     seed: int = 0
+
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        wide = 1.05 * max(SPREAD[self.habit] * self.reach, 2.3 * self.radius)
+        return wide, wide, self.height + 1.1 * self.reach
 
 
 def plant(parameters: Plant | None = None) -> Mesh:

@@ -52,6 +52,11 @@ class Rug:
     colors: Colors = ((0.52, 0.1, 0.1), (0.1, 0.14, 0.3), (0.85, 0.74, 0.55), (0.72, 0.45, 0.22))
     seed: int = 0
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        return self.width + 0.3, self.depth + 0.03, self.thickness + self.waves + 0.02
+
 
 def rug(parameters: Rug | None = None) -> Mesh:
     """The rug in metres, lying on z = 0, centred, its fringes at -X and +X. Parts: pile; binding, fringe where there are."""

@@ -77,6 +77,12 @@ class Television:
         low = self.stand + self.lift + 1.4 * self.bezel
         return -half, low, half, low + 2 * half * 9 / 16
 
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Width, depth and height of all of it, metres, at most."""
+        wide, deep = self.console if self.style == "console" else (self.width, 0.54 if self.style == "tube" else 0.3)
+        return wide + 0.04, deep + 0.04, self.stand + 0.6 * self.width + self.lift + 0.2
+
 
 def television(parameters: Television | None = None) -> Mesh:
     """The television in metres: its screen faces -Y, standing on z = 0, centred in x.

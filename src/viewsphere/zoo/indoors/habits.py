@@ -64,9 +64,11 @@ def _living_room(f: Furnishing) -> None:
         low = f.before(sofa, "table", _style("coffee"), gap=0.38, turn=0.0)
         if low is not None:
             f.scattered(low, "top", ("mug", "book", "bowl", "plate", "bottle"), int(f.rng.integers(1, 5)))
-        board = f.against("cabinet", _style("sideboard", height=0.85), [across(sofa.turn_deg)], middle=True)
-        if board is not None:
-            f.on(board, "top", "television", _style(width=1.1 * board.size[0]))
+        facing = [across(sofa.turn_deg)]
+        if f.rng.random() < 0.5 or f.against("television", _style("console"), facing, middle=True) is None:
+            board = f.against("cabinet", _style("sideboard", height=0.85), facing, middle=True)
+            if board is not None:
+                f.on(board, "top", "television", _style("feet", "foot", width=1.1 * board.size[0]))
         if f.beside(sofa, 1, "lamp", _style("column", "tripod")) is None:
             f.beside(sofa, -1, "lamp", _style("column", "tripod"))
         f.before(sofa, "chair", _seat("Armchair"), gap=0.45, right=sofa.size[0] / 2 + 0.5, turn=110.0)

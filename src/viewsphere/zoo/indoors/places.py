@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from viewsphere.errors import UserError
 from viewsphere.zoo.indoors.furnishing import Rectangle, Stand
 from viewsphere.zoo.indoors.habits import furnished
 from viewsphere.zoo.interior import Interior
-from viewsphere.zoo.places import Place, PlacePiece, standing
+from viewsphere.zoo.places import Place, PlacePiece, Surface, standing
 
 TRIES = 60
 """Interiors that are furnished until one leaves enough of its floor free."""
@@ -51,4 +52,22 @@ def laid_out(seed: int, stands: Sequence[Stand], free: Rectangle, z: float = 0.0
         count[s.family] += 1
         pose = standing(s.x - x, s.y - y, s.turn_deg, s.z - z)
         pieces.append(PlacePiece(f"{s.family}_{count[s.family]}", s.family, s.seed, s.family.replace("_", " "), pose))
-    return Place(tuple(pieces), free=(free[0] - x, free[1] - y, free[2] - x, free[3] - y))
+    surfaces = tuple(_surfaces(stands, (x, y, z)))
+    return Place(tuple(pieces), free=(free[0] - x, free[1] - y, free[2] - x, free[3] - y), surfaces=surfaces)
+
+
+def _surfaces(stands: Sequence[Stand], origin: tuple[float, float, float]) -> Iterator[Surface]:
+    """The level faces of furniture where things may stand, in the axes of this origin: the first face of the first table is
+    `table`, its others are `table_shelf`, ..., those of the second table `table_2`, `table_2_shelf`.
+    """
+    count: Counter[str] = Counter()
+    for stand in (s for s in stands if s.z == 0):
+        for number, face in enumerate(stand.surfaces()):
+            if number == 0:
+                count[stand.family] += 1
+            own = stand.family if count[stand.family] == 1 else f"{stand.family}_{count[stand.family]}"
+            x0, y0, x1, y1 = face.rectangle
+            x, y = stand.at((x0 + x1) / 2, -(y0 + y1) / 2)
+            pose = standing(x - origin[0], y - origin[1], stand.turn_deg, face.height - origin[2])
+            clear = None if math.isinf(face.clearance) else face.clearance
+            yield Surface(own if number == 0 else f"{own}_{face.name}", pose, (x1 - x0, y1 - y0), clear)
