@@ -13,6 +13,7 @@ from viewsphere.assets.symmetries import find
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.zoo.bottle import FORMS, Bottle, bottle
 from viewsphere.zoo.bottle import draw as draw_bottle
+from viewsphere.zoo.bowl import SHAPES as BOWLS
 from viewsphere.zoo.bowl import Bowl, bowl
 from viewsphere.zoo.can import Can, can
 from viewsphere.zoo.household.canvas import blank
@@ -20,7 +21,7 @@ from viewsphere.zoo.household.patterns import PATTERNS
 from viewsphere.zoo.household.prints import GROUNDS, PICTURES, wrapper
 from viewsphere.zoo.mug import SHAPES, Mug, mug
 from viewsphere.zoo.plate import Plate, plate
-from zoo_mesh import assert_family, part_vertices
+from zoo_mesh import assert_family, assert_sound, part_vertices
 
 SIZES = {
     "mug": ((0.09, 0.15), (0.075, 0.17), (0.07, 0.16)),
@@ -83,6 +84,19 @@ def test_what_is_asked_for_is_there() -> None:
     assert not {"cap", "label"} & set(bottle(Bottle(closure="none", label=None)).parts)
     for name in ("foil", "cork", "crown", "screw", "flip", "lid"):
         assert part_vertices(bottle(Bottle(closure=name)), "cap")[:, 2].max() > 0.3
+
+
+@pytest.mark.parametrize("shape", BOWLS)
+def test_what_is_in_a_bowl_does_not_come_through_its_wall(shape: str) -> None:
+    for content in ("soup", "rings", "fruit", "salad"):
+        p = Bowl(shape=shape, radius=0.09, height=0.075, content=content)
+        mesh = bowl(p)
+        food, wall = part_vertices(mesh, "content"), part_vertices(mesh, "body")
+        below = food[food[:, 2] < p.height]
+        outline = wall[np.argsort(wall[:, 2])]
+        outside = np.interp(below[:, 2], outline[:, 2], np.hypot(*outline[:, :2].T))
+        assert (np.hypot(*below[:, :2].T) < outside).all() and below[:, 2].min() > 0.003
+        assert_sound(mesh, 6_000, 200)
 
 
 @pytest.mark.parametrize("form", FORMS)

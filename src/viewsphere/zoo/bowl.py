@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -75,7 +75,8 @@ def bowl(parameters: Bowl | None = None) -> Mesh:
     rng = np.random.default_rng(p.seed)
     if p.content != "none":
         level = (0.6 if p.content in ("fruit", "salad") else 0.72) * p.height
-        pieces += food.FILLINGS[p.content](rng, shell.radius_inside(level), level)
+        filling = food.FILLINGS[p.content](rng, shell.radius_inside(level), level)
+        pieces += [replace(q, solid=shell.holding(q.solid, wall / 2)) for q in filling]
     return charts.charted(assemble(pieces, crease_deg=50), pictures, images)
 
 

@@ -23,9 +23,14 @@ class Vessel:
         """The inside's radius at this height, metres."""
         return float(np.interp(height, self.inside[::-1, 1], self.inside[::-1, 0]))
 
-    def whole(self) -> Float:
-        """All profiles as one, from the middle of the foot to the middle of the floor."""
-        return np.concatenate([self.foot, self.wall[1:], self.lip[1:], self.inside[1:]])
+    def holding(self, solid: Solid, slack: float) -> Solid:
+        """What lies in the vessel, pressed against the inside where it would stick out by more than `slack`, metres."""
+        x, y, z = solid.vertices.T
+        z = np.maximum(z, self.inside[-1, 1] - slack)
+        room = np.interp(z, self.inside[::-1, 1], self.inside[::-1, 0]) + slack
+        room = np.where(z > self.inside[0, 1], np.inf, room)
+        share = np.minimum(room / np.maximum(np.hypot(x, y), 1e-9), 1)
+        return Solid(np.stack([x * share, y * share, z], axis=1), solid.triangles)
 
 
 def vessel(outer: ArrayLike, wall: float, floor: float, foot: float = 0.0) -> Vessel:
