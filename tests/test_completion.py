@@ -50,7 +50,7 @@ def offered(*words, cwd=None):
     [
         (("rend",), ["render"]),
         (("inspect", "z"), ZOO),
-        (("inspect", "zoo", ":", "ca"), ["car"]),
+        (("inspect", "zoo", ":", "bic"), ["bicycle"]),
         (("inspect", "zoo", ":"), [name.removeprefix("zoo:") for name in ZOO]),
         (("inspect", "a.obj", "--up", "+"), ["+x", "+y", "+z"]),
         (("render", "a.yaml", "-f", ""), [*plugins.names("formats")]),
