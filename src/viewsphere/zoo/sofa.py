@@ -157,8 +157,8 @@ def _back(p: Sofa, coats: _Coats) -> list[Piece]:
     frame_top = p.height - (0.09 if p.back == "cushions" else 0.0)
     low = p.foot + 0.01
     if p.arms == "rolled":
-        roll = _rolled(0.15, low, frame_top, 2 * x - 0.05)
-        found = [Piece("back", coats.cover, moved(turned(roll, 2, np.pi / 2), (0, y - 0.15, 0)))]
+        roll = turned(_rolled(0.12, low, frame_top, 2 * x - 0.05), 2, -np.pi / 2)
+        found = [Piece("back", coats.cover, moved(roll, (0, y - 0.1, 0)))]
     else:
         found = [Piece("back", coats.cover, padded((-x, p.back_front, low), (x, y, frame_top), 0.05))]
     tall = p.height - p.seat_height + 0.01

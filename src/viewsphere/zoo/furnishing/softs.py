@@ -30,7 +30,7 @@ def upright(solid: Solid, at: ArrayLike, lean_deg: float) -> Solid:
     return moved(turned(solid, 0, np.pi / 2 - np.radians(lean_deg)), at)
 
 
-def pillow(width: float, height: float, thickness: float, pinch: float = 0.07, count: int = 12) -> Solid:
+def pillow(width: float, height: float, thickness: float, pinch: float = 0.07, count: int = 10) -> Solid:
     """A stuffed pillow about the origin: pointed corners, sides drawn in by `pinch` of its width, thickness along z."""
     s = np.sin(np.linspace(-np.pi / 2, np.pi / 2, count))
     u, v = np.meshgrid(s, s, indexing="ij")
