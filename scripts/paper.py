@@ -432,16 +432,16 @@ def chairs() -> None:
 # The gallery
 
 
-def family(name: str, azimuth: float = 35, fill: float = 0.85) -> None:
+def family(name: str, azimuth: float = 35, fill: float = 0.85, width: int = WIDTH, elevation: float = 15) -> None:
     """Twenty draws of a family."""
     made_of = Recipe(
         name=name,
         models=[{"source": f"zoo:{name}", "count": 20}],
-        viewpoints={"azimuth": azimuth, "elevation": 15, "distance": {"fill": fill}},
+        viewpoints={"azimuth": azimuth, "elevation": elevation, "distance": {"fill": fill}},
         camera={"size": [320, 240], "fov_deg": 30},
         scene={"ground": "on"},
     )
-    save(f"zoo_{name}.jpg", grid([s.rgb for s in render(made_of)], 5))
+    save(f"zoo_{name}.jpg", grid([s.rgb for s in render(made_of)], 5, width))
 
 
 def neighbourhood() -> None:
@@ -470,6 +470,15 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_chair": partial(family, "chair"),
     "zoo_boat": partial(family, "boat", fill=0.65),
     "zoo_hair_drier": partial(family, "hair_drier", 50),
+    "zoo_bus": partial(family, "bus", 40, width=960),
+    "zoo_truck": partial(family, "truck", 320, width=940),
+    "zoo_motorcycle": partial(family, "motorcycle", 60, width=860),
+    "zoo_traffic_light": partial(family, "traffic_light", 25, width=900),
+    "zoo_traffic_cone": partial(family, "traffic_cone", 30, width=800, elevation=25),
+    "zoo_bollard": partial(family, "bollard", 30, width=800, elevation=25),
+    "zoo_backpack": partial(family, "backpack", 310, width=900, elevation=20),
+    "zoo_shop": partial(family, "shop", 30, width=1000),
+    "zoo_fountain": partial(family, "fountain", 20, width=900, elevation=22),
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 
