@@ -504,6 +504,15 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_hair_drier": partial(family, "hair_drier", 50),
     **{f"zoo_{name}": partial(family, name, width=1200, quality=68) for name in FURNITURE},
     **{f"zoo_{name}": partial(family, name, elevation=25, width=940) for name in HOUSEHOLD},
+    "zoo_bus": partial(family, "bus", 40, width=960),
+    "zoo_truck": partial(family, "truck", 320, width=940),
+    "zoo_motorcycle": partial(family, "motorcycle", 60, width=860),
+    "zoo_traffic_light": partial(family, "traffic_light", 25, width=900),
+    "zoo_traffic_cone": partial(family, "traffic_cone", 30, width=800, elevation=25),
+    "zoo_bollard": partial(family, "bollard", 30, width=800, elevation=25),
+    "zoo_backpack": partial(family, "backpack", 310, width=900, elevation=20),
+    "zoo_shop": partial(family, "shop", 30, width=1000),
+    "zoo_fountain": partial(family, "fountain", 20, width=900, elevation=22),
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 

@@ -125,7 +125,7 @@ def test_bash_itself(tmp_path):
     [("zsh", r'''"zoo\\:boat"'''), ("fish", "zoo:boat"), ("powershell", "zoo:boat::: ")],
 )
 def test_other_shells(shell, answer):
-    words = {"_TYPER_COMPLETE_ARGS": "viewsphere inspect zoo:bo", "_TYPER_COMPLETE_WORD_TO_COMPLETE": "zoo:bo"}
+    words = {"_TYPER_COMPLETE_ARGS": "viewsphere inspect zoo:boa", "_TYPER_COMPLETE_WORD_TO_COMPLETE": "zoo:boa"}
     run = viewsphere(_VIEWSPHERE_COMPLETE=f"complete_{shell}", _TYPER_COMPLETE_FISH_ACTION="get-args", **words)
     assert answer in run.stdout
     source = viewsphere(_VIEWSPHERE_COMPLETE=f"source_{shell}").stdout

@@ -58,6 +58,11 @@ STUFF_OF: dict[str, dict[str, str]] = {
     "bench": {"": "street furniture"},
     "post_box": {"": "street furniture"},
     "wheelie_bin": {"": "street furniture"},
+    "shop": {"": "building"},
+    "traffic_light": {"": "traffic sign", "base": "pole", "post": "pole"},
+    "traffic_cone": {"": "street furniture"},
+    "bollard": {"": "street furniture"},
+    "fountain": {"": "street furniture"},
 }
 """Stuff that the pieces of the zoo's places are, by their categories and names of parts; empty: all other parts."""
 
