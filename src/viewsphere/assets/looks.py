@@ -253,7 +253,7 @@ def words(looks: Looks, repaints: Sequence[Repaint] = ()) -> tuple[str | None, s
         materials[made] = materials.get(made, 0.0) + patch.share
         if kind != "glass":
             color = None if own is not None and own.image is not None else NAMES[name]
-            color = color_of(substance) if substance else color
+            color = color_of(substance, own and own.tint) if substance else color
             colors[color] = colors.get(color, 0.0) + patch.share
     said = (None, None) if any(found) else (looks.color, looks.material)
     return said[0] or _most(colors), said[1] or _most(materials)
