@@ -28,6 +28,11 @@ Pictures = tuple[Image, Image, Image]
 """Colour; roughness in green and metallic in blue; normals, green up."""
 
 
+def is_replaceable(material: Material) -> bool:
+    """Whether a material can be replaced by a substance: glass and what has holes stay what they are."""
+    return material.alpha_mode == "OPAQUE" and not material.transmission
+
+
 def made_of(material: Material, substance: Substance, first: int) -> Material:
     """An opaque material made of a substance, whose pictures are the images from `first` on and repeat once a unit of uv."""
     color, rough, bumps = (Texture(first + i) for i in range(3))
