@@ -205,6 +205,9 @@ def test_sentences_say_what_a_model_is_made_of(chair, monkeypatch):
     assert words(looks, (Repaint(texture=BRICK),))[1] == "brick"
     assert words(looks, (Repaint(texture=WOOD),))[1] == "wooden"
     assert words(looks, (Repaint(texture=Substance(name="grass", size=128)),))[0] == "green"
+    assert words(looks, (Repaint(texture=Substance(name="plaster", size=128), tint=(0.0, 0.0, 0.9)),)) == ("blue", "plaster")
+    leaves = looks_of(replace(chair, materials=tuple(Material(m.name, alpha_mode="MASK") for m in chair.materials)))
+    assert words(leaves, (Repaint(texture=WOOD),))[1] != "wooden"  # they stay what they are
     brick = Brick(colors=((0.3, 0.03, 0.02),) * 3, rows=16)  # whose joints come back every 8 texels
     monkeypatch.setattr("viewsphere.materials.brick.draw", lambda rng: brick)
     assert words(looks, (Repaint(texture=Substance(name="brick", seed=77, size=128)),)) == ("red", "brick")

@@ -5,6 +5,7 @@ import pytest
 from viewsphere import Recipe
 from viewsphere.model.brief import Brief
 from viewsphere.model.instant import Viewpoint
+from viewsphere.model.looks import Patch
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Sensor
 from viewsphere.model.scene import Ground
@@ -16,7 +17,7 @@ from viewsphere.recipe.surface import GroundEntry, MaterialEntry
 from viewsphere.recipe.viewpoints import PoseList
 
 CLASSES = [
-    *(Viewpoint, ModelSpec, Sensor, Repaint, Ground, Distribution, Gaussian),
+    *(Viewpoint, ModelSpec, Sensor, Repaint, Ground, Patch, Distribution, Gaussian),
     *(ModelEntry, PlaceEntry, CompanyEntry, GroundEntry, MaterialEntry, PoseList),
 ]
 

@@ -13,7 +13,7 @@ from viewsphere.assets.color_names import NAMES, nearest_names
 from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.assets.primitive import face_normals
 from viewsphere.assets.srgb import linear
-from viewsphere.assets.substance import color_of
+from viewsphere.assets.substance import color_of, is_replaceable
 from viewsphere.materials import word
 from viewsphere.model.looks import Looks, Patch
 from viewsphere.model.thing import Repaint
@@ -166,6 +166,7 @@ def _patches(m: Material, spots: _Spots, weights: Float) -> Iterator[Patch]:
                     roughness=roughness,
                     clear=clear,
                     coated=coated,
+                    stays=None if is_replaceable(m) else True,
                 )
 
 
@@ -241,19 +242,19 @@ def words(looks: Looks, repaints: Sequence[Repaint] = ()) -> tuple[str | None, s
 
     What somebody said of the model counts first, but where it is repainted. A patch that is given a picture has no colour that
     is known; nor have glass and what else lets half of the light through, whose surface does not count for the colour. One that
-    is made of a substance, which only what lets no light through is, has that one's word and most frequent colour.
+    is made of a substance, as only what is opaque can be, has that one's word and most frequent colour.
     """
     colors, materials = dict[str | None, float](), dict[str | None, float]()
     found = [next((r for r in reversed(repaints) if fnmatchcase(p.material, r.material)), None) for p in looks.patches]
     now = [patch if own is None else _repainted(patch, own) for patch, own in zip(looks.patches, found, strict=True)]
     names = nearest_names([patch.color for patch in now]).tolist() if now else ()
     for patch, own, kind, name in zip(now, found, _materials_of(now), names, strict=True):
-        substance = None if own is None or patch.clear else own.texture
+        substance = None if own is None or patch.stays else own.texture
         made = word(substance.name) if substance else kind
         materials[made] = materials.get(made, 0.0) + patch.share
         if kind != "glass":
             color = None if own is not None and own.image is not None else NAMES[name]
-            color = color_of(substance) if substance else color
+            color = color_of(substance, own and own.tint) if substance else color
             colors[color] = colors.get(color, 0.0) + patch.share
     said = (None, None) if any(found) else (looks.color, looks.material)
     return said[0] or _most(colors), said[1] or _most(materials)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.box_mapping import box_mapped
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.opaque import Stamp, opaque_picture, stamp_of
-from viewsphere.assets.substance import made_of, pictures_of, scaled
+from viewsphere.assets.substance import is_replaceable, made_of, pictures_of, scaled
 from viewsphere.materials import is_grained, metres
 from viewsphere.model.thing import Repaint
 
@@ -69,7 +69,7 @@ def _found(material: Material, repaints: Sequence[Repaint]) -> Repaint:
     found = next((r for r in reversed(repaints) if fnmatchcase(material.name, r.material)), None)
     if found is None or material.alpha_mode != "OPAQUE":
         return Repaint()
-    return found.model_copy(update={"texture": None}) if material.transmission else found
+    return found if is_replaceable(material) else found.model_copy(update={"texture": None})
 
 
 def repaint_stamps(repaints: Iterable[Repaint]) -> tuple[Stamp, ...]:

@@ -12,6 +12,7 @@ from viewsphere import materials
 from viewsphere.assets.color_names import NAMES, nearest_names
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import encoded, linear
+from viewsphere.model.scene import WHITE, Color
 from viewsphere.model.substance import Substance
 
 KEPT = 8
@@ -25,6 +26,11 @@ _LEVELS = 65535
 
 Pictures = tuple[Image, Image, Image]
 """Colour; roughness in green and metallic in blue; normals, green up."""
+
+
+def is_replaceable(material: Material) -> bool:
+    """Whether a material can be replaced by a substance: glass and what has holes stay what they are."""
+    return material.alpha_mode == "OPAQUE" and not material.transmission
 
 
 def made_of(material: Material, substance: Substance, first: int) -> Material:
@@ -66,15 +72,15 @@ def _pictures(name: str, seed: int, size: int) -> Pictures:
     )
 
 
-def color_of(substance: Substance) -> str | None:
-    """The basic colour that most of a substance has, None where none has."""
-    return _color(substance.name, substance.seed, substance.size)
+def color_of(substance: Substance, tint: Color | None) -> str | None:
+    """The basic colour that most of a substance has, in light of this tint; None where none has."""
+    return _color(substance.name, substance.seed, substance.size, tint or WHITE)
 
 
 @lru_cache(maxsize=256)
-def _color(name: str, seed: int, size: int) -> str | None:
+def _color(name: str, seed: int, size: int, tint: Color) -> str | None:
     pixels = _pictures(name, seed, size)[0].pixels.reshape(-1, 4)[::STRIDE, :3]
-    counts = np.bincount(nearest_names(linear(pixels / 255)), minlength=len(NAMES))
+    counts = np.bincount(nearest_names(linear(pixels / 255) * tint), minlength=len(NAMES))
     return NAMES[int(counts.argmax())] if 2 * counts.max() > len(pixels) else None
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
+from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Amount, Portion
@@ -23,11 +24,13 @@ def _word(text: str) -> str:
 Word = Annotated[str, Field(min_length=1, max_length=LONGEST), AfterValidator(_word)]
 
 
-class Patch(Frozen):
+class Patch(Brief):
     """What of one material has one basic colour and one word for its material: its share of what is seen of the model; means
-    over it, the colour (linear [r, g, b]), metallic, roughness, and the share of light that is let through; and whether a clear
-    coat makes it glossy.
+    over it, the colour (linear [r, g, b]), metallic, roughness, and the share of light that is let through; whether a clear
+    coat makes it glossy; and whether it stays what it is where models are made of another material, as it is not opaque.
     """
+
+    UNSAID = ("stays",)
 
     material: str
     share: Portion
@@ -36,6 +39,7 @@ class Patch(Frozen):
     roughness: Portion
     clear: Portion
     coated: bool = False
+    stays: Literal[True] | None = None
 
 
 class Looks(Frozen):
