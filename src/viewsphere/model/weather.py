@@ -11,6 +11,7 @@ from viewsphere.model.numbers import Length, Portion
 
 Amount = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 Light = tuple[Amount, Amount, Amount]
+Exposed = Annotated[float, Field(strict=True, gt=0, le=1)]
 Speed = Annotated[float, Field(strict=True, ge=-60, le=60)]
 
 CONTRAST = 3.912
@@ -44,15 +45,15 @@ class Falling(Frozen):
 
     rate: Annotated[float, Field(strict=True, gt=0, le=200)] = Field(default=10.0, description="millimetres of water an hour")
     wind: tuple[Speed, Speed] = Field(default=(0.0, 0.0), description="[x, y] in metres a second, by which it is carried")
-    exposure: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        default=0.01, description="seconds for which a picture is exposed to it, where time has no shutter: longer streaks"
-    )
+    exposure: Exposed = Field(default=0.01, description="seconds for which a picture is exposed to it: longer streaks")
     color: Light = Field(default=(0.8, 0.8, 0.8), description="radiance of what falls: linear [r, g, b]; by default the sky's")
     seed: int = Field(default=0, ge=0, description="of where each drop or flake is")
 
 
 class Rain(Falling):
     """Drops by Marshall and Palmer 1948, as fast as Garg and Nayar 2007 have them."""
+
+    exposure: Exposed = Field(default=0.004, description="seconds for which a picture is exposed to it: longer streaks")
 
 
 class Snow(Falling):
