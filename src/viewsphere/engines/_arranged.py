@@ -11,6 +11,7 @@ from viewsphere.assets.deforming import Load, sharing
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.repaint import textured
 from viewsphere.assets.wetting import wetted
+from viewsphere.engines._lamps import lit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
@@ -112,6 +113,8 @@ class Arrangements:
         ring = Ring(shot.scene.ground is not None, shot.label_alpha)
         soaked = 0.0 if shot.scene.wet is None else shot.scene.wet.amount
         meshes = _dressed(shot.things, placed_meshes(shot.things, load), soaked)
+        if shot.scene.lamps is not None:
+            meshes = lit(shot.things, meshes, shot.scene.lamps)
         return cls(shot, Shown(load, soaked), meshes, None, ring).of(shot)
 
     def of(self, shot: Shot) -> Arrangements:

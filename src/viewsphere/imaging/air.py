@@ -69,4 +69,5 @@ class Air:
     def behind(self, sky: Float32, alpha: Float32) -> Float32:
         """The light (N, 3) that the sky's (N, 3) becomes, where `alpha` (N,) of it is hidden already."""
         through = np.exp(-self.depth(np.zeros(len(sky), np.float32)))
-        return sky * through[:, None] + ((1 - alpha) * (1 - through))[:, None] * np.array(self.fog.color, np.float32)
+        glow = ((1 - alpha) * (1 - through))[:, None] * np.array(self.fog.color, np.float32)
+        return np.add(sky * through[:, None], glow, dtype=np.float32)

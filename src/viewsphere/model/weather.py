@@ -1,4 +1,6 @@
-"""The concrete weather of a scene: what lies in the air between things and the camera, what falls, and what water lies."""
+"""The concrete weather of a scene: what lies in the air between things and the camera, what falls, what water lies, and whether
+lamps are lit.
+"""
 
 from __future__ import annotations
 
@@ -66,3 +68,14 @@ class Wet(Frozen):
     amount: Portion = Field(default=1.0, description="0 dry, 1 soaked: darker, and a film that mirrors")
     puddles: Portion = Field(default=0.3, description="share of level ground under water")
     seed: int = Field(default=0, ge=0, description="of where puddles are")
+
+
+class Lamps(Frozen):
+    """Lamps of a place that are lit: its pieces' parts named lens."""
+
+    strength: Amount = Field(default=90.0, description="irradiance at one metre below each")
+    color: Light = Field(default=(1.0, 0.74, 0.46), description="linear [r, g, b]")
+    most: Annotated[int, Field(strict=True, ge=0, le=32)] = Field(
+        default=8, description="how many are lights, those nearest to the middle of the place; the others only glow"
+    )
+    windows: Portion = Field(default=0.35, description="share of windows that are lit from inside")

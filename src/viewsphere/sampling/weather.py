@@ -11,11 +11,12 @@ from viewsphere.assets.srgb import encoded, linear
 from viewsphere.assets.wetting import darkened
 from viewsphere.imaging.precipitation import extinction
 from viewsphere.model.scene import HemisphereLight, Scene
-from viewsphere.model.weather import CONTRAST, Fog, Rain, Snow, Wet
+from viewsphere.model.weather import CONTRAST, Fog, Lamps, Rain, Snow, Wet
 from viewsphere.recipe.draws import RngOf, drawn
 from viewsphere.recipe.entries import concrete
+from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.scene import SceneEntry
-from viewsphere.recipe.weather import FogEntry, RainEntry, SnowEntry, WetEntry
+from viewsphere.recipe.weather import FogEntry, LampsEntry, RainEntry, SnowEntry, WetEntry
 from viewsphere.surroundings.weather import clouded, floor_light, in_fog
 
 SOAKING = 25.0
@@ -26,6 +27,7 @@ SeedOf = Callable[[str], int]
 
 def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -> Scene:
     """The scene with the weather of its entry, drawn. `seed_of`: a number for a purpose, on which nothing else depends."""
+    scene = scene.model_copy(update=_lamps(entry, rng_of))
     fog, rain, snow, wet = (drawn(getattr(entry, name), rng_of, (name,)) for name in ("fog", "rain", "snow", "wet"))
     falling = [one for one in (rain, snow) if isinstance(one, (RainEntry, SnowEntry))]
     if not falling and not isinstance(fog, FogEntry):
@@ -45,6 +47,14 @@ def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -
     if falling:
         changes["fog"] = _hazy(changes.get("fog"), [one for one in changes.values() if isinstance(one, (Rain, Snow))], light)
     return scene.model_copy(update={"sun": sun, "sky": sky, "lights": lights} | changes | _wet(scene, wet, rain, seed_of))
+
+
+def _lamps(entry: SceneEntry, rng_of: RngOf) -> dict[str, Lamps]:
+    """Lit lamps, in a scene's field: by default at night."""
+    lamps = drawn(entry.lamps, rng_of, ("lamps",))
+    if isinstance(lamps, LampsEntry):
+        return {"lamps": concrete(lamps)}
+    return {"lamps": Lamps()} if lamps == "auto" and isinstance(drawn(entry.sky, rng_of, ("sky",)), NightSky) else {}
 
 
 def _hazy(fog: Fog | None, falling: list[Rain | Snow], light: np.ndarray[Any, Any]) -> Fog:
