@@ -161,7 +161,11 @@ MISTAKES = [
         "scene.sky.choise: expected one of",
         "found 'choise'; did you mean 'choice'?",
     ),
-    ({"scene": {"sky": ["a.exr"]}}, "scene.sky: expected daylight, the path of an EXR or HDR file, or a mapping", "['a.exr']"),
+    (
+        {"scene": {"sky": ["a.exr"]}},
+        "scene.sky: expected daylight, night, the path of an EXR or HDR file, or a mapping",
+        "['a.exr']",
+    ),
     (
         {"scene": {"lights": [{"kind": "spot", "position": [0, 0, 0], "strength": 1}]}},
         "scene.lights[0].position: expected another place than toward, at which it points; ",

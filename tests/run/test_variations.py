@@ -53,6 +53,22 @@ def test_labels_are_the_same_bytes_and_pictures_are_not(made: Dataset) -> None:
         assert dark.rgb.mean() < 0.9 * day.rgb.mean()
 
 
+WEATHER = {"dry": {}, "fog": {"fog": 3.0}, "rain": {"rain": 40.0}, "snow": {"snow": 3.0}, "wet": {"wet": {"puddles": 0.6}}}
+
+
+def test_no_weather_changes_a_label_and_every_weather_a_picture() -> None:
+    once = recipe(
+        variations=WEATHER, models=[{**MODEL, "count": 1}], viewpoints={"azimuth": 30, "elevation": 20, "distance": 1}
+    )
+    found = {s.variation: s for s in vs.render(once)}
+    again = {s.variation: s.rgb for s in vs.render(once)}
+    assert list(found) == list(WEATHER)
+    for name, sample in found.items():
+        assert told(sample) == told(found["dry"])
+        assert (sample.rgb == again[name]).all()
+        assert name == "dry" or (sample.rgb != found["dry"].rgb).mean() > 0.05
+
+
 def test_noise_of_one_shot_differs_between_variations() -> None:
     twice = recipe(variations={"one": BOTH["day"], "other": BOTH["day"]}, models=[{**MODEL, "count": 1}])
     one, other = (s.rgb.astype(int) for s in vs.render(twice) if s.known_pose.index == 0)

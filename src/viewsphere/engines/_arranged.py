@@ -10,6 +10,8 @@ import numpy as np
 from viewsphere.assets.deforming import Load, sharing
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.repaint import textured
+from viewsphere.assets.wetting import wetted
+from viewsphere.engines._lamps import lit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
@@ -77,16 +79,20 @@ class Shown:
     """Gives models at their time steps; the last `STEPS` are kept, so that what is shown again is the same object."""
 
     load: Load
+    soaked: float = 0.0
     _held: dict[Look, Mesh] = field(default_factory=dict[Look, Mesh])
 
     def mesh(self, thing: Thing, step: TimeStep, resting: Mesh) -> Mesh:
         """A thing's mesh at a time step, which has in common with the mesh at rest what is equal."""
         look = Look(thing.model, step, thing.repaints)
-        found = self._held.pop(look, None) or sharing(look.mesh(self.load), resting)
+        found = self._held.pop(look, None) or sharing(self._soaked(look.mesh(self.load)), resting)
         self._held[look] = found  # the last used comes last
         if len(self._held) > STEPS:
             del self._held[next(iter(self._held))]
         return found
+
+    def _soaked(self, mesh: Mesh) -> Mesh:
+        return wetted(mesh, self.soaked, evenly=True) if self.soaked else mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +112,11 @@ class Arrangements:
     def build(cls, shot: Shot, load: Load) -> Arrangements:
         """Of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
         ring = Ring(shot.scene.ground is not None, shot.label_alpha)
-        meshes = _dressed(shot.things, placed_meshes(shot.things, load))
-        return cls(shot, Shown(load), meshes, None, ring).of(shot)
+        soaked = 0.0 if shot.scene.wet is None else shot.scene.wet.amount
+        meshes = _dressed(shot.things, placed_meshes(shot.things, load), soaked)
+        if shot.scene.lamps is not None:
+            meshes = lit(shot.things, meshes, shot.scene.lamps)
+        return cls(shot, Shown(load, soaked), meshes, None, ring).of(shot)
 
     def of(self, shot: Shot) -> Arrangements:
         """The arrangements of another shot of an equal `stage_key`, which share the loaded meshes."""
@@ -155,12 +164,15 @@ class Arrangements:
         return tuple(mesh if now.step is None else self.shown.mesh(now, now.step, mesh) for now, mesh in held)
 
 
-def _dressed(things: Sequence[Thing], meshes: Sequence[Mesh]) -> tuple[Mesh, ...]:
-    """The meshes with the pictures that things are painted with; things of one mesh and one paint share it."""
+def _dressed(things: Sequence[Thing], meshes: Sequence[Mesh], soaked: float) -> tuple[Mesh, ...]:
+    """The meshes with the pictures that things are painted with, and wet; things of one mesh and one paint share it."""
     found: dict[tuple[int, tuple[Repaint, ...]], Mesh] = {}
     for thing, mesh in zip(things, meshes, strict=True):
         if (id(mesh), thing.repaints) not in found:
-            found[id(mesh), thing.repaints] = textured(mesh, thing.repaints)
+            dressed = textured(mesh, thing.repaints)
+            if soaked:
+                dressed = wetted(dressed, soaked, thing.model.category, evenly=bool(thing.motion.steps))
+            found[id(mesh), thing.repaints] = dressed
     return tuple(found[id(mesh), thing.repaints] for thing, mesh in zip(things, meshes, strict=True))
 
 

@@ -55,7 +55,8 @@ class Air:
             level = np.abs(rate) < LEVEL
             climbed = np.clip(np.where(level, 0.0, rate) * np.where(np.isinf(away), 1e9, away), -60, 700)
             bent = -np.expm1(-climbed) / np.where(level, 1.0, rate)
-            return np.minimum(begin * np.where(level, away, bent), OPAQUE).astype(np.float32)
+            found: Float = np.minimum(begin * np.where(level, away, bent), OPAQUE)
+            return found.astype(np.float32)
 
     def veil(self, radiance: Float32, depth: Float32, which: NDArray[np.integer] | slice = slice(None)) -> None:
         """Dim light (N, 4), premultiplied, by an optical depth, and lay the air's own over what is covered, in place."""
@@ -68,4 +69,5 @@ class Air:
     def behind(self, sky: Float32, alpha: Float32) -> Float32:
         """The light (N, 3) that the sky's (N, 3) becomes, where `alpha` (N,) of it is hidden already."""
         through = np.exp(-self.depth(np.zeros(len(sky), np.float32)))
-        return sky * through[:, None] + ((1 - alpha) * (1 - through))[:, None] * np.array(self.fog.color, np.float32)
+        glow = ((1 - alpha) * (1 - through))[:, None] * np.array(self.fog.color, np.float32)
+        return np.add(sky * through[:, None], glow, dtype=np.float32)

@@ -61,6 +61,9 @@ LOW_DEG = 20.0
 SEEN_STUFF = 0.05
 """Share of the pixels from which on stuff is told of."""
 
+FOGGY = 300.0
+"""Metres of visibility below which rain and snow fall through fog."""
+
 SURROUNDINGS = {
     "road": "a road",
     "pavement": "a pavement",
@@ -91,7 +94,7 @@ class Captions(Frozen):
 @dataclass(frozen=True, eq=False)
 class Seen:
     """What there is to tell of a picture: the objects that are told of, the words for what they look like, by their ids, and
-    those of them that have a front; the picture's size; and what is around them.
+    those of them that have a front; the picture's size; what is around them, and what falls or hangs in the air.
     """
 
     told: Sequence[ObjectAnnotation]
@@ -102,6 +105,7 @@ class Seen:
     sun_is_low: bool
     surroundings: str
     plurals: Mapping[str, str]
+    air: tuple[str, ...] = ()
 
     @cached_property
     def company(self) -> Company:
@@ -136,7 +140,7 @@ def _seen(sight: Sight, around: Around, objects: Sequence[ObjectAnnotation], opt
     fronts = frozenset(o.id for o in told if has_front(sight.placement(o.id - 1).facts))
     weather, sun_is_low = _weather(around)
     size = sight.camera.width, sight.camera.height
-    return Seen(told, words_of(sight), fronts, size, weather, sun_is_low, _surroundings(sight), options.plurals)
+    return Seen(told, words_of(sight), fronts, size, weather, sun_is_low, _surroundings(sight), options.plurals, _air(around))
 
 
 def _weather(around: Around) -> tuple[str, bool]:
@@ -148,6 +152,14 @@ def _weather(around: Around) -> tuple[str, bool]:
     clouds = scene.sky.clouds
     weather = "clear" if clouds < CLEAR else "partly cloudy" if clouds < CLOUDY else "overcast"
     return weather, clouds < CLOUDY and scene.sun is not None and scene.sun.elevation_deg < LOW_DEG
+
+
+def _air(around: Around) -> tuple[str, ...]:
+    """Words for what hangs in the air, and what falls: mist that rain makes by itself is not told of."""
+    scene = around.shot.scene
+    falls = [word for word, what in (("raining", scene.rain), ("snowing", scene.snow)) if what is not None]
+    is_foggy = scene.fog is not None and (not falls or scene.fog.visibility < FOGGY)
+    return ("foggy", *falls) if is_foggy else tuple(falls)
 
 
 def _surroundings(sight: Sight) -> str:
@@ -209,6 +221,7 @@ def _of_sky(seen: Seen, rng: Rng) -> Sentences:
         yield Caption(f"The sky is {seen.weather}.", "weather")
     if seen.sun_is_low:
         yield Caption("The sun is low.", "weather")
+    yield from (Caption(f"It is {word}.", "weather") for word in seen.air)
 
 
 def _of_surroundings(seen: Seen, rng: Rng) -> Sentences:

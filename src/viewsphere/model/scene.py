@@ -13,10 +13,10 @@ from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
 from viewsphere.model.substance import Substance
-from viewsphere.model.weather import Fog, Rain, Snow, Wet
+from viewsphere.model.weather import Fog, Lamps, Rain, Snow, Wet
 
-WEATHER = ("fog", "rain", "snow", "wet")
-"""Fields of a scene that say what its weather is."""
+WEATHER = ("fog", "rain", "snow", "wet", "lamps")
+"""Fields of a scene that say what its weather is, and that its lamps are lit."""
 
 Vector = tuple[float, float, float]
 Row = tuple[float, float, float, float]
@@ -295,11 +295,12 @@ class Scene(Frozen):
     rain: Rain | None = None
     snow: Snow | None = None
     wet: Wet | None = None
+    lamps: Lamps | None = None
 
     @property
     def weather(self) -> bool:
         """Whether there is any."""
-        return any(getattr(self, name) is not None for name in WEATHER)
+        return any(getattr(self, name) is not None for name in WEATHER if name != "lamps")
 
     @model_serializer(mode="wrap")
     def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

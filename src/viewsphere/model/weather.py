@@ -1,4 +1,6 @@
-"""The concrete weather of a scene: what lies in the air between things and the camera, what falls, and what water lies."""
+"""The concrete weather of a scene: what lies in the air between things and the camera, what falls, what water lies, and whether
+lamps are lit.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +13,7 @@ from viewsphere.model.numbers import Length, Portion
 
 Amount = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 Light = tuple[Amount, Amount, Amount]
+Exposed = Annotated[float, Field(strict=True, gt=0, le=1)]
 Speed = Annotated[float, Field(strict=True, ge=-60, le=60)]
 
 CONTRAST = 3.912
@@ -44,15 +47,15 @@ class Falling(Frozen):
 
     rate: Annotated[float, Field(strict=True, gt=0, le=200)] = Field(default=10.0, description="millimetres of water an hour")
     wind: tuple[Speed, Speed] = Field(default=(0.0, 0.0), description="[x, y] in metres a second, by which it is carried")
-    exposure: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        default=0.01, description="seconds for which a picture is exposed to it, where time has no shutter: longer streaks"
-    )
+    exposure: Exposed = Field(default=0.01, description="seconds for which a picture is exposed to it: longer streaks")
     color: Light = Field(default=(0.8, 0.8, 0.8), description="radiance of what falls: linear [r, g, b]; by default the sky's")
     seed: int = Field(default=0, ge=0, description="of where each drop or flake is")
 
 
 class Rain(Falling):
     """Drops by Marshall and Palmer 1948, as fast as Garg and Nayar 2007 have them."""
+
+    exposure: Exposed = Field(default=0.004, description="seconds for which a picture is exposed to it: longer streaks")
 
 
 class Snow(Falling):
@@ -65,3 +68,14 @@ class Wet(Frozen):
     amount: Portion = Field(default=1.0, description="0 dry, 1 soaked: darker, and a film that mirrors")
     puddles: Portion = Field(default=0.3, description="share of level ground under water")
     seed: int = Field(default=0, ge=0, description="of where puddles are")
+
+
+class Lamps(Frozen):
+    """Lamps of a place that are lit: its pieces' parts named lens."""
+
+    strength: Amount = Field(default=90.0, description="irradiance at one metre below each")
+    color: Light = Field(default=(1.0, 0.74, 0.46), description="linear [r, g, b]")
+    most: Annotated[int, Field(strict=True, ge=0, le=32)] = Field(
+        default=8, description="how many are lights, those nearest to the middle of the place; the others only glow"
+    )
+    windows: Portion = Field(default=0.35, description="share of windows that are lit from inside")

@@ -14,7 +14,7 @@ from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at as standing_at
 from viewsphere.model.mistakes import nearest, one_of, shown
-from viewsphere.model.numbers import Length, Natural
+from viewsphere.model.numbers import Length, Natural, Number, Strength
 from viewsphere.model.scene import (
     AimedLight,
     AreaLight,
@@ -114,6 +114,23 @@ class DaylightSky(Frozen):
     daylight: DaylightEntry = Field(description="a sky made by the sun's place: turbidity, clouds, strength")
 
 
+class NightEntry(Frozen):
+    """A sky without the sun, as a long exposure shows it."""
+
+    moon: Drawn[Strength] = Field(default=0.1, description="irradiance of what faces the moon, in the sky's units")
+    azimuth_deg: Drawn[Number] = Field(default=-60.0, description="where the moon stands, degrees, as for cameras")
+    elevation_deg: Drawn[Annotated[float, Field(strict=True, gt=0, le=90)]] = Field(
+        default=45.0, description="degrees above the horizon"
+    )
+    glow: Drawn[Strength] = Field(default=0.05, description="radiance of the lights of towns at the horizon")
+
+
+class NightSky(Frozen):
+    """A sky of night."""
+
+    night: NightEntry = Field(description="a sky of night: moon and glow")
+
+
 class HdriSky(entry_of(Environment, without=("kind", "file"))):
     """Light from a picture of the whole sphere."""
 
@@ -122,32 +139,36 @@ class HdriSky(entry_of(Environment, without=("kind", "file"))):
     )
 
 
-SKIES = tuple(dict.fromkeys([*GradientEntry.model_fields, *DaylightSky.model_fields, *HdriSky.model_fields]))
+SKIES = tuple(
+    dict.fromkeys([*GradientEntry.model_fields, *DaylightSky.model_fields, *NightSky.model_fields, *HdriSky.model_fields])
+)
 """The fields of all kinds of sky."""
 
 
 def _sky(value: Any) -> Any:
     if isinstance(value, str):
-        return {"daylight": {}} if value == "daylight" else {"hdri": value}
+        return {value: {}} if value in ("daylight", "night") else {"hdri": value}
     if isinstance(value, Mapping):
         for name in cast(Mapping[Any, Any], value):
             if nearest(name, SKIES) and name not in SKIES:
                 with standing_at(str(name)):
                     raise ValueError(one_of(name, SKIES))
     elif not isinstance(value, Frozen):
-        raise ValueError(f"expected daylight, the path of an EXR or HDR file, or a mapping; found {shown(value)}")
+        raise ValueError(f"expected daylight, night, the path of an EXR or HDR file, or a mapping; found {shown(value)}")
     return cast(Any, value)
 
 
 def _kind_of_sky(value: Any) -> str:
     if isinstance(value, Mapping):
-        return "an hdri" if "hdri" in value else "a daylight" if "daylight" in value else "a gradient"
-    return {HdriSky: "an hdri", DaylightSky: "a daylight"}.get(type(value), "a gradient")
+        known = {"hdri": "an hdri", "daylight": "a daylight", "night": "a night"}
+        return next((tag for name, tag in known.items() if name in value), "a gradient")
+    return {HdriSky: "an hdri", DaylightSky: "a daylight", NightSky: "a night"}.get(type(value), "a gradient")
 
 
 SkyField = Annotated[
     Annotated[GradientEntry, Tag("a gradient")]
     | Annotated[DaylightSky, Tag("a daylight")]
+    | Annotated[NightSky, Tag("a night")]
     | Annotated[HdriSky, Tag("an hdri")],
     Discriminator(_kind_of_sky),
     BeforeValidator(_sky),

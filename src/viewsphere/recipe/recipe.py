@@ -63,6 +63,7 @@ LATER_FIELDS: dict[tuple[str, ...], Any] = {
     ("scene", "rain"): "off",
     ("scene", "snow"): "off",
     ("scene", "wet"): "auto",
+    ("scene", "lamps"): "auto",
     ("scenes", "orientation"): "upright",
     ("scenes", "balance"): "models",
     ("scenes", "on"): None,

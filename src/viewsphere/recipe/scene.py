@@ -41,7 +41,7 @@ from viewsphere.recipe.light import SKY_SUFFIXES, GradientEntry, HdriSky, Hemisp
 from viewsphere.recipe.scenery import CompanyEntry, CompanyField, Draw, PlaceEntry, PlaceField, PlaneEntry, PlanesField
 from viewsphere.recipe.surface import GroundEntry, GroundField, MaterialEntry
 from viewsphere.recipe.values import OrShort, pair
-from viewsphere.recipe.weather import FogField, RainField, SnowField, WetField, check_weather
+from viewsphere.recipe.weather import FogField, LampsField, RainField, SnowField, WetField, check_weather
 
 LARGEST_IMAGE = 16384
 OF_FILE = ("place", "sun", "sky", "ground")
@@ -232,6 +232,11 @@ class SceneEntry(Frozen):
     )
     wet: Drawn[WetField] = Field(
         default="auto", description="off, auto (as rain makes it), how wet from 0 to 1, or a mapping of amount and puddles"
+    )
+
+    lamps: Drawn[LampsField] = Field(
+        default="auto",
+        description="lamps of a place: on, off, auto (on under sky: night), or a mapping of strength, color, most and windows",
     )
 
     @model_validator(mode="after")

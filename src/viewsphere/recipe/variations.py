@@ -10,7 +10,7 @@ from viewsphere.model.mistakes import at
 from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.scene import SceneEntry
 
-CONDITIONS = ("sun", "sky", "lights", "fog", "rain", "snow", "wet", "background", "smoother", "view", "effects")
+CONDITIONS = ("sun", "sky", "lights", "fog", "rain", "snow", "wet", "lamps", "background", "smoother", "view", "effects")
 """Fields of a scene that no label depends on."""
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]

@@ -8,10 +8,10 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from viewsphere.model.mistakes import at
 from viewsphere.model.numbers import Portion
-from viewsphere.model.weather import Fog, Rain, Snow, Wet
+from viewsphere.model.weather import Fog, Lamps, Rain, Snow, Wet
 from viewsphere.recipe.draws import Drawn, span
 from viewsphere.recipe.entries import entry_of
-from viewsphere.recipe.values import OrShort, shape_of
+from viewsphere.recipe.values import OrShort, shape_of, switch
 
 HEAVY = {"rain": 7.6, "snow": 2.5}
 """Millimetres of water an hour from which on meteorologists call rain, and snow, heavy."""
@@ -37,6 +37,10 @@ class WetEntry(entry_of(Wet, without=("seed",))):
     """Water on what faces up; rain brings it by itself."""
 
 
+class LampsEntry(entry_of(Lamps)):
+    """Lamps of a place that are lit."""
+
+
 def _short(name: str, words: tuple[str, ...]) -> BeforeValidator:
     """A number, or a range of numbers, as a mapping of the field that matters most."""
 
@@ -52,29 +56,21 @@ def _short(name: str, words: tuple[str, ...]) -> BeforeValidator:
 
 
 Off = Annotated[Literal["off"], Tag("text")]
-FogField = Annotated[
-    Annotated[FogEntry, Tag("mapping")] | Off,
-    Discriminator(shape_of),
-    _short("visibility", ("off",)),
-    OrShort({"type": ["number", "array"]}),
-]
-RainField = Annotated[
-    Annotated[RainEntry, Tag("mapping")] | Off,
-    Discriminator(shape_of),
-    _short("rate", ("off",)),
-    OrShort({"type": ["number", "array"]}),
-]
-SnowField = Annotated[
-    Annotated[SnowEntry, Tag("mapping")] | Off,
-    Discriminator(shape_of),
-    _short("rate", ("off",)),
-    OrShort({"type": ["number", "array"]}),
-]
-WetField = Annotated[
-    Annotated[WetEntry, Tag("mapping")] | Annotated[Literal["off", "auto"], Tag("text")],
-    Discriminator(shape_of),
-    _short("amount", ("auto", "off")),
-    OrShort({"type": ["number", "array"]}),
+Auto = Annotated[Literal["off", "auto"], Tag("text")]
+SHAPE, NUMBERS = Discriminator(shape_of), OrShort({"type": ["number", "array"]})
+FogField = Annotated[Annotated[FogEntry, Tag("mapping")] | Off, SHAPE, _short("visibility", ("off",)), NUMBERS]
+RainField = Annotated[Annotated[RainEntry, Tag("mapping")] | Off, SHAPE, _short("rate", ("off",)), NUMBERS]
+SnowField = Annotated[Annotated[SnowEntry, Tag("mapping")] | Off, SHAPE, _short("rate", ("off",)), NUMBERS]
+WetField = Annotated[Annotated[WetEntry, Tag("mapping")] | Auto, SHAPE, _short("amount", ("auto", "off")), NUMBERS]
+
+
+def _lamps(value: Any) -> Any:
+    on = switch(value)
+    return value if on is None else {} if on else "off"
+
+
+LampsField = Annotated[
+    Annotated[LampsEntry, Tag("mapping")] | Auto, SHAPE, BeforeValidator(_lamps), OrShort({"enum": [True, False, "on"]})
 ]
 
 

@@ -23,6 +23,7 @@ from viewsphere.model.notebook import Shown
 from viewsphere.model.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scene import SceneEntry
 from viewsphere.sampling.checks import (
@@ -52,7 +53,7 @@ from viewsphere.sampling.pictures import check_pictures, proportions, scene_pict
 from viewsphere.sampling.recipe_warnings import hidden_background, hidden_by_exposure, no_light, out_of_view, too_small
 from viewsphere.sampling.rigs import rig_of
 from viewsphere.sampling.samplers import Sampler, Stock, lens
-from viewsphere.sampling.scenes import is_night
+from viewsphere.sampling.scenes import check_night, is_night
 from viewsphere.sampling.seeds import share
 from viewsphere.sampling.sequence_checks import check_sequences
 from viewsphere.sampling.sequence_poses import SequencePoses, poses_of
@@ -319,7 +320,8 @@ class Plan(Shown, Stock):
 
 def _unlit(scene: SceneEntry) -> Iterator[str]:
     """What makes a scene's pictures black, or white."""
-    if any(is_night(sun) for sun in alternatives(scene.sun)):
+    dark = not all(isinstance(sky, NightSky) for sky in alternatives(scene.sky))
+    if dark and any(is_night(sun) for sun in alternatives(scene.sun)):
         yield "scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight"
     yield from chain(no_light(scene), hidden_by_exposure(scene))
 
@@ -337,6 +339,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         for one in recipe.conditions.values():
             check_catcher(one)
             check_shutter(one)
+            check_night(one)
         check_splits(recipe)
         check_redraws(recipe)
         check_motions(recipe)

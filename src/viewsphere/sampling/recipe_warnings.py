@@ -18,7 +18,7 @@ from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Sun
 from viewsphere.recipe.draws import alternatives, component, span
-from viewsphere.recipe.light import DaylightSky, HdriSky, SunEntry
+from viewsphere.recipe.light import DaylightSky, HdriSky, NightSky, SunEntry
 from viewsphere.recipe.models import Dimensions, Length, ModelEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scene import SceneEntry
@@ -190,6 +190,9 @@ def _lights(scene: SceneEntry) -> Iterator[tuple[float, float]]:
 def _sky(sky: Any, night: bool) -> tuple[float, float]:
     if isinstance(sky, HdriSky):
         return span(sky.strength)[0] / UNKNOWN, span(sky.strength)[1] * UNKNOWN
+    if isinstance(sky, NightSky):
+        low, high = span(sky.night.glow)
+        return low / 2, high + span(sky.night.moon)[1]
     if isinstance(sky, DaylightSky):
         low, high = span(sky.daylight.strength)
         return (0.0, 0.0) if night else (low / UNKNOWN, high * UNKNOWN)

@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from viewsphere import materials
+from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
@@ -29,15 +30,16 @@ from viewsphere.model.scene import (
     Finish,
     Ground,
     Scene,
+    Sky,
     Sun,
     Vector,
 )
 from viewsphere.model.substance import Substance
 from viewsphere.model.thing import Repaint
-from viewsphere.recipe.draws import RngOf, drawn, is_random
+from viewsphere.recipe.draws import RngOf, alternatives, drawn, is_random
 from viewsphere.recipe.entries import concrete, pictures_of
 from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame
-from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, SunEntry
+from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, NightEntry, NightSky, SunEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.surface import GroundEntry, MaterialEntry
 from viewsphere.sampling.pictures import Kind, Pictures
@@ -156,8 +158,9 @@ class Scenes:
         def scene(names: Names, names_of_finish: tuple[Names, ...]) -> Scene:
             entry, rng_of = self.recipe.scene, self._rng_of(names)
             sun, sky = drawn(entry.sun, rng_of, ("sun",)), self._sky(drawn(entry.sky, rng_of, ("sky",)), names)
+            at_night = drawn(entry.sky, rng_of, ("sky",))
             made = Scene(
-                sun=_sun(sun, sky),
+                sun=_moon(at_night.night, sun) if isinstance(at_night, NightSky) else _sun(sun, sky),
                 sky=sky.model_copy(update={"strength": 0.0}) if isinstance(sky, Daylight) and is_night(sun) else sky,
                 lights=_lights(entry.lights, rng_of),
                 ground=self._ground(drawn(entry.ground, rng_of, ("ground",)), rng_of),
@@ -170,6 +173,8 @@ class Scenes:
     def _sky(self, entry: Any, names: Names) -> AnySky:
         if isinstance(entry, HdriSky):
             return concrete(entry, file=self._file("hdri", entry.hdri, ("sky", "hdri"), names))
+        if isinstance(entry, NightSky):
+            return _night(entry.night)
         return concrete(entry.daylight if isinstance(entry, DaylightSky) else entry)
 
     def _ground(self, entry: Any, rng_of: RngOf) -> Ground | None:
@@ -232,6 +237,34 @@ def _sun(entry: Any, sky: AnySky) -> Sun | None:
     if angles is None:
         return concrete(entry)
     return concrete(entry, azimuth_deg=angles[0], elevation_deg=angles[1]) if angles[1] > 0 else None
+
+
+def _night(entry: NightEntry) -> Sky:
+    """A sky that the moon and the lights of towns light."""
+    dark, glow = 0.05 + 0.5 * entry.moon, entry.glow
+    return Sky(
+        zenith=(0.1 * dark + 0.1 * glow, 0.13 * dark + 0.1 * glow, 0.24 * dark + 0.1 * glow),
+        horizon=(0.15 * dark + glow, 0.18 * dark + 0.8 * glow, 0.28 * dark + 0.65 * glow),
+    )
+
+
+def _moon(entry: NightEntry, sun: object) -> Sun | None:
+    if sun == "off" or not entry.moon:
+        return None
+    place = {"azimuth_deg": entry.azimuth_deg, "elevation_deg": entry.elevation_deg}
+    return Sun(strength=entry.moon, color=(0.75, 0.87, 1.0), **place)
+
+
+def check_night(recipe: Recipe) -> None:
+    """Raise RecipeError for a sky of night above which the sun stands."""
+    scene = recipe.scene
+    if any(isinstance(sky, NightSky) for sky in alternatives(scene.sky)):
+        for sun in alternatives(scene.sun):
+            if isinstance(sun, SunEntry) and not is_night(sun):
+                raise RecipeError(
+                    "scene.sun: expected auto, off, or a date and time of the night beside sky: night; found one above the "
+                    "horizon: leave it out, or take another sky"
+                )
 
 
 def _angles(entry: SunEntry) -> tuple[float, float] | None:

@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.assets.srgb import encoded, linear
+from viewsphere.assets.wetting import darkened
+from viewsphere.imaging.precipitation import extinction
 from viewsphere.model.scene import HemisphereLight, Scene
-from viewsphere.model.weather import CONTRAST, Fog, Rain, Snow, Wet
+from viewsphere.model.weather import CONTRAST, Fog, Lamps, Rain, Snow, Wet
 from viewsphere.recipe.draws import RngOf, drawn
 from viewsphere.recipe.entries import concrete
+from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.scene import SceneEntry
-from viewsphere.recipe.weather import FogEntry, RainEntry, SnowEntry, WetEntry
-from viewsphere.surroundings.falling import extinction
+from viewsphere.recipe.weather import FogEntry, LampsEntry, RainEntry, SnowEntry, WetEntry
 from viewsphere.surroundings.weather import clouded, floor_light, in_fog
 
 SOAKING = 25.0
@@ -24,10 +27,11 @@ SeedOf = Callable[[str], int]
 
 def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -> Scene:
     """The scene with the weather of its entry, drawn. `seed_of`: a number for a purpose, on which nothing else depends."""
+    scene = scene.model_copy(update=_lamps(entry, rng_of))
     fog, rain, snow, wet = (drawn(getattr(entry, name), rng_of, (name,)) for name in ("fog", "rain", "snow", "wet"))
     falling = [one for one in (rain, snow) if isinstance(one, (RainEntry, SnowEntry))]
     if not falling and not isinstance(fog, FogEntry):
-        return scene.model_copy(update=_wet(wet, None, seed_of))
+        return scene.model_copy(update=_wet(scene, wet, None, seed_of))
     clouds = max((one.clouds for one in falling), default=0.0)
     sun, sky = clouded(scene.sun, scene.sky, clouds)
     lights, changes = scene.lights, dict[str, Any]()
@@ -42,7 +46,15 @@ def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -
         changes["rain" if isinstance(own, Rain) else "snow"] = own
     if falling:
         changes["fog"] = _hazy(changes.get("fog"), [one for one in changes.values() if isinstance(one, (Rain, Snow))], light)
-    return scene.model_copy(update={"sun": sun, "sky": sky, "lights": lights} | changes | _wet(wet, rain, seed_of))
+    return scene.model_copy(update={"sun": sun, "sky": sky, "lights": lights} | changes | _wet(scene, wet, rain, seed_of))
+
+
+def _lamps(entry: SceneEntry, rng_of: RngOf) -> dict[str, Lamps]:
+    """Lit lamps, in a scene's field: by default at night."""
+    lamps = drawn(entry.lamps, rng_of, ("lamps",))
+    if isinstance(lamps, LampsEntry):
+        return {"lamps": concrete(lamps)}
+    return {"lamps": Lamps()} if lamps == "auto" and isinstance(drawn(entry.sky, rng_of, ("sky",)), NightSky) else {}
 
 
 def _hazy(fog: Fog | None, falling: list[Rain | Snow], light: np.ndarray[Any, Any]) -> Fog:
@@ -55,14 +67,27 @@ def _hazy(fog: Fog | None, falling: list[Rain | Snow], light: np.ndarray[Any, An
     return fog.model_copy(update={"visibility": CONTRAST / (fog.extinction + more)})
 
 
-def _wet(entry: object, rain: object, seed_of: SeedOf) -> dict[str, Wet]:
+def _wet(scene: Scene, entry: object, rain: object, seed_of: SeedOf) -> dict[str, Any]:
     """Water on the ground, in a scene's field: as it is said, else what rain brings."""
     if isinstance(entry, WetEntry):
-        return {"wet": concrete(entry, seed=seed_of("puddles"))}
+        return _soaked(scene, concrete(entry, seed=seed_of("puddles")))
     if entry == "off" or not isinstance(rain, RainEntry):
         return {}
     soaked = min(rain.rate / SOAKING, 1.0)
-    return {"wet": Wet(amount=0.6 + 0.4 * soaked, puddles=0.5 * soaked, seed=seed_of("puddles"))}
+    return _soaked(scene, Wet(amount=0.6 + 0.4 * soaked, puddles=0.45 * soaked, seed=seed_of("puddles")))
+
+
+def _soaked(scene: Scene, wet: Wet) -> dict[str, Any]:
+    """Water, and the ground plane under it, which it makes darker and smoother, in a scene's fields."""
+    ground = scene.ground
+    if ground is None or ground.catcher:
+        return {"wet": wet}
+    kept = darkened(ground.roughness, ground.metallic, wet.amount)
+    r, g, b = (float(f"{c:.6g}") for c in encoded(linear(ground.color) * kept).tolist())
+    return {
+        "wet": wet,
+        "ground": ground.model_copy(update={"color": (r, g, b), "roughness": ground.roughness * (1 - 0.5 * wet.amount)}),
+    }
 
 
 def _even(lights: tuple[Any, ...]) -> np.ndarray[Any, Any]:

@@ -24,6 +24,9 @@ ASYMMETRY = 0.85
 LAYER = 60.0
 """Metres of fog overhead, where nothing is said."""
 
+DARK = 0.3
+"""How much darker clouds are that rain or snow falls from, beside others, as a photographer exposes them."""
+
 METERED = 0.85
 """Radiance of thick fog as a photographer exposes it: a light grey."""
 
@@ -41,7 +44,7 @@ def clouded(sun: Sun | None, sky: AnySky, clouds: float) -> tuple[Sun | None, An
     if not clouds:
         return sun, sky
     if isinstance(sky, Daylight):
-        return sun, sky.model_copy(update={"clouds": max(sky.clouds, clouds)})
+        return sun, sky.model_copy(update={"clouds": max(sky.clouds, clouds), "strength": sky.strength * (1 - DARK * clouds)})
     left = None if sun is None or clouds == 1 else sun.model_copy(update={"strength": sun.strength * (1 - clouds)})
     if isinstance(sky, Environment):
         return left, sky.model_copy(update={"strength": sky.strength * (1 - clouds * (1 - CLOUD))})

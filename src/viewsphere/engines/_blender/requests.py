@@ -16,6 +16,7 @@ from viewsphere.assets.repaint import repainted
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.options import AnyOptions
 from viewsphere.engines._blender.texels import Kind, Levels
+from viewsphere.engines._lamps import lamplight
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint, Thing
@@ -64,12 +65,13 @@ def scene_request(
     if blend is None or not blend.is_lit:
         pictures = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
     middle = middle_of(geometry, sum(not p.scenery for p in things))
+    lit = lamplight(scene, things, meshes, middle)
     has_scenery = any(p.scenery for p in things)
     return {
         "meshes": meshes_told,
         "objects": objects,
         "ground": None if scene.ground is None else _ground_request(scene.ground, geometry, has_scenery, put),
-        "lights": [frame.light(light) for light in _lights_request(scene, middle)],
+        "lights": [frame.light(light) for light in _lights_request(lit, middle)],
         "world": pictures and _world_request(pictures, put),
         "hemispheres": pictures and _hemispheres(scene, pictures),
         "file": None if blend is None else _file_request(blend),

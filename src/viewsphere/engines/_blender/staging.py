@@ -29,6 +29,7 @@ from viewsphere.engines._blender.veiling import lay_sky, veil
 from viewsphere.engines._passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.imaging.background import display_background, shows_sky
+from viewsphere.imaging.falling import fall_in
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
@@ -230,6 +231,8 @@ class CyclesStage:
             veil(rendered["picture"], fog, camera, arranged.geometry)
             if shows_sky(finish.background):
                 lay_sky(rendered["picture"], fog, camera, arranged.sky)
+        seconds = self.shot.instants[instant].seconds
+        fall_in(self.shot.scene, rendered["picture"], camera, seconds, visibility.inverse_depth)
         focus, owner = np.array(self.shot.instants[instant].focus), arranged.geometry.triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
         return rendered | {name: finished(rendered["picture"], background, finish, seen)}

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import linear
 from viewsphere.engines._arranged import Arranged
+from viewsphere.engines._lamps import lamplight
 from viewsphere.engines.raster import kernels_paint
 from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
 from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
@@ -111,6 +112,9 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades) -
     has_ground = scene.ground is not None
     casters = _casters(packed, has_ground)
     distant = sky_lights(scene.sky, scene.sun, has_ground)
+    arranged = packed.arranged
+    middle = np.array(lengths.origin) + lengths.unit * (casters.extent.low + casters.extent.high) / 2
+    scene = lamplight(scene, arranged.things, arranged.whole, middle)
     lights = bake_lights(distant, scene.lights, casters, lengths.unit, has_ground, options.shadow_resolution)
     floor, albedo = _floor(scene.ground, lengths, still_lengths(packed.arranged), len(surfaces.looks) - 1)
     lamps = lamps_on_ground(lights, casters.extent)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,9 +67,10 @@ def paint(
     radiance: Float32,
     split: Float32 = NO_SPLIT,
     fog: Fog | None = None,
+    more: Callable[[Float32], None] | None = None,
 ) -> None:
     """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the covered share of the pixel, as seen through
-    `fog`.
+    `fog`. `more` adds to the light of the pixels' centres what surfaces mirror.
 
     Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, else 0. `split`, if it is not empty,
     is filled with the parts of this light, (H * W, 6 or 9) float32 as `kernels_split` has them; it must be 0 before.
@@ -76,7 +78,7 @@ def paint(
     view = view_of(baked, camera)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     air = None if fog is None else Air.of(fog, camera)
-    stack = _shade(baked, camera, view, visibility, triangle, depth, radiance, split, air=air)
+    stack = shade_all(baked, camera, view, visibility, triangle, depth, radiance, split, air=air, more=more)
     if has_sky:
         _lay_sky(view, baked.surrounding, radiance, air)
     if not antialias:
@@ -129,7 +131,7 @@ def _smooth(
     view = view_of(baked, camera, own)
     colors, parts = np.empty((len(at), 4), np.float32), np.zeros((len(at) if len(split) else 0, split.shape[1]), np.float32)
     air = None if fog is None else Air.of(fog, camera, _rays(camera, own))
-    _shade(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
+    shade_all(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
     if has_sky:
         colors[~is_own, 3] = 1  # the sky need not be looked up for these
         _lay_sky(view, baked.surrounding, colors, air)
@@ -159,7 +161,7 @@ def brighten_lines(pixels: Int32, means: Float32, width: int, radiance: Float32)
     radiance[pixels, :3] = dimmed + (means - dimmed) * share[:, None]
 
 
-def _shade(
+def shade_all(
     baked: Baked,
     camera: Camera,
     view: PictureRays,
@@ -170,6 +172,7 @@ def _shade(
     split: Float32,
     samples: Samples | None = None,
     air: Air | None = None,
+    more: Callable[[Float32], None] | None = None,
 ) -> list[Layer]:
     """Fill `radiance` (S, 4) with what the samples show, surfaces behind see-through ones first, and `split` with its parts,
     if it is not empty; each surface is seen through the air before it. Returns the layers.
@@ -179,6 +182,8 @@ def _shade(
     solids, grounds = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance, solid, ground)
     _shade_some(baked, view, solid[:solids], False, triangle, depth, radiance, split)
     _shade_some(baked, view, ground[:grounds], True, triangle, depth, radiance, split)
+    if more is not None:
+        more(radiance)
     # Layers are listed also where a solid surface is in front: a decal may lie on that surface.
     pixels = None if samples is None else samples.pixels
     stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)

@@ -15,12 +15,14 @@ from viewsphere.engines._arranged import Arranged, Arrangements
 from viewsphere.engines._passes import shading_of
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
 from viewsphere.engines.raster.blurring import Blur
+from viewsphere.engines.raster.mirroring import mirror
 from viewsphere.engines.raster.options import Options, parse_options
 from viewsphere.engines.raster.painting import Baked, materials, paint
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.surface import Lengths
 from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.imaging.background import display_background, shows_sky
+from viewsphere.imaging.falling import fall_in
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
@@ -116,7 +118,10 @@ class RasterStage:
             self.shot.camera(instant, sensor),
             self.shot.finish(instant).with_background(name == "rgba").background,
         )
-        self._paint(instant, sensor, visibility, shows_sky(background), self._canvas(camera.width * camera.height))
+        radiance = self._canvas(camera.width * camera.height)
+        self._paint(instant, sensor, visibility, shows_sky(background), radiance)
+        picture, seconds = radiance.reshape(camera.height, camera.width, 4), self.shot.instants[instant].seconds
+        fall_in(self.shot.scene, picture, camera, seconds, visibility.inverse_depth)
         return self._finished(instant, sensor, visibility, name)
 
     def _finished(self, instant: int, sensor: int, visibility: Visibility, name: str) -> NDArray[np.uint8]:
@@ -131,11 +136,11 @@ class RasterStage:
 
     def _paint(self, instant: int, sensor: int, visibility: Visibility, has_sky: bool, radiance: Float32) -> None:
         """Fill `radiance` with the light of a picture, blurred where anything moves while the shutter is open."""
-        is_smooth, blur = self.options.antialias == 4, Blur(self.arrangements, instant, sensor)
+        blur = Blur(self.arrangements, instant, sensor)
 
         def paint_moment(arranged: Arranged, camera: Camera, seen: Visibility, light: Float32) -> None:
             baked = bake(self._pack(arranged), self.shot.scene, self.options, self._shades)
-            paint(baked, camera, seen, is_smooth, has_sky, light, fog=self.shot.scene.fog)
+            self._paint_one(baked, camera, seen, has_sky, light)
 
         count = blur.count(self.at(instant), visibility)
         if count > 1:
@@ -143,7 +148,12 @@ class RasterStage:
             blur.paint(count, paint_moment, radiance)
         else:
             now, camera = self.baked(instant), self.shot.camera(instant, sensor)
-            paint(now, camera, visibility, is_smooth, has_sky, radiance, fog=self.shot.scene.fog)
+            self._paint_one(now, camera, visibility, has_sky, radiance)
+
+    def _paint_one(self, baked: Baked, camera: Camera, seen: Visibility, has_sky: bool, radiance: Float32) -> None:
+        scene = self.shot.scene
+        more = None if scene.wet is None else partial(mirror, baked, camera, seen, scene.wet)
+        paint(baked, camera, seen, self.options.antialias == 4, has_sky, radiance, fog=scene.fog, more=more)
 
     def _canvas(self, pixels: int) -> Float32:
         """Room for the light of a picture, the same one every time: fresh memory costs as much as the sky."""

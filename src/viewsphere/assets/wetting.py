@@ -1,0 +1,71 @@
+"""Wet materials: pores that fill with water look darker, and a film of it mirrors (Lekner and Dorf 1988; Lagarde 2013)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.model.classes import STUFF_IDS, stuff_of
+
+UPRIGHT = 0.35
+"""How wet walls are beside what faces up."""
+
+UP = 0.5
+"""z of a normal from which on a surface faces up."""
+
+DARKEST = 0.42
+"""Share of its colour that a porous surface keeps when it is soaked."""
+
+SMOOTH = 0.12
+"""Roughness of a film of water."""
+
+FILM = 0.5
+"""Share of a soaked rough surface that a film covers."""
+
+LEAVES = 0.6
+"""How wet plants are beside what faces up."""
+
+GREEN = {STUFF_IDS["grass"], STUFF_IDS["vegetation"]}
+"""Classes of plants."""
+
+
+def wetted(mesh: Mesh, amount: float, category: str = "", evenly: bool = False) -> Mesh:
+    """The mesh with wet materials: what faces up in its own axes by `amount`, the rest less, plants without a film. `evenly`:
+    all of it as the rest, as of meshes that deform. `category` says what scenery is made of, see `model.classes`.
+    """
+    if evenly:
+        return replace(mesh, materials=tuple(wet(material, amount * UPRIGHT) for material in mesh.materials))
+    corners = mesh.vertices[mesh.triangles].astype(np.float64)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    smooth = mesh.normals[mesh.triangles].sum(axis=1)
+    side = np.where((normal * smooth).sum(axis=1) < 0, -1.0, 1.0)  # that of the shading normals
+    kind = (side * normal[:, 2] > UP * np.linalg.norm(normal, axis=1)).astype(np.int64)
+    green = np.array([stuff_of(category, part) in GREEN for part in mesh.parts])
+    kind[green[mesh.triangle_part]] = 2
+    made = (
+        wet(m, share * amount, film) for share, film in ((UPRIGHT, FILM), (1.0, FILM), (LEAVES, 0.0)) for m in mesh.materials
+    )
+    material = mesh.triangle_material + kind * len(mesh.materials)
+    return replace(mesh, materials=tuple(made), triangle_material=material.astype(mesh.triangle_material.dtype))
+
+
+def wet(material: Material, amount: float, film: float = FILM) -> Material:
+    """A material that is so wet, 0 to 1, with so much of a film of water on it."""
+    pores = darkened(material.roughness, material.metallic, amount)
+    red, green, blue, alpha = material.base_color
+    rough = material.clearcoat_roughness if material.clearcoat > 0 else 1.0
+    return replace(
+        material,
+        base_color=(red * pores, green * pores, blue * pores, alpha),
+        roughness=material.roughness * (1 - 0.3 * amount),
+        clearcoat=max(material.clearcoat, film * amount),
+        clearcoat_roughness=min(rough, SMOOTH) if film * amount > 0 else rough,
+    )
+
+
+def darkened(roughness: float, metallic: float, amount: float) -> float:
+    """Share of its colour that a surface keeps: rough ones are porous, metals and lacquers are not."""
+    porosity = min(max((roughness - 0.5) / 0.4, 0.0), 1.0) * (1 - metallic)
+    return 1 + (DARKEST - 1) * porosity * amount

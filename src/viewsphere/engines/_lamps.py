@@ -1,0 +1,106 @@
+"""What shines at night: lamps of a place as spotlights, what glows already brighter, and some windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.scene import Scene, SpotLight
+from viewsphere.model.thing import Thing
+from viewsphere.model.weather import Lamps
+
+Float = NDArray[np.float64]
+
+LENS, WINDOW = "lens", "window"
+"""Names of parts of scenery: what a lamp shines through, and what may be lit from inside."""
+
+GLOW = 9.0
+"""How much brighter what glows by day is made."""
+
+ROOM = (0.62, 0.42, 0.2)
+"""Radiance of a window that is lit from inside: linear."""
+
+APART = 1.6
+"""Metres between the middles of triangles that belong to different windows."""
+
+BELOW = 0.06
+"""Metres below its lens at which a lamp's light begins, so that the lens hides none."""
+
+CONE = 150.0
+
+
+def lamplight(scene: Scene, things: Sequence[Thing], meshes: Sequence[Mesh], middle: Float) -> Scene:
+    """The scene with the lamps of its place that are nearest to the world's origin as lights; `middle` (3,): that of the
+    targets, from which lights count. Which lamps shine does not depend on where targets and cameras are.
+    """
+    lamps = scene.lamps
+    if lamps is None or not lamps.most:
+        return scene
+    found = [place for thing, mesh in zip(things, meshes, strict=True) if thing.scenery for place in _lenses(thing, mesh)]
+    nearest = sorted(found, key=lambda place: (round(float(np.hypot(place[0], place[1])), 3), *place.round(3)))[: lamps.most]
+    return scene.model_copy(update={"lights": (*scene.lights, *(_spot(place - middle, lamps) for place in nearest))})
+
+
+def _lenses(thing: Thing, mesh: Mesh) -> list[Float]:
+    """Where light begins below the lens of a thing, world metres; none where it has none, or is not there."""
+    if LENS not in mesh.parts or not thing.is_there:
+        return []
+    own = mesh.triangles[mesh.triangle_part == mesh.parts.index(LENS)]
+    if not len(own):
+        return []
+    corners = transform(thing.world_from_object, mesh.vertices[np.unique(own)].astype(np.float64))
+    x, y, _ = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    return [np.array([x, y, corners[:, 2].min() - BELOW])]
+
+
+def _spot(place: Float, lamps: Lamps) -> SpotLight:
+    x, y, z = (float(f"{value:.9g}") for value in place.tolist())
+    down = (x, y, z - 1.0)
+    return SpotLight(
+        position=(x, y, z), toward=down, angle_deg=CONE, blend=0.7, radius=0.12, strength=lamps.strength, color=lamps.color
+    )
+
+
+def lit(things: Sequence[Thing], meshes: Sequence[Mesh], lamps: Lamps) -> tuple[Mesh, ...]:
+    """The things' meshes whose glowing materials shine as at night; of scenery, a share of its windows is lit. Things of one
+    mesh share it, but for those with windows.
+    """
+    found = {id(mesh): _glowing(mesh) for mesh in meshes}
+    return tuple(_with_windows(found[id(mesh)], thing, lamps.windows) for thing, mesh in zip(things, meshes, strict=True))
+
+
+def _glowing(mesh: Mesh) -> Mesh:
+    if not any(max(material.emissive) for material in mesh.materials):
+        return mesh
+    materials = (
+        replace(m, emissive=(GLOW * m.emissive[0], GLOW * m.emissive[1], GLOW * m.emissive[2])) for m in mesh.materials
+    )
+    return replace(mesh, materials=tuple(materials))
+
+
+def _with_windows(mesh: Mesh, thing: Thing, share: float) -> Mesh:
+    if not thing.scenery or WINDOW not in mesh.parts or not thing.motion.is_still:
+        return mesh
+    own = np.flatnonzero(mesh.triangle_part == mesh.parts.index(WINDOW))
+    shining = own[_are_lit(mesh, own, thing, share)]
+    if not len(shining):
+        return mesh
+    material = mesh.triangle_material.copy()
+    material[shining] += len(mesh.materials)
+    rooms = tuple(replace(m, emissive=ROOM) for m in mesh.materials)
+    return replace(mesh, materials=(*mesh.materials, *rooms), triangle_material=material)
+
+
+def _are_lit(mesh: Mesh, own: NDArray[np.intp], thing: Thing, share: float) -> NDArray[np.bool_]:
+    """Which of these triangles (n,), window by window, are of lit ones: what is drawn follows from where the thing stands."""
+    middles = mesh.vertices[mesh.triangles[own]].mean(axis=1)
+    step = np.linalg.norm(np.diff(middles, axis=0, prepend=middles[:1]), axis=1)
+    window = np.cumsum(step > APART)
+    x, y = (round(1000 * row[3]) for row in thing.world_from_object[:2])
+    rng = np.random.default_rng([abs(x), abs(y), int(x < 0), int(y < 0)])
+    return (rng.random(int(window[-1]) + 1) < share)[window]
