@@ -32,7 +32,7 @@ MODELS = [
 TABLE = {"size": [1.4, 1.0], "height": 0.75}
 LAYOUTS: dict[str, dict[str, Any]] = {
     "floor": {"layout": "fall"},
-    "table": {"layout": "fall", "on": TABLE},
+    "table": {"layout": "fall", "surface": TABLE},
     "box": {"layout": {"kind": "container", "size": [1.1, 0.9, 0.45]}},
     "piles of 3": {"layout": {"kind": "stack", "friction": 0.9}, "orientation": "stable"},
 }

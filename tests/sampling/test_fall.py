@@ -108,10 +108,10 @@ def test_bad_options_are_told_before_anything_is_rendered(layout, message):
 
 
 def test_a_surface_that_is_not_there_is_told_before_anything_is_rendered():
-    scenes = {"count": 1, "objects": 2, "layout": "fall", "on": "table"}
-    with pytest.raises(RecipeError, match=r"scenes\.on: expected a scene\.place that has surfaces, or .*found 'table'"):
+    scenes = {"count": 1, "objects": 2, "layout": "fall", "surface": "table"}
+    with pytest.raises(RecipeError, match=r"scenes\.surface: expected a scene\.place that has surfaces, or .*found 'table'"):
         plan(small_recipe(scenes=scenes))
-    with pytest.raises(RecipeError, match=r"scenes\.on: expected a scene\.place that has surfaces"):
+    with pytest.raises(RecipeError, match=r"scenes\.surface: expected a scene\.place that has surfaces"):
         plan(small_recipe(scenes=scenes, scene={"place": "zoo:neighbourhood"}))
 
 
@@ -185,7 +185,7 @@ def falling(**changes):
         "repeat": True,
         "layout": "fall",
         "orientation": "any",
-        "on": {"size": [0.8, 0.6], "height": 0.4},
+        "surface": {"size": [0.8, 0.6], "height": 0.4},
     }
     values = {"scenes": scenes, "channels": ["rgb", "instances"], "formats": [], "splits": {"by": "frame"}, "shot_frames": 1}
     return small_recipe(**values, **changes)

@@ -60,7 +60,7 @@ LATER_FIELDS: dict[tuple[str, ...], Any] = {
     ("scene", "company", "orientation"): "upright",
     ("scenes", "orientation"): "upright",
     ("scenes", "balance"): "models",
-    ("scenes", "on"): None,
+    ("scenes", "surface"): None,
     ("scenes", "distractors"): 0,
     ("scene", "jitter", "off_center"): [0.0, 0.0],
     ("files", "shots"): "files",
