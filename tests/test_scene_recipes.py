@@ -27,7 +27,11 @@ def test_a_recipe_of_scenes_makes_a_data_set_that_passes(name, tmp_path):
 
 @pytest.mark.slow
 def test_the_recipe_of_occluders_makes_a_data_set_that_passes(tmp_path):
-    few = {"models": [{"source": "zoo:wheelie_bin", "count": 4, "category": "bin"}], "viewpoints.count": 2, "splits": {"by": "frame"}}
+    few = {
+        "models": [{"source": "zoo:wheelie_bin", "count": 4, "category": "bin"}],
+        "viewpoints.count": 2,
+        "splits": {"by": "frame"},
+    }
     generate(changed("occluded", **few), tmp_path)
     dataset = Dataset(tmp_path)
     seen = [sample.objects[0].visibility for sample in dataset]
