@@ -108,10 +108,10 @@ def test_bad_options_are_told_before_anything_is_rendered(layout, message):
 
 
 def test_a_surface_that_is_not_there_is_told_before_anything_is_rendered():
-    scenes = {"count": 1, "objects": 2, "layout": "fall", "on": "table"}
-    with pytest.raises(RecipeError, match=r"scenes\.on: expected a scene\.place that has surfaces, or .*found 'table'"):
+    scenes = {"count": 1, "objects": 2, "layout": "fall", "surface": "table"}
+    with pytest.raises(RecipeError, match=r"scenes\.surface: expected a scene\.place that has surfaces, or .*found 'table'"):
         plan(small_recipe(scenes=scenes))
-    with pytest.raises(RecipeError, match=r"scenes\.on: expected a scene\.place that has surfaces"):
+    with pytest.raises(RecipeError, match=r"scenes\.surface: expected a scene\.place that has surfaces"):
         plan(small_recipe(scenes=scenes, scene={"place": "zoo:neighbourhood"}))
 
 
@@ -130,7 +130,7 @@ def test_what_does_not_fit_on_a_table_is_told_with_the_best_that_was_found(monke
     monkeypatch.setattr(_dropping, "TRIES", 1)
     monkeypatch.setattr(_dropping, "ROUNDS", 1)
     with pytest.raises(RecipeError, match=r"scenes\.layout: expected room for 5 models; found \d inside, m\d not"):
-        fallen(solids(5), free=rectangle(0.12, 0.12), below=0.7)
+        fallen(solids(5), free=rectangle(0.01, 0.01), below=0.7)
 
 
 def test_what_is_simulated_is_kept_and_the_first_counts(tmp_path):
@@ -185,7 +185,7 @@ def falling(**changes):
         "repeat": True,
         "layout": "fall",
         "orientation": "any",
-        "on": {"size": [0.8, 0.6], "height": 0.4},
+        "surface": {"size": [0.8, 0.6], "height": 0.4},
     }
     values = {"scenes": scenes, "channels": ["rgb", "instances"], "formats": [], "splits": {"by": "frame"}, "shot_frames": 1}
     return small_recipe(**values, **changes)

@@ -76,7 +76,7 @@ def test_a_pile_that_does_not_stand_is_told():
     balls = np.random.default_rng(0).normal(size=(2, 400, 3))
     round_ones = [shape_of(0.2 * ball / np.linalg.norm(ball, axis=1, keepdims=True)) for ball in balls]
     with pytest.raises(
-        RecipeError, match=r"scenes\.layout: expected m0 and m1 on one another; found none that stays, of 12 tries"
+        RecipeError, match=r"scenes\.layout: expected models of which one stays on another, such as m1 on m0; found none"
     ):
         fallen(round_ones, "stack", given={"friction": 0.02})
 

@@ -66,7 +66,7 @@ LATER_FIELDS: dict[tuple[str, ...], Any] = {
     ("scene", "lamps"): "auto",
     ("scenes", "orientation"): "upright",
     ("scenes", "balance"): "models",
-    ("scenes", "on"): None,
+    ("scenes", "surface"): None,
     ("scenes", "distractors"): 0,
     ("scene", "jitter", "off_center"): [0.0, 0.0],
     ("files", "shots"): "files",

@@ -45,7 +45,7 @@ class ScenesEntry(Frozen):
         "one, over all scenes (of a split, where splits are by model), as far as it has models enough for a scene",
     )
     orientation: Orientation = Field(default="upright", description=ORIENTATION)
-    on: OnField = Field(default=None, description=ON)
+    surface: OnField = Field(default=None, description=ON)
 
     @model_validator(mode="after")
     def _check(self) -> ScenesEntry:

@@ -48,7 +48,7 @@ def unremembered(names: tuple[str, ...], make: Callable[[], Any]) -> Any:
 
 def remembered_as(entry: ScenesEntry | CompanyEntry, cast: Sequence[ModelSpec], names: Sequence[str]) -> tuple[str, ...]:
     """What simulated poses are remembered by: who is placed, how, and what all draws are for."""
-    asked = entry.model_dump_json(include={"layout", "gap", "orientation", "on"})
+    asked = entry.model_dump_json(include={"layout", "gap", "orientation", "surface"})
     return (asked, *names, "of", *(spec.key for spec in cast))
 
 

@@ -63,7 +63,7 @@ class World:
         self._model = self._compiled(bodies, boards, floor, fixed)
         self._data = self._mujoco.MjData(self._model)
         self._steps = 0
-        self._since = 0
+        self.is_damped = True
         for number, pose in enumerate(poses):
             self.put(number, pose)
 
@@ -104,7 +104,6 @@ class World:
         matrix = np.array(pose)
         at, speed = self._data.qpos.reshape(-1, 7)[number], self._data.qvel.reshape(-1, 6)[number]
         at[:3], at[3:], speed[:] = matrix[:3, 3] * self._scale, quaternion_from_matrix(matrix[:3, :3]), 0.0
-        self._since = self._steps
 
     def take_fences_away(self) -> None:
         """Let bodies go where fences were."""
@@ -127,7 +126,7 @@ class World:
         for _ in range(steps):
             self._mujoco.mj_step(self._model, self._data)
             self._steps += 1
-            if (self._steps - self._since) * STEP_S > DAMPED_S:
+            if self.is_damped and self._steps * STEP_S > DAMPED_S:
                 self._data.qvel *= 1 - DAMPING * STEP_S
 
     def settle(self, longest_s: float = LONGEST_S, each: int = LOOK, look: Any = None) -> bool:

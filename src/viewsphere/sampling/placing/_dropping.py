@@ -27,8 +27,8 @@ Float = NDArray[np.float64]
 TRIES = 3
 """Draws of a fall, of which the first that ends well is taken."""
 
-ROUNDS = 6
-"""How often what fell beside is let go again."""
+ROUNDS = 2
+"""How often things that fell beside are let go again, for each of the cast."""
 
 SPOTS = 12
 """Spots that are tried for each thing that is let go; the lowest is taken."""
@@ -123,21 +123,34 @@ class Drop:
         calm = world.settle(each=RECORDED, look=film.shoot) if film else world.settle()
         if fences and calm:
             world.take_fences_away()
-            calm = world.settle(each=RECORDED, look=film.shoot) if film else world.settle()
-        for again in range(0 if film else ROUNDS):
-            beside = self._beside(world)
-            if not beside:
-                break
-            for i, pose in zip(
-                beside, self._starts(f"{number} {again}", beside, places, self._lying(world, beside)), strict=True
-            ):
-                world.put(i, pose)
-            calm = world.settle()
+            calm = world.settle(each=RECORDED, look=film.shoot) if film else self._kept(world, number, places)
         made: dict[str, Any] = {"poses": world.poses}
         return made | ({"ways": film.ways} if film else {}), self._problem(world, calm, bool(film))
 
+    def _kept(self, world: World, number: str, places: Sequence[tuple[Float, float]]) -> bool:
+        """Let time go by until all are at rest where they have to stay; whether they are at rest. What leaves is let go
+        again at once, before it rolls away, and what lies too high when it is at rest.
+        """
+        again, most = 0, ROUNDS * len(self.cast)
+
+        def let_go(slots: Sequence[int]) -> None:
+            nonlocal again
+            for i in slots:
+                again += 1
+                (pose,) = self._starts(f"{number} {again}", [i], places, self._lying(world, slots))
+                world.put(i, pose)
+
+        def watch() -> None:
+            let_go(self._beside(world, math.inf) if again < most else ())
+
+        calm = world.settle(look=watch)
+        while calm and again < most and (high := self._beside(world, self.ground.height)):
+            let_go(high)
+            calm = world.settle(look=watch)
+        return calm
+
     def _problem(self, world: World, calm: bool, moves: bool) -> tuple[float, str] | None:
-        beside = [] if moves else self._beside(world)
+        beside = [] if moves else self._beside(world, self.ground.height)
         if beside:
             inside = len(self.cast) - len(beside)
             found = f"found {inside} inside, {self.cast[beside[0]].key} not: ask for fewer, or for more room"
@@ -201,8 +214,8 @@ class Drop:
             poses.append(_turned(middle, (x, y, z), 2 * math.pi * rng.random()))
         return poses
 
-    def _beside(self, world: World) -> list[int]:
-        """Numbers of things whose middle is not over where they have to stay, or that lie higher than they may, or lower."""
+    def _beside(self, world: World, height: float) -> list[int]:
+        """Numbers of things whose middle is not over where they have to stay, or of which all is higher than this."""
         within = self.ground.within
         if within is None:
             return []
@@ -211,7 +224,7 @@ class Drop:
             middle = transform(np.array(pose), self._spheres(i)[0])
             is_on = (np.abs((middle[:2] - within.center) @ within.axes.T) <= within.half).all()
             lowest = float(transform(np.array(pose), self._bodies[i].corners)[:, 2].min())
-            if not is_on or middle[2] < 0 or lowest > self.ground.height:
+            if not is_on or middle[2] < 0 or lowest > height:
                 found.append(i)
         return found
 

@@ -62,32 +62,29 @@ def place(
 
 def _piled(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> list[Matrix4]:
     poses: list[Any] = [IDENTITY] * len(cast)
-    prints, first = list(room.prints), 0
+    prints, first, highest, asked = list(room.prints), 0, 1, 1
     while first < len(cast):
         high = min(drawn(options.high, draws_of(rng, "high", str(first))), len(cast) - first)
-        pile = _highest(cast, room, shapes, range(first, first + high), rng, options)
+        pile = _highest(cast, shapes, range(first, first + high), rng, options)
         spot = free_spot(rng("pile", cast[first].key, str(first)), room, pile.box, prints)
         if spot is None:
             raise RecipeError(f"{room.field}: expected room for piles of {len(cast)} models; found none for {cast[first].key}")
         prints.append(footprint(pile.box, spot))
         for slot, pose in zip(pile.slots, pile.poses, strict=True):
             poses[slot] = tuple(map(tuple, (np.round(np.array(spot) @ np.array(pose), 10) + 0.0).tolist()))
-        first += len(pile.slots)
+        first, highest, asked = first + len(pile.slots), max(highest, len(pile.slots)), max(asked, high)
+    if highest < min(asked, 2):
+        raise RecipeError(
+            f"{room.field}.layout: expected models of which one stays on another, such as {cast[1].key} on {cast[0].key}; "
+            f"found none, in {TRIES} tries each: ask for orientation: stable, for more friction, or for models with flat sides"
+        )
     return poses
 
 
-def _highest(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], slots: range, rng: Draws, options: Options
-) -> _Pile:
+def _highest(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: range, rng: Draws, options: Options) -> _Pile:
     """A pile of these, or of as many of the first of them as stay on one another."""
-    for high in range(len(slots), min(2, len(slots)) - 1, -1):
-        pile = _pile(cast, shapes, tuple(slots[:high]), rng, options)
-        if pile.standing == high:
-            return pile
-    raise RecipeError(
-        f"{room.field}.layout: expected {cast[slots[0]].key} and {cast[slots[1]].key} on one another; found none that stays, "
-        f"of {TRIES} tries: ask for orientation: stable, for more friction, or for models with flat sides"
-    )
+    pile = _pile(cast, shapes, tuple(slots), rng, options)
+    return pile if pile.standing == len(slots) else _highest(cast, shapes, slots[:-1], rng, options)
 
 
 def _pile(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: tuple[int, ...], rng: Draws, options: Options) -> _Pile:

@@ -154,7 +154,7 @@ def _distractors(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
 def scene_around(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """What the models of a scene stand on or in that comes with their layout: background."""
     pieces = list(scene_laid(stock, subject, pose, box_of).around)
-    on, seed = scenes_entry(stock.recipe).on, stock.recipe.seed
+    on, seed = scenes_entry(stock.recipe).surface, stock.recipe.seed
     if isinstance(on, SurfaceEntry):
         pieces.append(Piece("plain_table", (on.size[0], on.height, on.size[1]), IDENTITY))
     return tuple(
@@ -179,7 +179,7 @@ def _spec(piece: Piece, seed: int, subject: str) -> ModelSpec:
 
 def check_surface(recipe: Recipe) -> None:
     """Raise RecipeError where models are to stand on a surface that the place does not have."""
-    on, place = scenes_entry(recipe).on, recipe.scene.place
+    on, place = scenes_entry(recipe).surface, recipe.scene.place
     if isinstance(on, str):
         names = () if place is None else draw_names(place.draw, "scene-000000", "")
         _named(on, place_surfaces(recipe, place, names))
@@ -187,7 +187,7 @@ def check_surface(recipe: Recipe) -> None:
 
 def surface(stock: Stock, subject: str, pose: str | None) -> Surface | None:
     """What the models of a scene stand on, world axes; None for the floor. Raises RecipeError for one that is not there."""
-    on = scenes_entry(stock.recipe).on
+    on = scenes_entry(stock.recipe).surface
     if on is None:
         return None
     if isinstance(on, SurfaceEntry):
@@ -199,10 +199,10 @@ def _named(name: str, found: Sequence[Surface]) -> Surface:
     names = {one.name: one for one in found}
     if not names:
         raise RecipeError(
-            f"scenes.on: expected a scene.place that has surfaces, or {{size: [1.2, 0.8], height: 0.75}}; found {name!r}"
+            f"scenes.surface: expected a scene.place that has surfaces, or {{size: [1.2, 0.8], height: 0.75}}; found {name!r}"
         )
     if name not in names:
-        raise RecipeError(f"scenes.on: {one_of(name, tuple(names))}")
+        raise RecipeError(f"scenes.surface: {one_of(name, tuple(names))}")
     return names[name]
 
 

@@ -1,0 +1,44 @@
+"""The recipes of scenes worth learning from make data sets that pass, small ones of each."""
+
+import pytest
+
+from small import ROOT
+from viewsphere import Recipe, generate
+from viewsphere.check import check
+from viewsphere.store import Dataset
+
+SCENES = {"tabletop_fall": 6, "bin_picking": 10, "flying_things": 6}
+
+
+def changed(name, **more):
+    return Recipe.load(ROOT / "recipes" / f"{name}.yaml", {"camera.size": [96, 72], "formats": [], **more})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_a_recipe_of_scenes_makes_a_data_set_that_passes(name, tmp_path):
+    recipe = changed(name, **{"scenes.count": 1, "splits": {"by": "frame"}})
+    generate(recipe, tmp_path)
+    dataset = Dataset(tmp_path)
+    assert all(len(sample.objects) >= SCENES[name] for sample in dataset) and len(dataset) > 0
+    report = check(dataset, sample=2)
+    assert report.ok, report.findings
+
+
+@pytest.mark.slow
+def test_the_recipe_of_occluders_makes_a_data_set_that_passes(tmp_path):
+    few = {
+        "models": [{"source": "zoo:wheelie_bin", "count": 4, "category": "bin"}],
+        "viewpoints.count": 2,
+        "splits": {"by": "frame"},
+    }
+    generate(changed("occluded", **few), tmp_path)
+    dataset = Dataset(tmp_path)
+    seen = [sample.objects[0].visibility for sample in dataset]
+    assert len(seen) == 8 and sum(0.3 <= share <= 0.7 for share in seen) >= 6
+    assert check(dataset, sample=2).ok
+
+
+@pytest.mark.parametrize("name", [*SCENES, "occluded"])
+def test_a_recipe_is_planned(name):
+    assert changed(name).models
