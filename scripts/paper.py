@@ -470,6 +470,7 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_chair": partial(family, "chair"),
     "zoo_boat": partial(family, "boat", fill=0.65),
     "zoo_hair_drier": partial(family, "hair_drier", 50),
+    "zoo_person": partial(family, "person", 25),
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 
