@@ -201,7 +201,9 @@ def _hair(body: _Body, skin: Solid, looks: Looks) -> list[Solid]:
     line = hairline(head, style)
     v = scalp.vertices.copy()
     v[:, :3] += _normals(v, scalp.triangles) * (0.0015 + rise(head, style, phase)(v[:, :3]))[:, None]
-    found = [opened(Solid(v, scalp.triangles), line(v[:, :3]), 0.0, 0.003)]
+    x, y, z = ((v[:, :3] - head.center) / head.size).T
+    ear = 0.036 - np.sqrt((np.abs(x) - 0.085) ** 2 + (y - 0.018) ** 2 + np.clip(np.abs(z + 0.014) - 0.024, 0, 1) ** 2)
+    found = [opened(Solid(v, scalp.triangles), np.maximum(line(v[:, :3]), ear * head.size), 0.0, 0.003)]
     hanging = falls(head, style, phase)
     if hanging is not None:
         solid = surface(hanging, cells(head.at(-0.14, -0.1, -0.3), head.at(0.14, 0.22, 0.17), CELL))
