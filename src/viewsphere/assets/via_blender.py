@@ -1,4 +1,4 @@
-"""FBX, USD, Alembic and .blend files, and frames of animated glTF: Blender opens and evaluates them, in its own process.
+"""FBX, USD, Alembic and .blend files, and compressed glTF: Blender opens and evaluates them, in its own process.
 
 Blender reads only the model's folder unless the model says `confined: false`, writes nowhere, runs no scripts and reaches no
 network. Textures are read here, like any other model's.
@@ -39,7 +39,7 @@ NAMES = {
     "blend": "Blender",
     "fbx": "FBX",
     **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "USD"),
-    **dict.fromkeys(("glb", "gltf"), "animated and compressed glTF"),
+    **dict.fromkeys(("glb", "gltf"), "compressed glTF"),
 }
 SETUP = "set it up by viewsphere doctor --setup-blender"
 

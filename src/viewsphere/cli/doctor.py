@@ -16,6 +16,7 @@ import typer
 from viewsphere.cli.arguments import AsJson, cores
 from viewsphere.cli.terminal import print_json
 from viewsphere.errors import UserError
+from viewsphere.zoo.people import makehuman
 
 LEFT = 12
 
@@ -25,11 +26,20 @@ def doctor(
         bool,
         typer.Option("--setup-blender", help="First make a Python environment with Blender in your data folder (about 1 GB)."),
     ] = False,
+    setup_people: Annotated[
+        bool,
+        typer.Option(
+            "--setup-people",
+            help="First fetch MakeHuman's bodies (CC0; 48 MB, of which 2 stay in the cache), of which zoo:person is made then.",
+        ),
+    ] = False,
     json_: AsJson = False,
 ) -> None:
     """Say what works on this machine: processor, kernels, optional packages, Blender. What is missing is no error."""
     if setup_blender:
         _set_up_blender()
+    if setup_people:
+        makehuman.set_up(lambda line: typer.echo(line, err=True))
     found = examine()
     if json_:
         print_json(found)
@@ -48,6 +58,7 @@ def examine() -> dict[str, Any]:
         "kernels": _kernels(),
         "extras": [_extra(name, packages) for name, packages in sorted(_extras().items())],
         "blender": _blender(),
+        "people": makehuman.where(),
     }
 
 
@@ -137,6 +148,7 @@ def _lines(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for extra in found["extras"]:
         packages = ", ".join(f"{name} {is_ or 'missing'}" for name, is_ in extra["packages"].items())
         yield f"[{extra['name']}]", packages + (f": {extra['install']}" if extra["install"] else "")
+    yield "people", found["people"] or "mannequins; MakeHuman's bodies by viewsphere doctor --setup-people"
     yield "Blender", _blender_line(blender)
     for device in blender["devices"]:
         yield "", f"{device['kind']}: {device['name']}"

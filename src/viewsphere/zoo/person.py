@@ -8,14 +8,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewsphere.assets.rigged import RiggedModel
+from viewsphere.zoo.people import makehuman
 from viewsphere.zoo.people.actions import Manner, clips, still
 from viewsphere.zoo.people.build import Build
 from viewsphere.zoo.people.hair import Style
 from viewsphere.zoo.people.head import Face
+from viewsphere.zoo.people.human import human
+from viewsphere.zoo.people.makehuman import HERITAGES
 from viewsphere.zoo.people.mannequin import Looks, mannequin
 from viewsphere.zoo.people.outfit import Bottom, Outfit, Top
 from viewsphere.zoo.people.skeleton import JOINTS, PARENTS, skeleton
-from viewsphere.zoo.people.weights import weights
 from viewsphere.zoo.shapes.paint import Color
 
 HOME = "street"
@@ -42,25 +44,35 @@ SHOES: tuple[Color, ...] = ((0.08, 0.07, 0.07), (0.26, 0.16, 0.09), (0.85, 0.84,
 
 @dataclass(frozen=True)
 class Person:
-    """A person: body, looks, clothes, how it moves, and whether it walks where nothing is played (else it stands)."""
+    """A person: body, looks, clothes, how it moves, and whether it walks where nothing is played (else it stands). Bodies of
+    MakeHuman's know an `age`, from 0 (young) to 1 (old), and a `heritage`: shares of African, Asian and Caucasian.
+    """
 
     build: Build = field(default_factory=Build)
     looks: Looks = field(default_factory=Looks)
     outfit: Outfit = field(default_factory=Outfit)
     manner: Manner = field(default_factory=Manner)
     walks: bool = False
+    age: float = 0.15
+    heritage: tuple[float, float, float] = (0.3, 0.3, 0.4)
 
 
 def person(parameters: Person | None = None) -> RiggedModel:
     """The person in metres, front -Y, the ground at z = 0. Parts: head, eyes, hair, arms, top, bottom, legs, shoes."""
     p = parameters or Person()
-    s = skeleton(p.build)
-    mesh = mannequin(p.build, s, p.looks, p.outfit)
-    parts = np.full(len(mesh.vertices), "", "U8")
-    for i, name in enumerate(mesh.parts):
-        parts[mesh.triangles[mesh.triangle_part == i].reshape(-1)] = name
-    joints, shares = weights(p.build, s, mesh.vertices.astype(np.float64), parts, p.outfit.bottom == "skirt")
+    data = makehuman.data()
+    if data is None:
+        s = skeleton(p.build)
+        mesh, joints, shares = mannequin(p.build, s, p.looks, p.outfit)
+    else:
+        made = human(data, p.build, p.looks, p.outfit, p.age, dict(zip(HERITAGES, p.heritage, strict=True)))
+        mesh, s, joints, shares = made.mesh, made.skeleton, made.joints, made.weights
     return RiggedModel(mesh, JOINTS, PARENTS, s.places, joints, shares, still(s, p.manner, p.walks), clips(s, p.manner))
+
+
+def made_of() -> str:
+    """A digest of what people are made of beside this package's sources: MakeHuman's data, where they were set up."""
+    return makehuman.digest()
 
 
 def person_random(rng: np.random.Generator) -> RiggedModel:
@@ -84,7 +96,14 @@ def draw(rng: np.random.Generator) -> Person:
         lean=float(rng.uniform(-1.5, 3.0)),
         phase=float(rng.random()),
     )
-    return Person(build, looks, outfit, manner, bool(rng.random() < 0.5))
+    return Person(build, looks, outfit, manner, bool(rng.random() < 0.5), float(rng.beta(1.2, 2.5)), _heritage(rng, looks))
+
+
+def _heritage(rng: np.random.Generator, looks: Looks) -> tuple[float, float, float]:
+    """Shares of shapes that suit a skin."""
+    fair = (sum(looks.skin) - 0.5) / 1.9
+    african, asian, caucasian = rng.dirichlet((0.2 + 1.5 * max(0.6 - fair, 0), 0.7, 0.2 + 1.2 * fair)).tolist()
+    return african, asian, caucasian
 
 
 def _looks(rng: np.random.Generator, is_man: bool) -> Looks:

@@ -25,43 +25,53 @@ THICK = {
 }
 
 
+CELL = 0.0092
+"""Metres of a quad of hair."""
+
+
 def hair(head: Head, style: Style, phase: float) -> Solid | None:
     """A head's hair; None for the bald."""
     if style == "bald":
         return None
-    s = head.size
-    thick = THICK[style] * s
-    line = hairline(head, style)
+    s, line = head.size, hairline(head, style)
+    field, low = grown(head.skull(), rise(head, style, phase)), -0.16
+    hanging = falls(head, style, phase)
+    if hanging is not None:
+        field, low = joined(0.024 * s, field, hanging), {"bob": -0.13, "long": -0.25}.get(style, -0.17)
+    solid = surface(field, cells(head.at(-0.14, -0.15, low - 0.04), head.at(0.14, 0.2, 0.17), CELL))
+    return opened(solid, line(solid.vertices), 0.0, 0.003)
+
+
+def rise(head: Head, style: Style, phase: float) -> Field:
+    """How high hair stands upon the skull, metres."""
+    s, line = head.size, hairline(head, style)
 
     def height(p: Float) -> Float:
         near = np.clip(0.25 - line(p) / (0.026 * s), 0.12, 1)  # hair is thin where it begins to grow
-        return near * (thick * _lift(head, p, style) + _strands(head, p, style, phase) * s)
+        return near * s * (THICK[style] * _lift(head, p, style) + _strands(head, p, style, phase))
 
-    field = grown(head.skull(), height)
-    low = -0.16
+    return height
+
+
+def falls(head: Head, style: Style, phase: float) -> Field | None:
+    """What of the hair hangs down or is bound; None for hair that does neither."""
+    s = head.size
+
+    def with_locks(field: Field) -> Field:
+        return grown(field, lambda p: _strands(head, p, style, phase) * s)
+
     if style in ("bob", "long"):
-        low = -0.13 if style == "bob" else -0.25
-        wide = 0.068 if style == "bob" else 0.062
-        fall = joined(
-            0.03 * s,
-            mirror(limb(head.at(0.050, 0.040, 0.02), head.at(wide, 0.045, low + 0.035), ((0, 0.035 * s), (1, 0.030 * s)))),
-            limb(head.at(0, 0.070, 0.02), head.at(0, 0.075, low + 0.035), ((0, 0.042 * s), (1, 0.040 * s))),
-        )
-        field = joined(0.03 * s, field, grown(fall, lambda p: _strands(head, p, style, phase) * s))
+        low, wide = (-0.13, 0.068) if style == "bob" else (-0.25, 0.062)
+        sides = limb(head.at(0.050, 0.040, 0.02), head.at(wide, 0.045, low + 0.035), ((0, 0.035 * s), (1, 0.030 * s)))
+        back = limb(head.at(0, 0.070, 0.02), head.at(0, 0.075, low + 0.035), ((0, 0.042 * s), (1, 0.040 * s)))
+        return with_locks(joined(0.03 * s, mirror(sides), back))
     if style == "ponytail":
-        tail = limb(
-            head.at(0, 0.105, 0.050),
-            head.at(0, 0.150, -0.110),
-            ((0, 0.017 * s), (0.4, 0.026 * s), (1, 0.012 * s)),
-            ((0, 0), (0.4, 0.02 * s), (1, 0)),
-        )
-        field, low = joined(0.012 * s, field, grown(tail, lambda p: _strands(head, p, style, phase) * s)), -0.17
+        radii = ((0, 0.017 * s), (0.4, 0.026 * s), (1, 0.012 * s))
+        bent = ((0, 0), (0.4, 0.02 * s), (1, 0))
+        return with_locks(limb(head.at(0, 0.105, 0.050), head.at(0, 0.150, -0.110), radii, bent))
     if style == "bun":
-        field = joined(
-            0.008 * s, field, grown(ball(head.at(0, 0.098, 0.085), 0.034 * s), lambda p: _strands(head, p, style, phase) * s)
-        )
-    solid = surface(field, cells(head.at(-0.14, -0.15, low - 0.04), head.at(0.14, 0.2, 0.17), 0.0092))
-    return opened(solid, line(solid.vertices), 0.0, 0.003)
+        return with_locks(ball(head.at(0, 0.098, 0.085), 0.034 * s))
+    return None
 
 
 def hairline(head: Head, style: Style) -> Field:

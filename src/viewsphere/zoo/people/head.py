@@ -99,9 +99,9 @@ class Head:
     def _ball(self, center: tuple[float, float, float], radii: tuple[float, float, float]) -> Field:
         return ball(self.at(*center), self.size * np.array(radii))
 
-    def eyes(self) -> tuple[Solid, Solid, Solid]:
-        """White, iris and pupil of both eyes, which look ahead."""
-        r = 0.0125 * self.size
+    def eyes(self, at: Float | None = None, radius: float | None = None) -> tuple[Solid, Solid, Solid]:
+        """White, iris and pupil of both eyes, which look ahead: the left one `at` a place, so large; by default its own."""
+        r, middle = radius or 0.0125 * self.size, self.eye if at is None else at
         out = list[Solid]()
         for k, reach in enumerate(np.radians((180.0, 28.0, 11.0))):
             angle = np.linspace(reach, 0, 13 if k == 0 else 4)
@@ -110,7 +110,7 @@ class Head:
             profile = np.concatenate([[(0.0, profile[0, 1])], profile])  # a flat back closes it
             profile[-1, 0] = 0.0
             one = turned(lathe(profile, 18), 0, np.pi / 2)
-            out.append(join(*(moved(one, self.eye * (side, 1, 1)) for side in (1, -1))))
+            out.append(join(*(moved(one, middle * (side, 1, 1)) for side in (1, -1))))
         white, iris, pupil = out
         return white, iris, pupil
 

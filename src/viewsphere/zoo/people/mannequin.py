@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.zoo.people import flesh
@@ -14,6 +16,7 @@ from viewsphere.zoo.people.hair import Style, hair
 from viewsphere.zoo.people.head import Face, Head, head_of, neck
 from viewsphere.zoo.people.outfit import Outfit, Tailor
 from viewsphere.zoo.people.skeleton import Skeleton
+from viewsphere.zoo.people.weights import weights
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, linear
 from viewsphere.zoo.shapes.solids import Float, Solid, both_sides
@@ -31,33 +34,56 @@ class Looks:
     fold: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def mannequin(b: Build, s: Skeleton, looks: Looks, outfit: Outfit) -> Mesh:
-    """The surface in the bind pose, metres, front -Y, up +Z. Parts: head, hair, eyes, arms, legs, top, bottom, shoes."""
+def mannequin(b: Build, s: Skeleton, looks: Looks, outfit: Outfit) -> tuple[Mesh, NDArray[np.int64], Float]:
+    """The surface in the bind pose, metres, front -Y, up +Z, the joints (V, 4) of its vertices and their weights. Parts: head,
+    hair, eyes, arms, legs, top, bottom, shoes.
+    """
     head = head_of(b, s, looks.face)
     tailor = Tailor(b, s, head, outfit, np.array(looks.fold))
-    skin = Material("skin", linear(looks.skin), roughness=0.55, specular=0.6)
-    cloth = Material("top", linear(outfit.top_color), roughness=0.85)
-    trousers = Material("bottom", linear(outfit.bottom_color), roughness=0.85)
+    paint = materials(looks, outfit)
     white, iris, pupil = head.eyes()
     upper, sole = tailor.shoes()
     pieces = [
-        Piece("head", skin, _head(b, s, head)),
-        Piece("eyes", Material("white", linear((0.90, 0.88, 0.86)), roughness=0.25), white),
-        Piece("eyes", Material("iris", linear(looks.eyes), roughness=0.2), iris),
-        Piece("eyes", Material("pupil", (0.004, 0.004, 0.004, 1.0), roughness=0.1), pupil),
-        Piece("arms", skin, _arms(b, s, outfit)),
-        Piece("top", cloth, tailor.top()),
-        Piece("bottom", trousers, tailor.bottom()),
-        Piece("shoes", Material("shoe", linear(outfit.shoe_color), roughness=0.6), upper),
-        Piece("shoes", Material("sole", linear(outfit.sole_color), roughness=0.8), sole),
+        Piece("head", paint["skin"], _head(b, s, head)),
+        *(Piece("eyes", paint[name], one) for name, one in (("white", white), ("iris", iris), ("pupil", pupil))),
+        Piece("arms", paint["skin"], _arms(b, s, outfit)),
+        Piece("top", paint["top"], tailor.top()),
+        Piece("bottom", paint["bottom"], tailor.bottom()),
+        Piece("shoes", paint["shoe"], upper),
+        Piece("shoes", paint["sole"], sole),
     ]
     if outfit.leg < 1.9:
-        pieces.append(Piece("legs", skin, _legs(b, s, outfit)))
+        pieces.append(Piece("legs", paint["skin"], _legs(b, s, outfit)))
     locks = hair(head, looks.hair, looks.fold[0])
     if locks is not None:
-        pieces.append(Piece("hair", Material("hair", linear(looks.hair_color), roughness=0.6), locks))
+        pieces.append(Piece("hair", paint["hair"], locks))
+    mesh, parts = dressed(pieces, head, looks)
+    return mesh, *weights(b, s, mesh.vertices.astype(np.float64), parts, outfit.bottom == "skirt")
+
+
+def materials(looks: Looks, outfit: Outfit) -> dict[str, Material]:
+    """What a person is made of, by name."""
+    found = (
+        Material("skin", linear(looks.skin), roughness=0.55, specular=0.6),
+        Material("white", linear((0.90, 0.88, 0.86)), roughness=0.25),
+        Material("iris", linear(looks.eyes), roughness=0.2),
+        Material("pupil", (0.004, 0.004, 0.004, 1.0), roughness=0.1),
+        Material("hair", linear(looks.hair_color), roughness=0.6),
+        Material("top", linear(outfit.top_color), roughness=0.85),
+        Material("bottom", linear(outfit.bottom_color), roughness=0.85),
+        Material("shoe", linear(outfit.shoe_color), roughness=0.6),
+        Material("sole", linear(outfit.sole_color), roughness=0.8),
+    )
+    return {material.name: material for material in found}
+
+
+def dressed(pieces: Sequence[Piece], head: Head, looks: Looks) -> tuple[Mesh, NDArray[np.str_]]:
+    """The pieces as one mesh, with tints on the skin, and the name of each vertex's part."""
     mesh = assemble(pieces, crease_deg=50.0)
-    return replace(mesh, colors=_tints(mesh, head, looks))
+    parts = np.full(len(mesh.vertices), "", "U8")
+    for i, name in enumerate(mesh.parts):
+        parts[mesh.triangles[mesh.triangle_part == i].reshape(-1)] = name
+    return replace(mesh, colors=_tints(mesh, head, looks)), parts
 
 
 def _head(b: Build, s: Skeleton, head: Head) -> Solid:

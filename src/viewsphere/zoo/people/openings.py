@@ -1,4 +1,7 @@
-"""Garments' ends: a closed surface cut along a line, its edge turned inwards: it is closed again, and looks open."""
+"""Garments' ends: a closed surface cut along a line, its edge turned inwards: it is closed again, and looks open.
+
+Vertices may have more columns than their places: what is known of them, and goes over from one to the next.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +25,10 @@ def opened(solid: Solid, level: Float, depth: float, thick: float) -> Solid:
 
 def welded(solid: Solid) -> Solid:
     """The solid with vertices of one place made one."""
-    places, index = np.unique(np.round(solid.vertices, 7), axis=0, return_inverse=True)
+    _, first, index = np.unique(np.round(solid.vertices[:, :3], 7), axis=0, return_index=True, return_inverse=True)
     triangles = index.reshape(-1)[solid.triangles]
     a, b, c = triangles.T
-    return Solid(places, triangles[(a != b) & (b != c) & (c != a)])
+    return Solid(solid.vertices[first], triangles[(a != b) & (b != c) & (c != a)])
 
 
 def rings(solid: Solid) -> list[NDArray[np.int64]]:
@@ -49,7 +52,8 @@ def rings(solid: Solid) -> list[NDArray[np.int64]]:
 
 def _hem(solid: Solid, ring: NDArray[np.int64], depth: float, thick: float) -> Solid:
     """From an open edge inwards by `thick`, back into the garment by `depth`, and a cap."""
-    edge = solid.vertices[ring]
+    more = solid.vertices[ring, 3:]
+    edge = solid.vertices[ring, :3]
     middle = edge.mean(axis=0)
     back = _inside(solid, ring)
     out = edge - middle
@@ -62,7 +66,9 @@ def _hem(solid: Solid, ring: NDArray[np.int64], depth: float, thick: float) -> S
     j = (i + 1) % n
     walls = [np.stack(t, axis=1) for k in (0, n) for t in ((j + k, i + k, i + k + n), (j + k, i + k + n, j + k + n))]
     cap = np.stack([j + 2 * n, i + 2 * n, np.full(n, 3 * n)], axis=1)
-    return Solid(np.concatenate([edge, inner, deep, deep.mean(axis=0)[None]]), np.concatenate([*walls, cap]))
+    places = np.concatenate([edge, inner, deep, deep.mean(axis=0)[None]])
+    known = np.concatenate([more, more, more, more.mean(axis=0)[None]])
+    return Solid(np.concatenate([places, known], axis=1), np.concatenate([*walls, cap]))
 
 
 def _inside(solid: Solid, ring: NDArray[np.int64]) -> Float:
@@ -70,7 +76,7 @@ def _inside(solid: Solid, ring: NDArray[np.int64]) -> Float:
     on = np.isin(solid.triangles, ring)
     one = solid.triangles[on.any(axis=1) & ~on.all(axis=1)]
     rest = np.setdiff1d(np.unique(one), ring)
-    edge = solid.vertices[ring]
+    edge = solid.vertices[ring, :3]
     area = np.cross(edge - edge.mean(axis=0), np.roll(edge, -1, axis=0) - edge.mean(axis=0)).sum(axis=0)
     area = area / np.sqrt((area * area).sum())
-    return area if float(((solid.vertices[rest] - edge.mean(axis=0)) * area).sum()) > 0 else -area
+    return area if float(((solid.vertices[rest, :3] - edge.mean(axis=0)) * area).sum()) > 0 else -area

@@ -100,7 +100,7 @@ class Tailor:
         sleeve = flesh.arm(b, s, 0.004 if o.sleeve < 1.5 else 0.003)
         thighs = mirror(flesh.leg(b, s, self._ease + 0.004))
         body = joined(0.028 * h, joined(0.02 * h, body, thighs), mirror(sleeve))
-        cloth = grown(body, lambda p: o.loose + self._folds(p) + 0.012 * np.clip((0.58 * h - p[:, 2]) / (0.07 * h), 0, 1))
+        cloth = grown(body, lambda p: o.loose + self.folds(p) + 0.012 * np.clip((0.58 * h - p[:, 2]) / (0.07 * h), 0, 1))
         if o.top == "jacket":
             collar = limb(
                 s["Neck"] + (0, 0.006 * h, -0.02 * h), s["Neck"] + (0, -0.004 * h, 0.024 * h), ((0, 0.052 * h), (1, 0.042 * h))
@@ -148,14 +148,16 @@ class Tailor:
         hips = grown(trunk(waist), 0.003)
         hem = 0.035 * h if o.bottom == "trousers" else 0.0
         legs = mirror(flesh.leg(b, s, self._ease, hem))
-        cloth = grown(joined(0.020 * h, hips, legs), lambda p: 0.003 + 0.8 * self._folds(p))
+        cloth = grown(joined(0.020 * h, hips, legs), lambda p: 0.003 + 0.8 * self.folds(p))
         wide = float(s["L_Hip"][0]) + 0.10 * h
         solid = surface(cloth, (steps(-wide, wide, CELL), steps(-0.16 * h, 0.16 * h, CELL), steps(-0.03, 0.66 * h, 0.021)))
-        end = self._end_of_leg()
+        end = self.end_of_leg
         solid = opened(solid, solid.vertices[:, 2] - 0.575 * h, 0.0, 0.002)
         return opened(solid, end - solid.vertices[:, 2], 0.03, 0.003)
 
-    def _end_of_leg(self) -> float:
+    @property
+    def end_of_leg(self) -> float:
+        """Height at which the legs of the bottom, or its skirt, end, metres."""
         s, t = self.skeleton, self.outfit.leg
         hip, knee, ankle = (float(s[name][2]) for name in ("L_Hip", "L_Knee", "L_Ankle"))
         return hip + t * (knee - hip) if t <= 1 else knee + (t - 1) * (ankle - knee) - 0.012
@@ -163,7 +165,7 @@ class Tailor:
     def _skirt(self, waist: Float) -> Solid:
         h = self.build.height
         widest = waist[np.argmax(waist[:, 1])]
-        end = self._end_of_leg()
+        end = self.end_of_leg
         hip = waist[waist[:, 0] >= widest[0]].copy()
         low = widest.copy()
         low[0], low[1:4] = end - 0.03, widest[1:4] * (1.16, 1.55, 1.32)
@@ -199,7 +201,7 @@ class Tailor:
         low, high = cut(solid, solid.vertices[:, 2] - rim)
         return both_sides(high), both_sides(low)
 
-    def _folds(self, p: Float) -> Float:
+    def folds(self, p: Float) -> Float:
         """Folds of cloth, metres: across the belly, and where elbows and knees bend."""
         s, h = self.skeleton, self.build.height
         a, b, c = self.fold.tolist()
