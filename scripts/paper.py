@@ -502,7 +502,6 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_chair": partial(family, "chair"),
     "zoo_boat": partial(family, "boat", fill=0.65),
     "zoo_hair_drier": partial(family, "hair_drier", 50),
-<<<<<<< HEAD
     **{f"zoo_{name}": partial(family, name, width=1200, quality=68) for name in FURNITURE},
     **{f"zoo_{name}": partial(family, name, elevation=25, width=940) for name in HOUSEHOLD},
     "zoo_bus": partial(family, "bus", 40, width=960),
@@ -514,9 +513,7 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_backpack": partial(family, "backpack", 310, width=900, elevation=20),
     "zoo_shop": partial(family, "shop", 30, width=1000),
     "zoo_fountain": partial(family, "fountain", 20, width=900, elevation=22),
-=======
     "zoo_person": partial(family, "person", 25),
->>>>>>> person
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 
