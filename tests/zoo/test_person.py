@@ -263,3 +263,17 @@ def test_a_store_holds_the_mesh_that_was_drawn(walked):
     spec = spec_of(0, source=str(walked.path(info.glb)))
     seen = load_normalised(spec)
     assert len(seen.triangles) > 20_000 and step.body_parts == SMPL
+
+
+def test_an_export_tells_the_same_joints(walked):
+    (file,) = (walked.root / "coco" / "annotations").glob("*.json")
+    told = {one["image_id"]: one for one in json.loads(file.read_text())["annotations"]}
+    assert len(told) == len(walked)
+    for sample, one in zip(walked, (told[i] for i in sorted(told)), strict=True):
+        pixels = np.array(one["keypoints"]).reshape(-1, 3)
+        seen = pixels[:, 2] > 0
+        camera, places = sample.camera, np.asarray(sample.objects[0].keypoints3d_camera)
+        found = places @ camera.K.T
+        own = found[:, :2] / found[:, 2:] - 0.5  # in COCO a pixel's centre is at whole numbers
+        np.testing.assert_allclose(pixels[seen, :2], own[seen], atol=0.02)
+        assert seen.sum() >= 20

@@ -103,7 +103,7 @@ def describe(source: Path | ModelSpec, build: Build | None = None) -> ModelRepor
         sidecar=Path(spec.source).name + ENDING if is_file else "",
         animation=animation,
         warnings=mesh.warnings,
-        suggestions=(*_suggestions(spec, facts, (width, height, length)), *problems),
+        suggestions=(*(_suggestions(spec, facts, (width, height, length)) if is_file else ()), *problems),
     )
 
 

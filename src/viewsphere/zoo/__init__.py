@@ -90,8 +90,7 @@ def clips_of(family: str) -> tuple[str, ...]:
 def file_of(spec: ModelSpec) -> Path | None:
     """The GLB file of a model of a family that moves, made unless the cache has it; None for all others.
 
-    Raises UserError for an unknown family, and OSError where neither the cache nor the system's folder for such files can be
-    written.
+    Raises UserError for an unknown family, and OSError where the cache cannot be written.
     """
     import numpy as np
 

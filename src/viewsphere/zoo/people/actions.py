@@ -243,7 +243,7 @@ class _Foot:
         )
         middle = 0.42 * self.g.contact
         along = self.g.speed * self.g.seconds * (phase - middle)
-        across = hip[0] * (0.70 if self.g.contact > 0.5 else 0.42) - rest[0]
+        across = hip[0] * (0.85 if self.g.contact > 0.5 else 0.5) - rest[0]
         return pivot + turned + (across, along, 0.0)
 
 
