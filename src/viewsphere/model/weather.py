@@ -32,9 +32,7 @@ class Fog(Frozen):
     height: Length | None = Field(
         default=None, description="metres up to which it is e times thinner: ground fog; by default it has no end"
     )
-    color: Light = Field(
-        default=(0.8, 0.8, 0.8), description="radiance of the fog itself: linear [r, g, b]; by default what sun and sky make it"
-    )
+    color: Light = Field(default=(0.8, 0.8, 0.8), description="radiance of the fog itself: linear [r, g, b]")
 
     @property
     def extinction(self) -> float:
@@ -48,7 +46,7 @@ class Falling(Frozen):
     rate: Annotated[float, Field(strict=True, gt=0, le=200)] = Field(default=10.0, description="millimetres of water an hour")
     wind: tuple[Speed, Speed] = Field(default=(0.0, 0.0), description="[x, y] in metres a second, by which it is carried")
     exposure: Exposed = Field(default=0.01, description="seconds for which a picture is exposed to it: longer streaks")
-    color: Light = Field(default=(0.8, 0.8, 0.8), description="radiance of what falls: linear [r, g, b]; by default the sky's")
+    color: Light = Field(default=(0.8, 0.8, 0.8), description="radiance of what falls: linear [r, g, b]")
     seed: int = Field(default=0, ge=0, description="of where each drop or flake is")
 
 

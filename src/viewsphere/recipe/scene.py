@@ -23,6 +23,7 @@ from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, shown, told_of
 from viewsphere.model.numbers import Count, Number, Positive
+from viewsphere.model.scene import WEATHER
 from viewsphere.recipe.blend import BlendField, VariantEntry
 from viewsphere.recipe.draws import Drawn, alternatives, is_random
 from viewsphere.recipe.finish import (
@@ -352,7 +353,7 @@ class SceneEntry(Frozen):
     @property
     def is_new_each_frame(self) -> bool:
         """Whether anything that frames of one shot must share is drawn anew for every frame."""
-        lit = (self.sun, self.sky, self.lights, self.ground, self.materials)
+        lit = (self.sun, self.sky, self.lights, self.ground, self.materials, *(getattr(self, name) for name in WEATHER))
         drawn = is_random(lit) or self._has_folder or self._has_grain
         return self.is_moved_each_frame or (self.draw == "per_frame" and drawn)
 

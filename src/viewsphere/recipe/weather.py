@@ -6,9 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at
 from viewsphere.model.numbers import Portion
-from viewsphere.model.weather import Fog, Lamps, Rain, Snow, Wet
+from viewsphere.model.weather import Fog, Lamps, Light, Rain, Snow, Wet
 from viewsphere.recipe.draws import Drawn, span
 from viewsphere.recipe.entries import entry_of
 from viewsphere.recipe.values import OrShort, shape_of, switch
@@ -17,20 +18,29 @@ HEAVY = {"rain": 7.6, "snow": 2.5}
 """Millimetres of water an hour from which on meteorologists call rain, and snow, heavy."""
 
 
-class FogEntry(entry_of(Fog, optional=("color",))):
+class FogEntry(entry_of(Fog)):
     """Air that scatters light."""
 
+    color: Drawn[Light] | None = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        default=None, description="radiance of the fog itself: linear [r, g, b]; by default what sun and sky make it"
+    )
 
-class RainEntry(entry_of(Rain, without=("seed",), optional=("color",))):
+
+class _FallingEntry(Frozen):
+    """What rain and snow have in common besides."""
+
+    color: Drawn[Light] | None = Field(
+        default=None, description="radiance of what falls: linear [r, g, b]; by default the sky's"
+    )
+    clouds: Drawn[Portion] = Field(default=1.0, description="share of the sky that it covers: 1 hides the sun")
+
+
+class RainEntry(entry_of(Rain, without=("seed",)), _FallingEntry):  # pyright: ignore[reportIncompatibleVariableOverride]
     """Rain that falls, under a sky that it covers, onto what it wets."""
 
-    clouds: Drawn[Portion] = Field(default=1.0, description="share of the sky that it covers: 1 hides the sun")
 
-
-class SnowEntry(entry_of(Snow, without=("seed",), optional=("color",))):
+class SnowEntry(entry_of(Snow, without=("seed",)), _FallingEntry):  # pyright: ignore[reportIncompatibleVariableOverride]
     """Snow that falls, under a sky that it covers."""
-
-    clouds: Drawn[Portion] = Field(default=1.0, description="share of the sky that it covers: 1 hides the sun")
 
 
 class WetEntry(entry_of(Wet, without=("seed",))):

@@ -64,7 +64,7 @@ def _living_room(f: Furnishing) -> None:
         low = f.before(sofa, "table", _style("coffee"), gap=0.38, turn=0.0)
         if low is not None:
             f.scattered(low, "top", ("mug", "book", "bowl", "plate", "bottle"), int(f.rng.integers(1, 5)))
-        facing = [across(sofa.turn_deg)]
+        facing = (across(sofa.turn_deg),)
         if f.rng.random() < 0.5 or f.against("television", _style("console"), facing, middle=True) is None:
             board = f.against("cabinet", _style("sideboard", height=0.85), facing, middle=True)
             if board is not None:
