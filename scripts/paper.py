@@ -459,6 +459,27 @@ def neighbourhood() -> None:
     save("zoo_neighbourhood.jpg", grid([s.rgb for s in samples], 3, 1276))
 
 
+def place(name: str, model: str, distance: float, elevation: float, fov: float, exposure: float) -> None:
+    """A model in six draws of a place."""
+    tiles: list[Any] = []
+    for seed in range(6):
+        made_of = Recipe(
+            name=name,
+            seed=seed,
+            models=[{"source": model}],
+            viewpoints={"azimuth": 40 + 60 * seed, "elevation": elevation, "distance": distance},
+            camera={"size": [480, 320], "fov_deg": fov},
+            scene={
+                "place": f"zoo:{name}",
+                "sky": {"daylight": {"turbidity": 2.5}},
+                "sun": {"azimuth_deg": 60, "elevation_deg": 38},
+                "view": {"exposure": exposure, "transform": "filmic"},
+            },
+        )
+        tiles.append(next(iter(render(made_of))).rgb)
+    save(f"zoo_{name}.jpg", grid(tiles, 3, 1440), 80)
+
+
 def engines() -> None:
     """Five chairs by the raster engine and by Cycles, whose Python VIEWSPHERE_BLENDER_PYTHON names; one row an engine."""
     picks = [Pick(0, 30, 20, 4), Pick(1, 60, 10, 4), Pick(2, 140, 30, 4), Pick(3, 20, 40, 4), Pick(4, 110, 20, 4)]
@@ -514,6 +535,9 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_shop": partial(family, "shop", 30, width=1000),
     "zoo_fountain": partial(family, "fountain", 20, width=900, elevation=22),
     "zoo_person": partial(family, "person", 25),
+    "zoo_town": partial(place, "town", "zoo:car", 11.0, 11.0, 60.0, 0.3),
+    "zoo_room": partial(place, "room", "zoo:chair", 1.45, 14.0, 90.0, 1.0),
+    "zoo_table_top": partial(place, "table_top", "zoo:mug", 0.55, 28.0, 65.0, 1.0),
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 

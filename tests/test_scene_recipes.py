@@ -9,6 +9,8 @@ from viewsphere.store import Dataset
 
 SCENES = {"tabletop_fall": 6, "bin_picking": 10, "flying_things": 6}
 
+TRAFFIC = [{"source": "zoo:car", "count": 4, "motion": {"kind": "path", "lane": "any", "speed": [5, 9], "offset": [0, 130]}}]
+
 
 def changed(name, **more):
     return Recipe.load(ROOT / "recipes" / f"{name}.yaml", {"camera.size": [96, 72], "formats": [], **more})
@@ -39,6 +41,22 @@ def test_the_recipe_of_occluders_makes_a_data_set_that_passes(tmp_path):
     assert check(dataset, sample=2).ok
 
 
-@pytest.mark.parametrize("name", [*SCENES, "occluded"])
+@pytest.mark.slow
+def test_the_recipe_of_rooms_makes_a_data_set_that_passes(tmp_path):
+    generate(changed("rooms", **{"scenes.count": 1, "viewpoints.count": 2, "splits": {"by": "frame"}}), tmp_path)
+    dataset = Dataset(tmp_path)
+    assert len(dataset) == 2 and all(3 <= len(sample.objects) <= 8 for sample in dataset)
+    assert check(dataset, sample=2).ok
+
+
+@pytest.mark.slow
+def test_the_recipe_of_a_town_makes_a_data_set_that_passes(tmp_path):
+    generate(changed("town", **{"time.frames": 2, "scenes.objects": 4, "models": TRAFFIC}), tmp_path)
+    dataset = Dataset(tmp_path)
+    assert len(dataset) == 2
+    assert check(dataset, sample=1).ok
+
+
+@pytest.mark.parametrize("name", [*SCENES, "occluded", "rooms", "town"])
 def test_a_recipe_is_planned(name):
     assert changed(name).models
