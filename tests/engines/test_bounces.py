@@ -259,6 +259,7 @@ def test_auto_is_on_indoors_only():
     assert is_bounced(stage_of(small, scene, room(0.5), bounces="auto"))
     assert not is_bounced(stage_of(small, scene, room(0.5), bounces="off"))
     assert not is_bounced(stage_of(small, scene, street, bounces="auto"))
+    assert not is_bounced(stage_of(small, scene, mesh_of(box((-4, -4, -1), (4, 4, 0)), matt(0.5)), bounces="auto"))
     assert not is_bounced(stage_of(small, scene, bounces="auto"))
     assert is_bounced(stage_of(small, scene, street))
 

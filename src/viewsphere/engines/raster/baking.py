@@ -147,7 +147,8 @@ def _casters(packed: Packed, has_ground: bool) -> Casters:
     arranged, (corner, unit) = packed.arranged, packed.lengths
     geometry, origin, targets = arranged.geometry, np.array(corner), arranged.targets
     low, high = geometry.extent()
-    reach = float(np.abs(np.stack([low, high]) - origin).max()) / unit
+    # A light from afar looks along any direction: its widest map holds a ball around all corners.
+    reach = float(np.linalg.norm(np.abs(np.stack([low, high]) - origin).max(axis=0))) / unit
     ground_z = geometry.ground_z
     if arranged.has_scenery:
         low, high = geometry.extent(targets)

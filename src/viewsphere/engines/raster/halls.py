@@ -77,7 +77,7 @@ class _Roof:
 
 @lru_cache(maxsize=4)
 def _is_roofed(roof: _Roof) -> bool:
-    """Whether most places within a scenery have something right above them."""
+    """Whether most places within a scenery have the underside of something above them; within a solid thing there is none."""
     corners = roof.corners
     low, high = np.nanmin(corners, axis=(0, 1)), np.nanmax(corners, axis=(0, 1))
     # A tree of what is above is small: of a street nearly nothing is.
@@ -88,5 +88,7 @@ def _is_roofed(roof: _Roof) -> bool:
     if not len(above):
         return False
     places = np.stack([x, y, np.full_like(x, eyes)], axis=-1).reshape(-1, 3).astype(np.float32)
-    met, _ = cast(tree_of(above), places, np.array([[1e-3, 2e-3, 1]], np.float32), np.inf)
-    return bool((met >= 0).mean() >= ROOFED)
+    (met,), _ = cast(tree_of(above), places, np.array([[1e-3, 2e-3, 1]], np.float32), np.inf)
+    a, b, c = above[met[met >= 0]].transpose(1, 0, 2)
+    is_underside = np.cross(b - a, c - a)[:, 2] < 0
+    return bool(is_underside.sum() >= ROOFED * len(places))
