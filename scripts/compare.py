@@ -40,7 +40,8 @@ from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, S
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.sampling.camera import looking
-from viewsphere.surroundings.ground import ground_material, laid_with_slabs
+from viewsphere.surroundings.ground import ground_material
+from viewsphere.surroundings.slab_picture import laid_with_slabs
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 

@@ -9,6 +9,7 @@ from test_raster import BLACK, DARK, SPEC, box, camera, mesh_of, rectangle
 from shots import painted, still_shot
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import raster
+from viewsphere.engines.raster.arriving import arriving
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Scene, Sky, Sun
 from viewsphere.model.thing import Motion, Thing
@@ -141,3 +142,15 @@ def test_without_scenery_there_are_no_wide_maps():
     assert len(stage_of(BOX, [(floor(), moved(0, 0))]).baked(0).lights.views.form) > 1
     no_sun = SCENE.model_copy(update={"sun": None, "sky": Sky()})
     assert len(stage_of(BOX, [(floor(), moved(0, 0))], no_sun).baked(0).lights.views.form) == 0
+
+
+def test_no_corner_of_a_place_is_beyond_its_shadow_map():
+    """A sun that looks along a diagonal sees corners far from the middle of its map: what lies in a closed hall stays dark."""
+    hall = mesh_of(box((-8, -8, -0.2), (8, 8, 4)))
+    sun = Sun(azimuth_deg=45, elevation_deg=30, strength=3.0)
+    small = mesh_of(box((0, 0, 0), (0.3, 0.3, 0.3)))
+    baked = stage_of(small, [(hall, moved(0, 0))], Scene(sun=sun, sky=DARK)).baked(0)
+    x, y = np.meshgrid(np.linspace(-7.4, 7.4, 40), np.linspace(-7.4, 7.4, 40))
+    places = (np.stack([x, y, np.full_like(x, 0.01)], axis=-1).reshape(-1, 3) - baked.origin) / baked.unit
+    _, share = arriving(baked.lights, 0, places, 0.4 / baked.unit)
+    assert share.max() < 0.01

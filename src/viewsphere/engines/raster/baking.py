@@ -14,13 +14,15 @@ from viewsphere.assets.srgb import linear
 from viewsphere.engines._arranged import Arranged
 from viewsphere.engines._lamps import lamplight
 from viewsphere.engines.raster import kernels_paint
+from viewsphere.engines.raster.bounces import bake_bounces
 from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
+from viewsphere.engines.raster.halls import hall_of
 from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
 from viewsphere.engines.raster.lights import Casters, Extent, bake_lights
-from viewsphere.engines.raster.occlusion import bake_occlusion, with_ground_light
+from viewsphere.engines.raster.occlusion import bake_occlusion, of_ground_alone, with_ground_light
 from viewsphere.engines.raster.options import Options
 from viewsphere.engines.raster.painting import Baked
-from viewsphere.engines.raster.records import Float32, Int32, Surfaces
+from viewsphere.engines.raster.records import NO_BOUNCES, Float32, Int32, Surfaces
 from viewsphere.engines.raster.still_maps import StillMaps
 from viewsphere.engines.raster.surface import Lengths, Materials, made_of, move_surfaces, pack_materials, pack_surfaces
 from viewsphere.engines.raster.thing_occlusion import TargetShades
@@ -123,6 +125,10 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades) -
         occlusion = shades.bake(packed.arranged, casters, lengths.unit, has_ground, options.ambient_occlusion)
     else:
         occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
+    hall = hall_of(packed.arranged, casters, floor, lengths, has_ground, options.bounces)
+    bounces = NO_BOUNCES if hall is None else bake_bounces(hall, surrounding, lights)
+    if hall is not None and hall.has_map:
+        occlusion = of_ground_alone(occlusion)
     return Baked(
         geometry=geometry,
         origin=np.array(lengths.origin),
@@ -136,6 +142,7 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades) -
         kind=packed.kind,
         owner=packed.owner,
         see_through=packed.see_through,
+        bounces=bounces,
         blended=packed.blended,
     )
 
@@ -144,7 +151,8 @@ def _casters(packed: Packed, has_ground: bool) -> Casters:
     arranged, (corner, unit) = packed.arranged, packed.lengths
     geometry, origin, targets = arranged.geometry, np.array(corner), arranged.targets
     low, high = geometry.extent()
-    reach = float(np.abs(np.stack([low, high]) - origin).max()) / unit
+    # A light from afar looks along any direction: its widest map holds a ball around all corners.
+    reach = float(np.linalg.norm(np.abs(np.stack([low, high]) - origin).max(axis=0))) / unit
     ground_z = geometry.ground_z
     if arranged.has_scenery:
         low, high = geometry.extent(targets)

@@ -35,7 +35,9 @@ FACE_R, FACE_G, FACE_B, EDGE_R, EDGE_G, EDGE_B, BASE_R, BASE_G, BASE_B = range(7
 LOBE, RIM, TAKEN, THROUGH = range(79 * BLOCK, 83 * BLOCK, BLOCK)
 # 1 on scenery, else 0.
 SCENERY = 83 * BLOCK
-# Position and shading normal in the axes in which what hides the sky was baked. The last row is room for vectors that begin in
-# the row before.
+# Position and shading normal in the axes in which what hides the sky was baked.
 OX, OY, OZ, ONX, ONY, ONZ = range(84 * BLOCK, 90 * BLOCK, BLOCK)
-ROWS = 91
+# Light that things throw at the sample: radiance of a white matt surface, the share of it that replaces the sky's own light;
+# then what the nearest probes see, see `kernels_bounce`. The last row is room for vectors that begin in the row before.
+GLOW_R, GLOW_G, GLOW_B, INSIDE, PROBES = range(90 * BLOCK, 95 * BLOCK, BLOCK)
+ROWS = 94 + 48 + 1

@@ -18,9 +18,10 @@ import numpy as np
 from viewsphere.engines.raster.kernels_blend import blend
 from viewsphere.engines.raster.kernels_block import (
     ALPHA, BASE_R, BLOCK, BLUE, BOUNCE, COAT, COAT_ROUGH, CX, CY, CZ, DR, EDGE_R, ER, F0R,
-    FACE_R, GREEN, GX, GY, GZ, IB, IG, IR, LOBE, LX, LY, LZ, METAL, NX, NY, NZ, OPEN, OPENX, OPENY, RED,
+    FACE_R, GLOW_R, GREEN, GX, GY, GZ, IB, IG, INSIDE, IR, LOBE, LX, LY, LZ, METAL, NX, NY, NZ, OPEN, OPENX, OPENY, RED,
     RIM, ROUGH, SHARE, SR, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION, UNLIT, VX, VY, VZ, WIDTH,
 )  # fmt: skip
+from viewsphere.engines.raster.kernels_bounce import add_near_light, near_light
 from viewsphere.engines.raster.kernels_environment import ABOVE, BELOW, LAMPS, SCALE, TURN
 from viewsphere.kernels.lanes import clamp, cross, dot, lanewise, least, most, root, size, where
 from viewsphere.kernels.lanes import FAST
@@ -305,6 +306,14 @@ def _scatter(b):
 
 
 @lanewise
+def _scatter_bounced(b):
+    """`_scatter`, where probes know the light of the sky, too, as far as INSIDE says."""
+    for k in range(0, 3 * BLOCK, BLOCK):
+        light = b[T3 + k] * b[OPEN] * (1 - b[INSIDE]) + b[GLOW_R + k]
+        b[DR + k] = b[DR + k] + b[BASE_R + k] * light
+
+
+@lanewise
 def _shine(b):
     lobe, rim, out = b.get(LOBE, RIM, T7)
     for k in range(0, 3 * BLOCK, BLOCK):
@@ -319,8 +328,9 @@ def _shine_coat(b):
 
 
 @inner(fastmath=FAST)
-def ambient(count, surrounding, b):
-    """Add the light of the surroundings to DR to SB; the block must be weighed before. Reads OPEN and BOUNCE.
+def ambient(count, surrounding, is_bounced, b):
+    """Add the light of the surroundings to DR to SB; the block must be weighed before. Reads OPEN and BOUNCE, and where
+    `is_bounced` what `kernels_bounce.bounced` fills.
 
     Leaves in T3 to T5 the light behind a transmissive surface, and overwrites the rows of a light.
     """
@@ -335,8 +345,15 @@ def ambient(count, surrounding, b):
             _look_through(count, b)
         else:
             _mirror(count, U(CX if layer == 2 else NX), U(COAT_ROUGH if layer == 2 else ROUGH), b)
+        is_near = is_bounced and layer in (1, 2)
+        if is_near:
+            near_light(count, b)
         light_around(count, surrounding, b)
-        if layer == 0:
+        if is_near:
+            add_near_light(count, b)
+        if layer == 0 and is_bounced:
+            _scatter_bounced(count, b)
+        elif layer == 0:
             _scatter(count, b)
         elif layer == 1:
             _shine(count, b)
@@ -408,7 +425,18 @@ def _open_matte(up, b):
         b[DR + row] = b[DR + row] + b[BASE_R + row] * up.one(k) * b[OPEN]
 
 
+@lanewise
+def _open_matte_bounced(up, b):
+    for k in range(3):
+        row = k * BLOCK
+        light = up.one(k) * b[OPEN] * (1 - b[INSIDE]) + b[GLOW_R + row]
+        b[DR + row] = b[DR + row] + b[BASE_R + row] * light
+
+
 @inner
-def ambient_matte(count, surrounding, b):
+def ambient_matte(count, surrounding, is_bounced, b):
     """`ambient` for level ground that only scatters."""
-    _open_matte(count, surrounding.up, b)
+    if is_bounced:
+        _open_matte_bounced(count, surrounding.up, b)
+    else:
+        _open_matte(count, surrounding.up, b)

@@ -34,6 +34,7 @@ from viewsphere.engines.raster.kernels_block import (
     ROWS,
     SHARE,
 )  # isort: skip  # fmt: skip
+from viewsphere.engines.raster.kernels_bounce import bounced
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
 from viewsphere.engines.raster.kernels_light import (
     add_light,
@@ -170,7 +171,9 @@ def _lay_all(start, count, is_ground, slots, radiance, b):
 
 
 @njit(fastmath=FAST, _nrt=True)
-def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_ground, slots, triangle, depth, radiance):
+def shade(
+    view, surfaces, textures, floor, surrounding, lights, occlusion, bounces, is_ground, slots, triangle, depth, radiance
+):
     """Shade the samples in `slots` (N,) int32 over `radiance` (S, 4) float32, premultiplied, in place.
 
     triangle (S,) int32 and depth (S,) float32 (inverse) are what each sample shows; all slots show the ground, or none does.
@@ -179,6 +182,7 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     is_matte = is_ground and floor[4] == f4(1)
+    is_bounced = bounces.grid[0] > 0
     for start in range(0, slots.shape[0], BLOCK):
         count = min(slots.shape[0] - start, BLOCK)
         locate(view, start, count, slots, depth, b, own)
@@ -195,11 +199,13 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
         for k in range(lights.kind.shape[0]):
             arrive(count, lights, k, b)
             _take(count, is_matte, b)
+        if is_bounced:
+            bounced(count, bounces, is_ground, b)
         if is_matte:
-            ambient_matte(count, surrounding, b)
+            ambient_matte(count, surrounding, is_bounced, b)
             _finish_matte(count, b)
         else:
-            ambient(count, surrounding, b)
+            ambient(count, surrounding, is_bounced, b)
             compose(count, b)
         _lay_all(start, count, is_ground, slots, radiance, b)
 

@@ -24,6 +24,7 @@ from viewsphere.engines.raster.kernels_block import (
     ROWS,
     UNLIT,
 )  # fmt: skip
+from viewsphere.engines.raster.kernels_bounce import bounced
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
 from viewsphere.engines.raster.kernels_light import (
     UNEXPOSED,
@@ -81,7 +82,7 @@ def _lay(start, count, is_ground, slots, b, p, out):
 
 
 @inner(fastmath=FAST)
-def _light(count, is_matte, surrounding, lights, occlusion, b):
+def _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, b):
     """Add all light that arrives at the samples."""
     occlude(count, occlusion, b)
     for k in range(lights.kind.shape[0]):
@@ -90,14 +91,17 @@ def _light(count, is_matte, surrounding, lights, occlusion, b):
             add_light_matte(count, b)
         else:
             add_light(count, b)
+    is_bounced = bounces.grid[0] > 0
+    if is_bounced:
+        bounced(count, bounces, is_ground, b)
     if is_matte:
-        ambient_matte(count, surrounding, b)
+        ambient_matte(count, surrounding, is_bounced, b)
     else:
-        ambient(count, surrounding, b)
+        ambient(count, surrounding, is_bounced, b)
 
 
 @njit(fastmath=FAST, _nrt=True)
-def split(view, surfaces, textures, floor, surrounding, lights, occlusion, is_ground, slots, triangle, depth, out):
+def split(view, surfaces, textures, floor, surrounding, lights, occlusion, bounces, is_ground, slots, triangle, depth, out):
     """Lay the parts of the samples in `slots` (N,) int32 over `out` (S, 6 or 9) float32; arguments as in `shade`."""
     b, p = np.zeros(ROWS * BLOCK, np.float32), np.zeros((COLUMNS + 1) * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -115,7 +119,7 @@ def split(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
             material(count, view, surfaces, textures, b, which)
             weigh(count, surrounding.albedo, b)
         if is_lit:
-            _light(count, is_matte, surrounding, lights, occlusion, b)
+            _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, b)
         if is_matte:
             _part_matte(count, b, p)
         else:

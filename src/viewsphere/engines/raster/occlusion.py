@@ -163,6 +163,14 @@ def with_ground_light(occlusion: Occlusion, lights: Lights, ambient: float) -> O
     return occlusion._replace(floor=floor)
 
 
+def of_ground_alone(occlusion: Occlusion) -> Occlusion:
+    """The same where the targets' own light is known (`bounces`): only the ground is darkened, by all that the targets hide."""
+    frame, floor = occlusion.frame.copy(), occlusion.floor.copy()
+    frame[:, 5] = 0
+    floor[..., 0] = np.clip(1 - (1 - floor[..., 0]) / _DEEPEST, 0, 1)
+    return occlusion._replace(frame=frame, floor=floor)
+
+
 def _all_light(occlusion: Occlusion, k: int, lights: Lights, ambient: float) -> Float:
     """Share of all light that reaches the cells of map k, (n, n)."""
     cells, left, front, z, height = (float(v) for v in occlusion.floor_frame[k, :5])

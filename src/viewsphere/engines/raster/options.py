@@ -15,12 +15,14 @@ from viewsphere.model.mistakes import one_of
 @dataclass(frozen=True)
 class Options:
     """antialias: samples in an edge pixel, 1 or 4; shadow_resolution: width of the shadow maps in texels, 0 to derive it from
-    the pictures' size; ambient_occlusion: off, fast or fine.
+    the pictures' size; ambient_occlusion: off, fast or fine; bounces: whether still things throw light at one another: on,
+    off, or auto, on where a place shuts out the sky.
     """
 
     antialias: int = 4
     shadow_resolution: int = 0
     ambient_occlusion: Literal["off", "fast", "fine"] = "fast"
+    bounces: Literal["auto", "on", "off"] = "auto"
 
     def for_width(self, pixels: int) -> int:
         """Width of the shadow maps for pictures whose longer side has so many pixels: the next power of two, 1,024 to 4,096."""
@@ -49,4 +51,9 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
         occlusion = "off"
     if occlusion not in ("off", "fast", "fine"):
         raise RecipeError(f"engine.ambient_occlusion: expected off, fast or fine, found {occlusion!r}")
-    return Options(4 if antialias == 4 else 1, resolution - resolution % 16, occlusion)
+    bounces = given.get("bounces", default.bounces)
+    if isinstance(bounces, bool):  # YAML reads on and off as True and False
+        bounces = "on" if bounces else "off"
+    if bounces not in ("auto", "on", "off"):
+        raise RecipeError(f"engine.bounces: expected auto, on or off, found {bounces!r}")
+    return Options(4 if antialias == 4 else 1, resolution - resolution % 16, occlusion, bounces)

@@ -12,7 +12,7 @@ from viewsphere.engines.raster import kernels_paint, kernels_split
 from viewsphere.engines.raster.environment import Surrounding, sky_behind
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.occlusion import Occlusion
-from viewsphere.engines.raster.records import Float32, Int32, PictureRays, Surfaces, Textures
+from viewsphere.engines.raster.records import Bounces, Float32, Int32, PictureRays, Surfaces, Textures
 from viewsphere.engines.raster.samples import Layer, Marks, Samples, differs_behind, edge_samples, layers
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.imaging.air import Air
@@ -47,6 +47,7 @@ class Baked:
     surrounding: Surrounding
     lights: Lights
     occlusion: Occlusion
+    bounces: Bounces
     kind: NDArray[np.uint8]
     owner: Int32
     see_through: NDArray[np.bool_]
@@ -235,7 +236,7 @@ def _shade_some(
     if is_ground and baked.catches:
         kernels_paint.catch(view, baked.floor, *light, *seen, radiance)
         return
-    given = view, baked.surfaces, baked.textures, baked.floor, *light, is_ground, *seen
+    given = view, baked.surfaces, baked.textures, baked.floor, *light, baked.bounces, is_ground, *seen
     kernels_paint.shade(*given, radiance)
     if len(split):
         kernels_split.split(*given, split)

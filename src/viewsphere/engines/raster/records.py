@@ -62,3 +62,32 @@ class PictureRays(NamedTuple):
     pixel: np.float32
     scale: np.float32
     places: Float32 = np.zeros((0, 2), np.float32)
+
+
+class Bounces(NamedTuple):
+    """Light that things throw at one another: a volume of probes, and a map of level ground below things that stand on it.
+
+    light (cells, 48) float32: what each probe sees, columns named in `kernels_bounce`; screens (cells, 32): of the cell whose
+    first corner a probe is, for each of its eight corners, what part of the cell that corner sees: the normal's x of all
+    eight, y, z and offset of a plane, in cells from the first corner; grid (3,) int64: layers, rows and columns, 0 for no
+    volume; frame (6,): x, y, z of the first probe, cells per length, how far from a surface it is read in cells, whether there
+    is a ground; floor (n, n, 4): radiance of a white matt ground lit by things alone; floor_frame (4,): its cells per
+    length, its corner's x and y, whether there is a map.
+    """
+
+    light: Float32
+    screens: Float32
+    grid: NDArray[np.int64]
+    frame: Float32
+    floor: Float32
+    floor_frame: Float32
+
+
+NO_BOUNCES = Bounces(
+    np.zeros((1, 48), np.float32),
+    np.zeros((1, 32), np.float32),
+    np.zeros(3, np.int64),
+    np.zeros(6, np.float32),
+    np.zeros((2, 2, 4), np.float32),
+    np.zeros(4, np.float32),
+)

@@ -1,0 +1,242 @@
+"""Light that still things throw at one another, and that of the sky as far as they let it in, baked once a stage.
+
+A grid of probes around all of them casts rays; patches of what these hit exchange light with the probes until nothing changes.
+Light of lamps and sun reaches patches along rays of their own: nothing depends on what moves, or on any camera.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.raster import kernels_probes as kernels
+from viewsphere.engines.raster.environment import Surrounding
+from viewsphere.engines.raster.kernels_bounce import terms
+from viewsphere.engines.raster.kernels_environment import LAMPS
+from viewsphere.engines.raster.lights import Lights
+from viewsphere.engines.raster.patches import Patches, Rays, patches_of
+from viewsphere.engines.raster.records import NO_BOUNCES, Bounces, Float32, Int32, Surfaces, Textures
+from viewsphere.engines.raster.tracing import Tree, cast, tree_of
+
+Float = NDArray[np.float64]
+
+CELL = 0.25
+"""Metres between probes, at most, unless there would be more than `MOST`."""
+
+ALONG, MOST = 24, 40_000
+"""Probes along the longest side, at least, and of a volume, at most."""
+
+RAYS, FEW_RAYS, MANY_PROBES = 1024, 512, 16_000
+"""Of a probe, and of one of so many."""
+
+PAD = 2
+"""Cells around all things."""
+
+PUSH = 0.3
+"""Cells off its surface at which a sample reads."""
+
+PATCHES = 2.0
+"""Patches along a cell."""
+
+MAP, MAP_RAYS, BEYOND = 96, 128, 0.9
+"""Cells of the ground's map each way, rays of each, and heights of all things that it reaches beyond them."""
+
+SHADOWS = 2e-3
+"""Cells off a surface at which shadows begin."""
+
+UNCHANGED, ROUNDS = 0.004, 48
+"""The share of all light below which another bounce is not seen, and how many there are at most."""
+
+SKY_ROUGHNESS = 0.3
+"""Of a mirror that blurs the sky about as far as to the next ray."""
+
+
+@dataclass(frozen=True)
+class Hall:
+    """Things that throw light at one another, between the corners low and high (3,) in the stage's units, `unit` metres.
+
+    key: equal where all of it is, but for light; which (T,): their triangles; ground_z: the ground's height, None for none;
+    floor: see `painting.Baked`; has_map: whether they stand on the ground, and nothing else does.
+    """
+
+    key: Hashable
+    surfaces: Surfaces = field(compare=False)
+    textures: Textures = field(compare=False)
+    which: Int32 = field(compare=False)
+    low: Float = field(compare=False)
+    high: Float = field(compare=False)
+    floor: Float32 = field(compare=False)
+    unit: float
+    ground_z: float | None
+    has_map: bool
+
+
+class _Seen(NamedTuple):
+    """What depends on no light."""
+
+    bounces: Bounces
+    tree: Tree
+    directions: Float32
+    patches: Patches
+
+
+@dataclass(frozen=True)
+class _Lighting:
+    hall: Hall
+    lamps: tuple[bytes, ...]
+    sky: tuple[bytes, ...]
+    surrounding: Surrounding = field(compare=False)
+    lights: Lights = field(compare=False)
+
+
+def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounces:
+    """The light that a hall's things throw at one another. The last hall's rays are kept, and the last light."""
+    if not len(hall.which) or not (hall.high - hall.low).max() > 0:
+        return NO_BOUNCES
+    # Shadows are cast here; and what lamps give the ground near the targets comes from the ground itself.
+    lights = lights._replace(first=np.zeros_like(lights.first))
+    light = surrounding.light.copy()
+    light[LAMPS] = 0
+    surrounding = surrounding._replace(light=light)
+    lamps = tuple(values.tobytes() for values in lights if isinstance(values, np.ndarray))
+    sky = tuple(values.tobytes() for values in (surrounding.texels, surrounding.light, surrounding.up))
+    lighting = _Lighting(hall, lamps, sky, surrounding, lights)
+    return _bake.__wrapped__(lighting) if hall.key is None else _bake(lighting)
+
+
+@lru_cache(maxsize=1)
+def _bake(lighting: _Lighting) -> Bounces:
+    hall, surrounding = lighting.hall, lighting.surrounding
+    seen = _look.__wrapped__(hall) if hall.key is None else _look(hall)
+    bounces, patches, directions = seen.bounces, seen.patches, seen.directions
+    bounces = bounces._replace(light=np.zeros_like(bounces.light), floor=np.zeros_like(bounces.floor))
+    weights, off = irradiance_weights(directions), SHADOWS / float(bounces.frame[3])
+    lit = patches.lit(hall.surfaces, hall.textures, hall.floor, surrounding.albedo, seen.tree, lighting.lights, off)
+    sky = np.empty((len(directions), 3), np.float32)
+    kernels.sky_from(surrounding, directions, np.float32(SKY_ROUGHNESS), sky)
+    own = lit.emitted + lit.reflectance * lit.arrived / np.float32(math.pi)
+    places, normals, sent = patches.places, patches.normals, own
+    glow, inside = np.empty_like(own), np.empty(len(own), np.float32)
+    for _ in range(ROUNDS):
+        kernels.send(patches.ids[0], weights, sky, surrounding.below, sent, bounces.light)
+        kernels.look_up(bounces, places, normals, glow, inside)
+        before = sent
+        sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * surrounding.up)
+        if np.abs(sent - before).sum(dtype=np.float64) <= UNCHANGED * sent.sum(dtype=np.float64):
+            break
+    kernels.send(patches.ids[0], weights, sky, surrounding.below, sent, bounces.light)
+    kernels.send_sharply(patches.ids[0], directions, patches.is_ground, sent, bounces.light)
+    if hall.has_map:
+        light = np.empty((bounces.floor.shape[0] ** 2, 4), np.float32)
+        kernels.send_down(patches.ids[1], sent, light)
+        bounces.floor[:] = light.reshape(bounces.floor.shape) * _window(len(bounces.floor))[..., None].astype(np.float32)
+    return bounces
+
+
+@lru_cache(maxsize=1)
+def _look(hall: Hall) -> _Seen:
+    """Cast all rays."""
+    corners = hall.surfaces.vertices[hall.surfaces.triangles[hall.which], 11:14]
+    tree = tree_of(corners)
+    corner, cells, shape = _grid(hall)
+    points = _points(corner, cells, shape)
+    directions = _sphere(FEW_RAYS if len(points) > MANY_PROBES else RAYS)
+    met, far = cast(tree, points, directions, np.inf)
+    normals = hall.surfaces.normals[hall.which]
+    screens = np.empty((len(points), 32), np.float32)
+    kernels.screen(met, far, directions, normals, np.float32(cells), shape, screens)
+    floor, floor_frame = NO_BOUNCES.floor, NO_BOUNCES.floor_frame
+    bundles = [Rays(points, directions, _whole(hall, met), far)]
+    if hall.has_map and hall.ground_z is not None:
+        places, floor_frame = _map(hall, hall.ground_z)
+        floor, up = np.zeros((MAP, MAP, 4), np.float32), _dome(MAP_RAYS)
+        met, far = cast(tree, places, up, np.inf)
+        bundles.append(Rays(places, up, _whole(hall, met), far))
+    patches = patches_of(
+        bundles, hall.surfaces.normals, hall.surfaces.material, corner.astype(np.float32), cells * PATCHES, _ground(hall)
+    )
+    frame = np.array([*corner, cells, PUSH, hall.ground_z is not None], np.float32)
+    light = np.zeros((len(points), 48), np.float32)
+    return _Seen(Bounces(light, screens, shape, frame, floor, floor_frame), tree, directions, patches)
+
+
+def _whole(hall: Hall, met: Int32) -> Int32:
+    """Triangles of a hall as those of its surfaces."""
+    return np.where(met >= 0, hall.which[met], np.int32(-1))
+
+
+def _grid(hall: Hall) -> tuple[Float, float, NDArray[np.int64]]:
+    """Where the first probe is, cells per length, and layers, rows and columns (3,)."""
+    size = hall.high - hall.low
+    cells = max(hall.unit / CELL, ALONG / float(size.max()))
+    while np.prod(np.ceil(size * cells) + 2 * PAD + 1) > MOST:
+        cells *= 0.95
+    # Half a cell off the corner: walls of even sizes then do not run along probes.
+    shape = (np.ceil(size * cells + 0.5) + 2 * PAD + 1).astype(np.int64)
+    spare = (shape - 1) / cells - size
+    return hall.low - spare / 2, cells, shape[::-1].copy()
+
+
+def _points(corner: Float, cells: float, shape: NDArray[np.int64]) -> Float32:
+    """All probes, (N, 3)."""
+    return (corner + np.indices(tuple(shape.tolist())).reshape(3, -1).T[:, ::-1] / cells).astype(np.float32)
+
+
+def _ground(hall: Hall) -> Float32:
+    """The ground's height, the box in which it has patches, and whether there is one, for `kernels_probes.patch`."""
+    if hall.ground_z is None:
+        return np.zeros(6, np.float32)
+    beyond = 2 * float(hall.high[2] - hall.ground_z)
+    (left, front), (right, back) = hall.low[:2] - beyond, hall.high[:2] + beyond
+    return np.array([hall.ground_z, left, right, front, back, 1], np.float32)
+
+
+def _map(hall: Hall, z: float) -> tuple[Float32, Float32]:
+    """The places of the ground's map, (MAP * MAP, 3), and its `Bounces.floor_frame`."""
+    size = hall.high - hall.low
+    half = float(max(size[:2].max() / 2, 1e-3) + BEYOND * (hall.high[2] - z))
+    left, front = ((hall.low + hall.high) / 2 - half)[:2].tolist()
+    cells = MAP / (2 * half)
+    x, y = np.meshgrid(left + (np.arange(MAP) + 0.5) / cells, front + (np.arange(MAP) + 0.5) / cells)
+    places = np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3)
+    return places.astype(np.float32), np.array([cells, left, front, 1], np.float32)
+
+
+def _sphere(count: int) -> Float32:
+    """Directions that share the sphere evenly, (count, 3): a Fibonacci spiral. None lies along an axis."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    return _around(z, np.arange(count))
+
+
+def _dome(count: int) -> Float32:
+    """Directions up, as dense as their cosine, (count, 3)."""
+    return _around(np.sqrt(1 - (np.arange(count) + 0.5) / count), np.arange(count))
+
+
+def _around(z: Float, turn: NDArray[np.int_]) -> Float32:
+    angle, radius = (turn + 0.5) * math.pi * (3 - math.sqrt(5)), np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1).astype(np.float32)
+
+
+def irradiance_weights(directions: Float32) -> Float32:
+    """Of light from each of these directions (K, 3), which share the sphere evenly, in the terms of irradiance / pi: (K, 9)
+    (Ramamoorthi and Hanrahan 2001).
+    """
+    x, y, z = directions.T.astype(np.float64)
+    values = np.stack([np.ones_like(x), *terms(x, y, z)], axis=1)
+    # The constants of spherical harmonics, squared, times the share of each degree that irradiance keeps.
+    squares = np.array([1 / 4, *[3 / 4] * 3, *[15 / 4] * 2, 5 / 16, 15 / 4, 15 / 16]) / math.pi
+    kept = np.array([1, *[2 / 3] * 3, *[1 / 4] * 5])
+    return (values * squares * kept * 4 * math.pi / len(directions)).astype(np.float32)
+
+
+def _window(size: int) -> Float:
+    """1 within the ground's map, falling to 0 at its border."""
+    inward = np.minimum(np.arange(size) + 0.5, size - np.arange(size) - 0.5) / (0.15 * size)
+    return np.clip(np.minimum(inward[:, None], inward), 0, 1)

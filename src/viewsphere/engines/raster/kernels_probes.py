@@ -1,0 +1,380 @@
+"""What the probes of a volume see, from the rays that were cast from them.
+
+What rays hit is gathered in patches: places that are close together, of one material, and look the same way. The light that
+patches send to probes, and probes to patches, is exchanged until it no longer changes (Goral, Torrance, Greenberg and Battaile
+1984; irradiance volumes as Greger, Shirley, Hubbard and Greenberg 1998).
+"""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+
+from viewsphere.engines.raster import kernels_block as row
+from viewsphere.engines.raster.kernels_arrive import AREA, DISTANT, arrive
+from viewsphere.engines.raster.kernels_block import (
+    BASE_R,
+    BLOCK,
+    ER,
+    FACE_R,
+    GX,
+    IR,
+    LOBE,
+    LX,
+    NX,
+    PIXEL,
+    PX,
+    RED,
+    RIM,
+    ROWS,
+    SHARE,
+    UNLIT,
+    VX,
+)  # fmt: skip
+from viewsphere.engines.raster.kernels_bounce import CORNERS, LOWER, THINGS, UPPER, bounced
+from viewsphere.engines.raster.kernels_gather import gather, gather_ground
+from viewsphere.engines.raster.kernels_light import UNEXPOSED, light_around, weigh
+from viewsphere.engines.raster.kernels_material import material
+from viewsphere.engines.raster.kernels_trace import DEEP, nearest
+from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.lanes import FAST
+
+f4 = nb.float32
+U = nb.uintp
+SKY, FAR_GROUND, GROUND = -1, -2, -3
+NO_MATERIAL = -1
+HITS = 4  # of a patch that are shaded, at most
+GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+CLUSTERS = 6
+ALIKE = 0.9  # cosine between normals of one screen
+FEWEST = 2  # rays of a screen
+WINDOW = np.float32(0.8)  # of degree 1 of things' light, which is read as it is: less of it below zero behind a bright thing
+
+
+@inner
+def _key(p, normal, cells, low, m):
+    """One number for a patch: its cell, the axis along which its normal is longest, and its material."""
+    axis = 0
+    for k in range(1, 3):
+        if abs(normal[k]) > abs(normal[axis]):
+            axis = k
+    side = 2 * axis + (1 if normal[axis] > f4(0) else 0)
+    key = np.uint64(m % 4096 if m >= 0 else 4095) * np.uint64(8) + np.uint64(side)
+    for k in range(3):
+        at = nb.int64(np.floor((p[k] - low[k]) * cells + f4(0.25)))
+        key = key * np.uint64(1 << 16) + np.uint64((at + 32768) & 65535)
+    return key
+
+
+@inner
+def _found(key, keys, patches):
+    """The place of a key in an open table, whose size is a power of two: its own, or the empty one where it belongs."""
+    last = np.uint64(len(keys) - 1)
+    at = (key * GOLDEN) >> np.uint64(20) & last
+    while patches[at] >= 0 and keys[at] != key:
+        at = (at + np.uint64(1)) & last
+    return at
+
+
+@njit
+def patch(met, far, origins, directions, normals, materials, low, cells, ground, table, count, ids):
+    """The patch that each ray hits, into ids (K, N) int32, SKY or FAR_GROUND for none; returns how many patches there are then,
+    of which there were `count` before, or -1 if there is no room for more.
+
+    met, far (K, N): triangle or -1, distance; low (3,), cells: of the patches' grid; ground (6,): its height, the box (lowest
+    and highest x and y) within which it has patches, whether there is one; table: see `patches.Table`.
+    """
+    m_ground = nb.int64(NO_MATERIAL)
+    for k in range(U(directions.shape[0])):
+        d = directions[k, U(0)], directions[k, U(1)], directions[k, U(2)]
+        for i in range(U(origins.shape[0])):
+            o = origins[i, U(0)], origins[i, U(1)], origins[i, U(2)]
+            t, triangle, m = far[k, i], nb.int64(met[k, i]), m_ground
+            normal = f4(0), f4(0), f4(1)
+            if ground[5] > f4(0) and d[2] < f4(0) and o[2] > ground[0] and (ground[0] - o[2]) / d[2] < t:
+                t, triangle = (ground[0] - o[2]) / d[2], nb.int64(GROUND)
+            if triangle == -1:
+                ids[k, i] = SKY
+                continue
+            p = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]
+            if triangle == GROUND:
+                if not (p[0] > ground[1] and p[0] < ground[2] and p[1] > ground[3] and p[1] < ground[4]):
+                    ids[k, i] = FAR_GROUND
+                    continue
+            else:
+                m, x, y, z = nb.int64(materials[triangle]), normals[triangle, 0], normals[triangle, 1], normals[triangle, 2]
+                side = f4(-1) if x * d[0] + y * d[1] + z * d[2] > f4(0) else f4(1)
+                normal = x * side, y * side, z * side
+            key = _key(p, normal, cells, low, m)
+            at = _found(key, table.keys, table.patch)
+            if table.patch[at] < 0:
+                if 2 * count >= len(table.keys):
+                    return -1
+                table.keys[at], table.patch[at], table.known[count] = key, count, 0
+                count += 1
+            own = table.patch[at]
+            ids[k, i] = own
+            n = table.known[own]
+            if n < HITS:
+                table.known[own] = n + 1
+                table.triangle[own, n], table.far[own, n] = triangle, t
+                for c in range(3):
+                    table.place[own, n, c], table.way[own, n, c], table.normal[own, n, c] = p[c], d[c], normal[c]
+    return count
+
+
+@inner
+def _sight(tree, lights, k, which, p, n, stack):
+    """Whether light k reaches a place: 1 or 0. which: a number that says which part of a rectangle is looked at."""
+    if lights.kind[k] == DISTANT:
+        d = lights.place[k, 0], lights.place[k, 1], lights.place[k, 2]
+        limit = f4(np.inf)
+    else:
+        u = v = f4(0)
+        if lights.kind[k] == AREA:
+            u, v = f4(2 * ((which * 0.7548776662) % 1.0) - 1), f4(2 * ((which * 0.5698402910) % 1.0) - 1)
+        right, up, place = lights.right[k], lights.up[k], lights.place[k]
+        d = (
+            place[0] + u * right[0] + v * up[0] - p[0],
+            place[1] + u * right[1] + v * up[1] - p[1],
+            place[2] + u * right[2] + v * up[2] - p[2],
+        )
+        limit = f4(0.999)
+        if lights.kind[k] != AREA:  # what lies within a ball that shines is its bulb
+            limit = f4(1) - lights.radius[k] / np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    if d[0] * n[0] + d[1] * n[1] + d[2] * n[2] <= f4(0):
+        return f4(0)
+    found, _ = nearest(tree, p, d, limit, True, stack)
+    return f4(1) if found < 0 else f4(0)
+
+
+@inner
+def _arrive(start, count, tree, lights, off, arrived, b, stack):
+    """arrived: irradiance of all lights at the block's samples, shadows cast."""
+    for i in range(count):
+        for c in range(3):
+            arrived[start + i, c] = f4(0)
+    for k in range(lights.kind.shape[0]):
+        arrive(count, lights, k, b)
+        for i in range(count):
+            n = b[GX + i], b[GX + BLOCK + i], b[GX + 2 * BLOCK + i]
+            cosine = f4(0)
+            for c in range(3):
+                cosine += n[c] * b[LX + c * BLOCK + i]
+            if cosine <= f4(0) or b[SHARE + i] <= f4(0):
+                continue
+            p = b[PX + i] + off * n[0], b[PX + BLOCK + i] + off * n[1], b[PX + 2 * BLOCK + i] + off * n[2]
+            light = _sight(tree, lights, k, start + i, p, n, stack) * cosine
+            for c in range(3):
+                arrived[start + i, c] += b[IR + c * BLOCK + i] * light
+
+
+@inner
+def _answer(count, start, answers, b):
+    """Reflectance and emission of the block's samples; lobes that mirror are taken as if they scattered. Unlit surfaces send
+    their colour.
+    """
+    for i in range(count):
+        unlit = b[UNLIT + i]
+        for c in range(3):
+            r = c * BLOCK
+            shiny = b[FACE_R + r + i] * b[LOBE + i] + b[FACE_R + 3 * BLOCK + r + i] * b[RIM + i]
+            answers[start + i, c] = min(b[BASE_R + r + i] + shiny, f4(0.98)) * (f4(1) - unlit)
+            answers[start + i, c + 3] = b[ER + r + i] + (b[RED + r + i] * UNEXPOSED - b[ER + r + i]) * unlit
+
+
+@njit(fastmath=FAST, _nrt=True)
+def shade_hits(
+    view, surfaces, textures, floor, albedo, tree, lights, off, triangle, places, ways, pixels, is_ground, answers, arrived
+):
+    """What the places (M, 3) that rays of directions `ways` (M, 3) hit are made of, all on the ground or none, as wide as
+    `pixels` (M,): reflectance and emitted light, answers (M, 6); irradiance of all lights, arrived (M, 3).
+
+    off: how far from a surface shadows are cast.
+    """
+    b, stack = np.zeros(ROWS * BLOCK, np.float32), np.empty((DEEP, 2), np.float32)
+    own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    for start in range(0, places.shape[0], BLOCK):
+        count = min(BLOCK, places.shape[0] - start)
+        for i in range(count):
+            for c in range(3):
+                b[PX + c * BLOCK + i], b[VX + c * BLOCK + i] = places[start + i, c], -ways[start + i, c]
+            b[PIXEL + i], own[i] = pixels[start + i], start + i
+        if is_ground:
+            gather_ground(view, floor, count, b, which)
+        else:
+            gather(surfaces, count, triangle, b, own, which)
+        material(count, view, surfaces, textures, b, which)
+        weigh(count, albedo, b)
+        if is_ground and floor[4] == f4(1):  # ground that only scatters has its colour apart
+            for i in range(count):
+                for c in range(3):
+                    b[BASE_R + c * BLOCK + i] = b[RED + c * BLOCK + i]
+                    b[FACE_R + c * BLOCK + i], b[FACE_R + (c + 3) * BLOCK + i] = f4(0), f4(0)
+        _answer(count, start, answers, b)
+        _arrive(start, count, tree, lights, off, arrived, b, stack)
+
+
+@njit(fastmath=FAST, _nrt=True)
+def sky_from(surrounding, directions, rough, light):
+    """Radiance from far away in directions (K, 3), blurred as a mirror of this roughness does, into light (K, 3)."""
+    b = np.zeros(ROWS * BLOCK, np.float32)
+    for start in range(0, directions.shape[0], BLOCK):
+        count = min(BLOCK, directions.shape[0] - start)
+        for i in range(count):
+            for c in range(3):
+                b[row.T0 + c * BLOCK + i] = directions[start + i, c]
+            b[row.T6 + i], b[row.BOUNCE + i] = rough, f4(1)
+        light_around(count, surrounding, b)
+        for i in range(count):
+            for c in range(3):
+                light[start + i, c] = b[row.T3 + c * BLOCK + i]
+
+
+@njit(fastmath=FAST, _nrt=True)
+def look_up(bounces, places, normals, glow, inside):
+    """Radiance of white matt surfaces lit by the probes, at places (M, 3) with these normals (M, 3), into glow (M, 3), and the
+    share of it that the probes know, into inside (M,).
+    """
+    b = np.zeros(ROWS * BLOCK, np.float32)
+    for start in range(0, places.shape[0], BLOCK):
+        count = min(BLOCK, places.shape[0] - start)
+        for i in range(count):
+            for c in range(3):
+                b[PX + c * BLOCK + i] = places[start + i, c]
+                b[NX + c * BLOCK + i] = b[GX + c * BLOCK + i] = normals[start + i, c]
+            b[row.OPEN + i], b[row.BOUNCE + i] = f4(1), f4(1)
+        bounced(count, bounces, False, b)
+        for i in range(count):
+            for c in range(3):
+                glow[start + i, c] = b[row.GLOW_R + c * BLOCK + i]
+            inside[start + i] = b[row.INSIDE + i]
+
+
+@njit(fastmath=FAST)
+def send(ids, weights, sky, far_ground, sent, light):
+    """What arrives at the probes: irradiance, columns 0 to THINGS of light (N, 48), from patches that send `sent` (M, 3), the
+    sky (K, 3) and the ground far away (3,). weights (K, 9): of each direction in the terms of irradiance.
+    """
+    light[:, :THINGS] = f4(0)
+    for k in range(U(ids.shape[0])):
+        for i in range(U(ids.shape[1])):
+            own = ids[k, i]
+            r, g, b = far_ground[0], far_ground[1], far_ground[2]
+            if own >= 0:
+                r, g, b = sent[U(own), U(0)], sent[U(own), U(1)], sent[U(own), U(2)]
+            elif own == SKY:
+                r, g, b = sky[k, U(0)], sky[k, U(1)], sky[k, U(2)]
+            for j in range(U(9)):
+                w = weights[k, j]
+                light[i, U(3) * j] += w * r
+                light[i, U(3) * j + U(1)] += w * g
+                light[i, U(3) * j + U(2)] += w * b
+
+
+@njit(fastmath=FAST)
+def send_sharply(ids, directions, patch_is_ground, sent, light):
+    """The other columns: light of things in each direction, and what they leave of the sky and of the ground."""
+    light[:, THINGS:] = f4(0)
+    per = f4(1) / f4(directions.shape[0])
+    for k in range(U(directions.shape[0])):
+        x, y, z = directions[k, U(0)], directions[k, U(1)], directions[k, U(2)]
+        first = U(UPPER if z > f4(0) else LOWER)
+        for i in range(U(ids.shape[1])):
+            own = ids[k, i]
+            if own < 0 or patch_is_ground[U(own)]:
+                light[i, first] += per
+                light[i, first + U(1)] += per * x
+                light[i, first + U(2)] += per * y
+                light[i, first + U(3)] += per * z
+                continue
+            for c in range(U(3)):
+                radiance = sent[U(own), c] * per
+                at = U(THINGS) + c
+                light[i, at] += radiance
+                light[i, at + U(3)] += radiance * y * f4(3 * WINDOW)
+                light[i, at + U(6)] += radiance * z * f4(3 * WINDOW)
+                light[i, at + U(9)] += radiance * x * f4(3 * WINDOW)
+
+
+@inner
+def _octant(d):
+    """Which of the eight cells around a probe a direction goes to: bit k is set where it goes up axis k."""
+    octant = 0
+    for axis in range(3):
+        octant += (1 << axis) if d[axis] >= f4(0) else 0
+    return octant
+
+
+@inner
+def _add_hit(own, n, along, far):
+    """Count a hit among those of about the same normal. own (CLUSTERS, 5): sums of normals on the probe's side and of planes'
+    offsets, and how many there are; along: cosine between ray and normal; far: in cells.
+    """
+    side = f4(-1) if along > f4(0) else f4(1)
+    for c in range(CLUSTERS):
+        size = np.sqrt(own[c, 0] ** 2 + own[c, 1] ** 2 + own[c, 2] ** 2)
+        fits = (own[c, 0] * n[0] + own[c, 1] * n[1] + own[c, 2] * n[2]) * side >= f4(ALIKE) * size
+        if own[c, 4] == f4(0) or fits:
+            for axis in range(3):
+                own[c, axis] += n[axis] * side
+            own[c, 3] += along * side * far
+            own[c, 4] += f4(1)
+            return
+
+
+@inner
+def _place_screen(own, octant, x, y, z, rows, columns, screens):
+    """The plane of the normal that most hits have, for the cell that lies that way from the probe at these places."""
+    best = 0
+    for c in range(1, CLUSTERS):
+        if own[c, 4] > own[best, 4]:
+            best = c
+    bits = 7 - octant  # which of the cell's corners the probe is
+    u, v, w = x - (bits & 1), y - (bits >> 1 & 1), z - (bits >> 2 & 1)
+    if own[best, 4] < f4(FEWEST) or u < 0 or v < 0 or w < 0:
+        return
+    per = f4(1) / np.sqrt(own[best, 0] ** 2 + own[best, 1] ** 2 + own[best, 2] ** 2)
+    offset, cell = own[best, 3] / own[best, 4], (w * rows + v) * columns + u
+    for axis in range(3):
+        n = own[best, axis] * per
+        screens[cell, CORNERS * axis + bits] = n
+        offset += n * f4(bits >> axis & 1)
+    screens[cell, 3 * CORNERS + bits] = -offset
+
+
+@njit(_nrt=True)
+def screen(met, far, directions, normals, cells, shape, screens):
+    """Fill Bounces.screens (N, 32): of the hits of each probe that lie in one of the eight cells around it, the plane of the
+    normal that most of them have. shape (3,): layers, rows, columns.
+    """
+    rows, columns = shape[1], shape[2]
+    screens[:, : 3 * CORNERS], screens[:, 3 * CORNERS :] = f4(0), f4(1)
+    found = np.empty((8, CLUSTERS, 5), np.float32)
+    for i in range(met.shape[1]):
+        found[:] = f4(0)
+        hits = 0
+        for k in range(directions.shape[0]):
+            d, t = directions[k], far[k, i] * cells
+            if met[k, i] >= 0 and t * max(abs(d[0]), abs(d[1]), abs(d[2])) <= f4(1):
+                n = normals[met[k, i]]
+                _add_hit(found[_octant(d)], n, n[0] * d[0] + n[1] * d[1] + n[2] * d[2], t)
+                hits += 1
+        x, y, z = i % columns, i // columns % rows, i // (columns * rows)
+        for octant in range(8 if hits > 0 else 0):
+            _place_screen(found[octant], octant, x, y, z, rows, columns, screens)
+
+
+@njit(fastmath=FAST)
+def send_down(ids, sent, floor):
+    """Radiance of white matt ground lit by things alone, of places from which cosine-weighted rays (K, N) hit patches, into
+    floor (N, 4).
+    """
+    floor[:] = f4(0)
+    per = f4(1) / f4(ids.shape[0])
+    for k in range(U(ids.shape[0])):
+        for i in range(U(ids.shape[1])):
+            own = ids[k, i]
+            if own >= 0:
+                for c in range(U(3)):
+                    floor[i, c] += sent[U(own), c] * per

@@ -1,0 +1,51 @@
+"""Rays through triangles, for what is baked once: see `kernels_trace`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.raster import kernels_trace as kernels
+from viewsphere.engines.raster.records import Float32, Int32
+
+
+class Tree(NamedTuple):
+    """Boxes around T triangles, in leaves' order. bounds (N, 6) float32: lowest and highest x, y, z of each node; links (N, 2)
+    int32: see `kernels_trace.build`; corners (T, 9) float32: first corner and both edges; order (T,) int32: which triangles.
+    """
+
+    bounds: Float32
+    links: Int32
+    corners: Float32
+    order: Int32
+
+
+def tree_of(corners: Float32) -> Tree:
+    """The tree of triangles (T, 3, 3), at least one; those that have a corner without numbers are met by no ray."""
+    corners = np.where(np.isfinite(corners).all(axis=(1, 2), keepdims=True), corners, np.float32(0)).astype(np.float32)
+    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    order = np.arange(len(corners), dtype=np.int32)
+    bounds, links = np.empty((2 * len(corners), 6), np.float32), np.empty((2 * len(corners), 2), np.int32)
+    nodes = kernels.build(boxes, order, bounds, links)
+    a, b, c = corners[order].transpose(1, 0, 2)
+    return Tree(bounds[:nodes].copy(), links[:nodes].copy(), np.concatenate([a, b - a, c - a], axis=1), order)
+
+
+def cast(tree: Tree, origins: Float32, directions: Float32, limit: float) -> tuple[Int32, Float32]:
+    """What rays from all origins (N, 3) in all directions (K, 3) meet first: the triangle, (K, N) int32, -1 for nothing before
+    `limit`, and how far away it is, (K, N).
+    """
+    met, far = np.empty((len(directions), len(origins)), np.int32), np.empty((len(directions), len(origins)), np.float32)
+    kernels.cast(tree, origins, directions, np.float32(limit), met, far)
+    found = met >= 0
+    met[found] = tree.order[met[found]]
+    return met, far
+
+
+def unblocked(tree: Tree, origins: Float32, ways: Float32) -> NDArray[np.float32]:
+    """1 where nothing lies between an origin (N, 3) and origin + way (N, 3), else 0."""
+    clear = np.empty(len(origins), np.float32)
+    kernels.unblocked(tree, origins, ways, clear)
+    return clear

@@ -1,0 +1,285 @@
+"""Light that things throw at one another, against closed forms of radiosity and bounds of energy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from light_stage import ball
+from test_raster import BLACK, DARK, SPEC, box, camera, mesh_of, rectangle
+
+from shots import painted, still_shot
+from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.engines import raster
+from viewsphere.engines.raster import bounces as baking
+from viewsphere.engines.raster.kernels_probes import look_up
+from viewsphere.engines.raster.options import parse_options
+from viewsphere.engines.raster.records import Bounces
+from viewsphere.engines.raster.tracing import cast, tree_of, unblocked
+from viewsphere.errors import RecipeError
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Finish, Ground, PointLight, Scene, Sky, Sun
+from viewsphere.model.thing import Thing
+
+EVEN = Sky(zenith=(1, 1, 1), horizon=(1, 1, 1))
+OUT = Finish(background=BLACK)
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    """Fewer rays of fewer probes: what is proved here does not depend on how many there are."""
+    monkeypatch.setattr(baking, "RAYS", 256)
+    monkeypatch.setattr(baking, "ALONG", 14)
+    monkeypatch.setattr(baking, "CELL", 0.3)
+    baking._bake.cache_clear()
+    baking._look.cache_clear()
+
+
+def matt(reflectance: float, emits: float = 0.0) -> Material:
+    color, light = (reflectance,) * 3, (emits,) * 3
+    return Material("matt", (*color, 1.0), roughness=1.0, specular=0.0, metallic=0.0, emissive=light)
+
+
+def painted_mesh(*parts: tuple[np.ndarray, Material]) -> Mesh:
+    """One mesh of triangles (T, 3, 3), each part of its own material."""
+    mesh = mesh_of(np.concatenate([part for part, _ in parts]))
+    which = np.repeat(np.arange(len(parts), dtype=np.int32), [len(part) for part, _ in parts])
+    return replace(mesh, triangle_material=which, materials=tuple(material for _, material in parts))
+
+
+def inside_out(triangles: np.ndarray) -> np.ndarray:
+    return triangles[:, ::-1]
+
+
+def stage_of(mesh: Mesh, scene: Scene, scenery: Mesh | None = None, **options):
+    things, meshes = [Thing(id=1, model=SPEC)], {SPEC.key: mesh}
+    if scenery is not None:
+        place = ModelSpec(key="place", source="memory", category="", category_id=0)
+        things.append(Thing(id=0, model=place, scenery=True))
+        meshes["place"] = scenery
+    shot = still_shot(things, scene=scene, engine_options={"bounces": "on"} | options)
+    return raster.stage(shot, lambda spec, step=None: meshes[spec.key])
+
+
+def probed(stage, places, normals) -> np.ndarray:
+    """Radiance (N, 3) of white matt surfaces at world places (N, 3) that have these normals, by bounced light and sky alone."""
+    baked = stage.baked(0)
+    at = ((np.asarray(places, float) - baked.origin) / baked.unit).astype(np.float32)
+    glow, inside = np.empty(at.shape, np.float32), np.empty(len(at), np.float32)
+    look_up(baked.bounces, at, np.ascontiguousarray(normals, np.float32), glow, inside)
+    assert (inside == 1).all()
+    return glow
+
+
+def walls(low, high, count: int = 12) -> tuple[np.ndarray, np.ndarray]:
+    """Places all over the inner faces of a box, as many on every face, and normals inwards, (6, count * count, 3)."""
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    u, v = ((np.indices((count, count)) + 0.5) / count).reshape(2, -1)
+    places, normals = [], []
+    for axis in range(3):
+        for side in (0, 1):
+            place, normal = np.empty((count * count, 3)), np.zeros((count * count, 3))
+            others = [k for k in range(3) if k != axis]
+            place[:, axis], normal[:, axis] = (low, high)[side][axis], 1 - 2 * side
+            for share, k in zip((u, v), others, strict=True):
+                place[:, k] = low[k] + share * (high - low)[k]
+            places.append(place)
+            normals.append(normal)
+    return np.array(places), np.array(normals)
+
+
+def test_rays_meet_what_brute_force_finds():
+    rng = np.random.default_rng(5)
+    corners = (rng.uniform(-1, 1, (300, 1, 3)) + rng.normal(0, 0.15, (300, 3, 3))).astype(np.float32)
+    origins, ways = rng.uniform(-1.2, 1.2, (40, 3)).astype(np.float32), rng.normal(size=(25, 3)).astype(np.float32)
+    met, far = cast(tree_of(corners), origins, ways, np.inf)
+    a, b, c = corners.astype(float).transpose(1, 0, 2)
+    for k, d in enumerate(ways.astype(float)):
+        p = np.cross(d, c - a)
+        det = (p * (b - a)).sum(axis=1)
+        s = origins[:, None].astype(float) - a
+        q = np.cross(s, b - a)
+        u, v, t = (s * p).sum(axis=2) / det, (q @ d) / det, (q * (c - a)).sum(axis=2) / det
+        t = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, np.inf)
+        np.testing.assert_array_equal(met[k], np.where(np.isfinite(t.min(axis=1)), t.argmin(axis=1), -1))
+        np.testing.assert_allclose(far[k], t.min(axis=1), rtol=2e-4)
+    assert 0.2 < (met >= 0).mean() < 0.98
+    ends = origins + ways[0] * np.where(np.isfinite(far[0]), far[0], 1)[:, None]
+    seen = unblocked(tree_of(corners), origins, ((ends - origins) * np.float32(0.9)).astype(np.float32))
+    assert seen.all()
+    beyond = unblocked(tree_of(corners), origins, ((ends - origins) * np.float32(1.1)).astype(np.float32))
+    np.testing.assert_array_equal(beyond[met[0] >= 0], 0)
+
+
+@pytest.mark.parametrize("reflectance", [0.0, 0.5, 0.8])
+def test_a_closed_box_that_glows_evenly(reflectance):
+    """Everywhere light is that of one wall over one less its reflectance: the furnace."""
+    low, high = (-1.0, -0.8, -0.6), (1.0, 0.8, 0.6)
+    stage = stage_of(painted_mesh((inside_out(box(low, high)), matt(reflectance, 1.0))), Scene(sun=None, sky=DARK))
+    places, normals = walls(low, high)
+    light = probed(stage, places.reshape(-1, 3), normals.reshape(-1, 3))
+    np.testing.assert_allclose(light, 1 / (1 - reflectance), rtol=0.02)
+
+
+def test_a_closed_box_of_which_one_wall_glows(monkeypatch):
+    """What is sent out is all absorbed: the mean irradiance is the power over area times absorption. A wall opposite has what
+    the form factor of two equal rectangles says (here integrated) before any bounce, and a little more: it is read from probes
+    in front of it.
+    """
+    monkeypatch.setattr(baking, "ALONG", 24)
+    low, high, reflectance = np.array((-1.0, -0.8, -0.6)), np.array((1.0, 0.8, 0.6)), 0.6
+    faces = inside_out(box(low, high)).reshape(6, 2, 3, 3)
+    glowing = [k for k in range(6) if (faces[k][..., 2] == high[2]).all()]
+    others = np.concatenate([faces[k] for k in range(6) if k not in glowing])
+    places, normals = walls(low, high, 16)
+    size = high - low
+    areas = np.repeat([size[1] * size[2], size[0] * size[2], size[0] * size[1]], 2)
+    means = {}
+    for r in (0.0, reflectance):
+        mesh = painted_mesh((others, matt(r)), (faces[glowing[0]], matt(r, 1.0)))
+        light = probed(stage_of(mesh, Scene(sun=None, sky=DARK)), places.reshape(-1, 3), normals.reshape(-1, 3))
+        means[r] = light.reshape(6, -1, 3).mean(axis=(1, 2))
+    # A sum of radiance over all walls: of a power of pi L A, irradiance / pi.
+    total = (areas * means[reflectance]).sum()
+    assert total == pytest.approx(areas[5] / (1 - reflectance), rel=0.03)
+    assert means[0.0][5] == pytest.approx(0, abs=0.02)
+    u, v = ((np.indices((40, 40)) + 0.5) / 40).reshape(2, -1, 1)
+    dx, dy = (u - u.T) * size[0], (v - v.T) * size[1]
+    factor = (size[2] ** 2 / (math.pi * (dx**2 + dy**2 + size[2] ** 2) ** 2)).mean() * areas[5]
+    assert means[0.0][4] == pytest.approx(factor, rel=0.08)
+
+
+def test_the_ground_below_a_glowing_ball():
+    """Irradiance of the ball's disc: pi L r^2 h / d^3 (Lambert)."""
+    radius, height = 0.4, 0.7
+    mesh = replace(ball(radius, (0, 0, height), 32), materials=(matt(0.0, 2.0),))
+    foot = mesh_of(rectangle((3, 3, 0), (1e-3, 0, 0), (0, 1e-3, 0)))  # what the ground lies at
+    both = replace(
+        mesh,
+        vertices=np.concatenate([mesh.vertices, foot.vertices]),
+        triangles=np.concatenate([mesh.triangles, foot.triangles + len(mesh.vertices)]),
+        normals=np.concatenate([mesh.normals, foot.normals]),
+        triangle_material=np.zeros(len(mesh.triangles) + 2, np.int32),
+        triangle_part=np.zeros(len(mesh.triangles) + 2, np.int32),
+    )
+    stage = stage_of(both, Scene(sun=None, sky=DARK, ground=Ground()))
+    baked = stage.baked(0)
+    cells, left, front, there = (float(v) for v in baked.bounces.floor_frame)
+    assert there == 1
+    x, y = (np.arange(baking.MAP) + 0.5) / cells + left, (np.arange(baking.MAP) + 0.5) / cells + front
+    x, y = x * baked.unit + baked.origin[0], y * baked.unit + baked.origin[1]
+    squared = x**2 + y[:, None] ** 2
+    expected = 2.0 * radius**2 * height / (squared + height**2) ** 1.5
+    is_near = squared < 0.8**2
+    assert is_near.sum() > 50
+    off = baked.bounces.floor[is_near][:, :3] - expected[is_near][:, None]
+    assert np.abs(off).max() < 5 * 2.0 / baking.MAP_RAYS
+    assert np.sqrt((off**2).mean()) < 0.02
+
+
+def room(reflectance: float, window: bool = True, partition: bool = False) -> Mesh:
+    """4 x 3 x 2.4 m inside, walls 0.2 m thick, a window to -Y on the left."""
+    x, y, z, t = 4.0, 3.0, 2.4, 0.2
+    solids = [
+        ((-t, -t, -t), (x + t, y + t, 0)),
+        ((-t, -t, z), (x + t, y + t, z + t)),
+        ((-t, -t, 0), (0, y + t, z)),
+        ((x, -t, 0), (x + t, y + t, z)),
+        ((0, y, 0), (x, y + t, z)),
+    ]
+    front = [((0, -t, 0), (x, 0, z))]
+    if window:
+        front = [
+            ((0, -t, 0), (0.5, 0, z)),
+            ((1.7, -t, 0), (x, 0, z)),
+            ((0.5, -t, 0), (1.7, 0, 0.8)),
+            ((0.5, -t, 2.0), (1.7, 0, z)),
+        ]
+    if partition:
+        front.append(((2.4, 0, 0), (2.5, y, z)))
+    return mesh_of(np.concatenate([box(*solid) for solid in solids + front]), matt(reflectance))
+
+
+def test_light_through_a_window_is_less_than_the_sky():
+    """No place of a room under a sky of radiance 1 is brighter than that sky, and where more is reflected more bounces."""
+    places, normals = walls((0, 0, 0), (4, 3, 2.4))
+    small = mesh_of(box((3.0, 1.0, 0.5), (3.2, 1.2, 0.7)), matt(0.5))
+    means = []
+    for reflectance in (0.2, 0.9):
+        stage = stage_of(small, Scene(sun=None, sky=EVEN), room(reflectance))
+        light = probed(stage, places.reshape(-1, 3), normals.reshape(-1, 3))
+        assert light.max() < 1.0 and light.min() >= 0
+        means.append(light.mean())
+    assert means[1] > 2 * means[0] > 0
+
+
+@pytest.mark.parametrize("window", [True, False])
+def test_a_dark_room_beside_a_lit_one_stays_dark(window):
+    """A partition of 10 cm, less than half of what lies between probes; without a window a lamp stands in the first room."""
+    lamp = PointLight(position=(-2.6, 0.4, 0.6), strength=1.0)  # from the small thing's middle
+    sun = Sun(azimuth_deg=-10, elevation_deg=40, strength=5.0) if window else None
+    small = mesh_of(box((3.1, 1.0, 0.5), (3.3, 1.2, 0.7)), matt(0.5))
+    scene = Scene(sun=sun, sky=EVEN if window else DARK, lights=() if window else (lamp,))
+    stage = stage_of(small, scene, room(0.7, window, partition=True))
+    lit, dark = (
+        probed(stage, *(values.reshape(-1, 3) for values in walls(low, high)))
+        for low, high in (((0, 0, 0), (2.4, 3, 2.4)), ((2.5, 0, 0), (4, 3, 2.4)))
+    )
+    assert lit.mean() > 0.02
+    assert dark.mean() < 0.004 * lit.mean()
+    assert dark.max() < 0.1 * lit.mean()
+
+
+def test_the_same_bytes_whatever_was_baked_before():
+    """Also with another target, which is not part of a place's light."""
+    view = camera(60, 45, 40, 20, 20, 1.6, (1.5, 1.5, 1.0))
+    scene = Scene(sun=Sun(azimuth_deg=-10, elevation_deg=40), sky=EVEN, finish=OUT)
+    place = room(0.6)
+    first, second = (mesh_of(box((1, 1, 0), (1.5, 1.5, h)), matt(0.5)) for h in (0.4, 0.8))
+    once = painted(stage_of(first, scene, place), view)
+    stage_of(second, scene, place).baked(0)
+    assert baking._bake.cache_info().hits >= 1
+    np.testing.assert_array_equal(painted(stage_of(first, scene, place), view), once)
+    baking._bake.cache_clear()
+    baking._look.cache_clear()
+    np.testing.assert_array_equal(painted(stage_of(first, scene, place), view), once)
+
+
+def is_bounced(stage) -> bool:
+    bounces: Bounces = stage.baked(0).bounces
+    return bool(bounces.grid[0] > 0)
+
+
+def test_auto_is_on_indoors_only():
+    small = mesh_of(box((1, 1, 0), (1.5, 1.5, 0.4)), matt(0.5))
+    street = mesh_of(np.concatenate([rectangle((-9, -9, 0), (18, 0, 0), (0, 18, 0)), box((4, 4, 0), (7, 7, 5))]), matt(0.5))
+    scene = Scene(sun=None, sky=EVEN)
+    assert is_bounced(stage_of(small, scene, room(0.5), bounces="auto"))
+    assert not is_bounced(stage_of(small, scene, room(0.5), bounces="off"))
+    assert not is_bounced(stage_of(small, scene, street, bounces="auto"))
+    assert not is_bounced(stage_of(small, scene, mesh_of(box((-4, -4, -1), (4, 4, 0)), matt(0.5)), bounces="auto"))
+    assert not is_bounced(stage_of(small, scene, bounces="auto"))
+    assert is_bounced(stage_of(small, scene, street))
+
+
+def test_a_green_ball_colours_the_ground_and_its_neighbour():
+    green = replace(ball(0.4, (0, 0, 0.4)), materials=(replace(matt(0.5), base_color=(0.05, 0.6, 0.05, 1.0)),))
+    scene = Scene(sun=Sun(azimuth_deg=0, elevation_deg=50), sky=EVEN, ground=Ground(), finish=OUT)
+    view = camera(80, 60, 90, 0, 35, 2.0, (0, 0, 0.2))
+    plain, bounced = (painted(stage_of(green, scene, bounces=b), view).astype(float) for b in ("off", "on"))
+    floor = plain[..., 1] < 1.2 * plain[..., 0]
+    gained = (bounced - plain)[floor]
+    assert gained[:, 1].max() > gained[:, 0].max() + 3
+    assert np.abs(gained).max() < 60
+
+
+@pytest.mark.parametrize(("given", "known"), [(True, "on"), (False, "off"), ("auto", "auto")])
+def test_yaml_reads_on_and_off_as_truth_values(given, known):
+    assert parse_options({"bounces": given}).bounces == known
+
+
+def test_an_unknown_value_is_told():
+    with pytest.raises(RecipeError, match=r"engine.bounces: expected auto, on or off, found 'much'"):
+        parse_options({"bounces": "much"})
