@@ -22,18 +22,23 @@ from viewsphere.engines.raster.kernels_environment import LAMPS
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.patches import Patches, Rays, patches_of
 from viewsphere.engines.raster.records import NO_BOUNCES, Bounces, Float32, Int32, Surfaces, Textures
-from viewsphere.engines.raster.tracing import Tree, cast, tree_of
+from viewsphere.engines.raster.tracing import Tree, cast, tree_of, unblocked
 
 Float = NDArray[np.float64]
 
-CELL = 0.25
+CELL = 0.2
 """Metres between probes, at most, unless there would be more than `MOST`."""
 
 ALONG, MOST = 24, 40_000
 """Probes along the longest side, at least, and of a volume, at most."""
 
-RAYS, FEW_RAYS, MANY_PROBES = 1024, 512, 16_000
+RAYS, FEW_RAYS, MANY_PROBES = 384, 256, 24_000
 """Of a probe, and of one of so many."""
+
+TURNS = 8
+"""Ways to turn the rays: two neighbours never look the same way, so that a probe and those around it see as one with all of
+their rays (interleaved sampling, Keller and Heidrich 2001).
+"""
 
 PAD = 2
 """Cells around all things."""
@@ -78,11 +83,15 @@ class Hall:
 
 
 class _Seen(NamedTuple):
-    """What depends on no light."""
+    """What depends on no light. own (N,): which probe each ray's origin is; opens (3, N): whether nothing lies between a probe
+    and the next one along x, y and z.
+    """
 
     bounces: Bounces
     tree: Tree
-    directions: Float32
+    rays: Rays
+    own: Int32
+    opens: Float32
     patches: Patches
 
 
@@ -114,29 +123,40 @@ def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounce
 def _bake(lighting: _Lighting) -> Bounces:
     hall, surrounding = lighting.hall, lighting.surrounding
     seen = _look.__wrapped__(hall) if hall.key is None else _look(hall)
-    bounces, patches, directions = seen.bounces, seen.patches, seen.directions
+    bounces, patches, rays = seen.bounces, seen.patches, seen.rays
     bounces = bounces._replace(light=np.zeros_like(bounces.light), floor=np.zeros_like(bounces.floor))
-    weights, off = irradiance_weights(directions), SHADOWS / float(bounces.frame[3])
+    off = SHADOWS / float(bounces.frame[3])
     lit = patches.lit(hall.surfaces, hall.textures, hall.floor, surrounding.albedo, seen.tree, lighting.lights, off)
-    sky = np.empty((len(directions), 3), np.float32)
-    kernels.sky_from(surrounding, directions, np.float32(SKY_ROUGHNESS), sky)
+    sky = np.empty(rays.directions.shape, np.float32)
+    kernels.sky_from(surrounding, rays.directions.reshape(-1, 3), np.float32(SKY_ROUGHNESS), sky.reshape(-1, 3))
+    weights = irradiance_weights(rays.directions)
     own = lit.emitted + lit.reflectance * lit.arrived / np.float32(math.pi)
     places, normals, sent = patches.places, patches.normals, own
     glow, inside = np.empty_like(own), np.empty(len(own), np.float32)
+    sources = patches.ids[0], rays.turn, seen.own
     for _ in range(ROUNDS):
-        kernels.send(patches.ids[0], weights, sky, surrounding.below, sent, bounces.light)
+        kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
         kernels.look_up(bounces, places, normals, glow, inside)
         before = sent
         sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * surrounding.up)
         if np.abs(sent - before).sum(dtype=np.float64) <= UNCHANGED * sent.sum(dtype=np.float64):
             break
-    kernels.send(patches.ids[0], weights, sky, surrounding.below, sent, bounces.light)
-    kernels.send_sharply(patches.ids[0], directions, patches.is_ground, sent, bounces.light)
+    kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
+    kernels.send_sharply(*sources, rays.directions, patches.is_ground, sent, bounces.light)
+    _smooth(bounces.light, seen.opens, bounces.grid)
     if hall.has_map:
         light = np.empty((bounces.floor.shape[0] ** 2, 4), np.float32)
         kernels.send_down(patches.ids[1], sent, light)
         bounces.floor[:] = light.reshape(bounces.floor.shape) * _window(len(bounces.floor))[..., None].astype(np.float32)
     return bounces
+
+
+def _smooth(light: Float32, opens: Float32, shape: NDArray[np.int64]) -> None:
+    """Mix what neighbours that see each other know: by all three axes each way to turn the rays counts an eighth."""
+    other = np.empty_like(light)
+    for axis, step in enumerate((1, int(shape[2]), int(shape[1] * shape[2]))):
+        kernels.blur(light, opens[axis], step, other)
+        light[:] = other
 
 
 @lru_cache(maxsize=1)
@@ -145,25 +165,33 @@ def _look(hall: Hall) -> _Seen:
     corners = hall.surfaces.vertices[hall.surfaces.triangles[hall.which], 11:14]
     tree = tree_of(corners)
     corner, cells, shape = _grid(hall)
-    points = _points(corner, cells, shape)
-    directions = _sphere(FEW_RAYS if len(points) > MANY_PROBES else RAYS)
-    met, far = cast(tree, points, directions, np.inf)
+    points, turn, own = _points(corner, cells, shape)
+    directions = _turned(_sphere(FEW_RAYS if len(points) > MANY_PROBES else RAYS))
+    met, far = cast(tree, points, directions, turn, np.inf)
     normals = hall.surfaces.normals[hall.which]
     screens = np.empty((len(points), 32), np.float32)
-    kernels.screen(met, far, directions, normals, np.float32(cells), shape, screens)
-    floor, floor_frame = NO_BOUNCES.floor, NO_BOUNCES.floor_frame
-    bundles = [Rays(points, directions, _whole(hall, met), far)]
+    buried = np.zeros(len(points), np.uint8)
+    kernels.screen(met, far, directions, turn, own, normals, np.float32(cells), shape, screens, buried)
+    rays = Rays(points, directions, turn, _whole(hall, met), far)
+    bundles, floor, floor_frame = [rays], NO_BOUNCES.floor, NO_BOUNCES.floor_frame
     if hall.has_map and hall.ground_z is not None:
         places, floor_frame = _map(hall, hall.ground_z)
-        floor, up = np.zeros((MAP, MAP, 4), np.float32), _dome(MAP_RAYS)
-        met, far = cast(tree, places, up, np.inf)
-        bundles.append(Rays(places, up, _whole(hall, met), far))
+        floor, up, same = np.zeros((MAP, MAP, 4), np.float32), _dome(MAP_RAYS)[None], np.zeros(len(places), np.int32)
+        met, far = cast(tree, places, up, same, np.inf)
+        bundles.append(Rays(places, up, same, _whole(hall, met), far))
     patches = patches_of(
         bundles, hall.surfaces.normals, hall.surfaces.material, corner.astype(np.float32), cells * PATCHES, _ground(hall)
     )
     frame = np.array([*corner, cells, PUSH, hall.ground_z is not None], np.float32)
     light = np.zeros((len(points), 48), np.float32)
-    return _Seen(Bounces(light, screens, shape, frame, floor, floor_frame), tree, directions, patches)
+    return _Seen(
+        Bounces(light, screens, shape, frame, floor, floor_frame),
+        tree,
+        rays,
+        own,
+        _opens(tree, points, own, buried, cells, shape),
+        patches,
+    )
 
 
 def _whole(hall: Hall, met: Int32) -> Int32:
@@ -183,9 +211,32 @@ def _grid(hall: Hall) -> tuple[Float, float, NDArray[np.int64]]:
     return hall.low - spare / 2, cells, shape[::-1].copy()
 
 
-def _points(corner: Float, cells: float, shape: NDArray[np.int64]) -> Float32:
-    """All probes, (N, 3)."""
-    return (corner + np.indices(tuple(shape.tolist())).reshape(3, -1).T[:, ::-1] / cells).astype(np.float32)
+def _points(corner: Float, cells: float, shape: NDArray[np.int64]) -> tuple[Float32, Int32, Int32]:
+    """All probes (N, 3), those of one turn together; each one's turn, of which any two by two by two have all, and its place in
+    the volume.
+    """
+    at = np.indices(tuple(shape.tolist())).reshape(3, -1).T[:, ::-1]
+    turn = at % 2 @ [1, 2, 4]
+    own = np.argsort(turn, kind="stable")
+    return (corner + at[own] / cells).astype(np.float32), turn[own].astype(np.int32), own.astype(np.int32)
+
+
+def _opens(
+    tree: Tree, points: Float32, own: Int32, buried: NDArray[np.uint8], cells: float, shape: NDArray[np.int64]
+) -> Float32:
+    """Whether nothing lies between each probe and the next along x, y and z, and neither is buried: (3, N), by place."""
+    at = np.indices(tuple(shape.tolist())).reshape(3, -1)[::-1]
+    opens = np.empty((3, len(points)), np.float32)
+    for axis in range(3):
+        way = np.zeros_like(points)
+        way[:, axis] = 1 / cells
+        ahead, back = unblocked(tree, points, way), unblocked(tree, points + way, -way)
+        opens[axis, own] = np.minimum(ahead, back)
+        is_last = at[axis] == shape[2 - axis] - 1
+        opens[axis, is_last] = 0
+        step = int(np.prod(shape[3 - axis :]))
+        opens[axis][~is_last] *= 1 - np.maximum(buried[~is_last], buried[np.flatnonzero(~is_last) + step])
+    return opens
 
 
 def _ground(hall: Hall) -> Float32:
@@ -214,6 +265,21 @@ def _sphere(count: int) -> Float32:
     return _around(z, np.arange(count))
 
 
+def _turned(directions: Float32) -> Float32:
+    """The same (K, 3) turned in `TURNS` ways, (TURNS, K, 3), which share all rotations about evenly (Shoemake 1992)."""
+    i = np.arange(1, TURNS + 1)
+    u, v, w = ((i * step) % 1.0 for step in (0.8191725134, 0.6710436067, 0.5497004779))  # Roberts' sequence in three dimensions
+    a, b = np.sqrt(1 - u), np.sqrt(u)
+    x, y, z, r = a * np.sin(2 * np.pi * v), a * np.cos(2 * np.pi * v), b * np.sin(2 * np.pi * w), b * np.cos(2 * np.pi * w)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * r), 2 * (x * z + y * r)],
+        [2 * (x * y + z * r), 1 - 2 * (x * x + z * z), 2 * (y * z - x * r)],
+        [2 * (x * z - y * r), 2 * (y * z + x * r), 1 - 2 * (x * x + y * y)],
+    ]
+    turned = np.einsum("ijw,kj->wki", np.array(rows), directions.astype(np.float64))
+    return np.ascontiguousarray(turned, np.float32)
+
+
 def _dome(count: int) -> Float32:
     """Directions up, as dense as their cosine, (count, 3)."""
     return _around(np.sqrt(1 - (np.arange(count) + 0.5) / count), np.arange(count))
@@ -225,15 +291,15 @@ def _around(z: Float, turn: NDArray[np.int_]) -> Float32:
 
 
 def irradiance_weights(directions: Float32) -> Float32:
-    """Of light from each of these directions (K, 3), which share the sphere evenly, in the terms of irradiance / pi: (K, 9)
+    """Of light from each of K directions (..., K, 3) that share the sphere evenly, in the terms of irradiance / pi: (..., K, 9)
     (Ramamoorthi and Hanrahan 2001).
     """
-    x, y, z = directions.T.astype(np.float64)
-    values = np.stack([np.ones_like(x), *terms(x, y, z)], axis=1)
+    x, y, z = np.moveaxis(directions.astype(np.float64), -1, 0)
+    values = np.stack([np.ones_like(x), *terms(x, y, z)], axis=-1)
     # The constants of spherical harmonics, squared, times the share of each degree that irradiance keeps.
     squares = np.array([1 / 4, *[3 / 4] * 3, *[15 / 4] * 2, 5 / 16, 15 / 4, 15 / 16]) / math.pi
     kept = np.array([1, *[2 / 3] * 3, *[1 / 4] * 5])
-    return (values * squares * kept * 4 * math.pi / len(directions)).astype(np.float32)
+    return (values * squares * kept * 4 * math.pi / directions.shape[-2]).astype(np.float32)
 
 
 def _window(size: int) -> Float:

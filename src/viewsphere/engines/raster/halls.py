@@ -26,6 +26,9 @@ EYES = 0.4
 ROOFED = 0.6
 """Share of a place under a roof from which on it is indoors."""
 
+UP = np.array([[[1e-3, 2e-3, 1]]], np.float32)
+"""Nearly: no ray runs along a wall."""
+
 
 def hall_of(
     arranged: Arranged,
@@ -88,7 +91,7 @@ def _is_roofed(roof: _Roof) -> bool:
     if not len(above):
         return False
     places = np.stack([x, y, np.full_like(x, eyes)], axis=-1).reshape(-1, 3).astype(np.float32)
-    (met,), _ = cast(tree_of(above), places, np.array([[1e-3, 2e-3, 1]], np.float32), np.inf)
+    (met,), _ = cast(tree_of(above), places, UP, np.zeros(len(places), np.int32), np.inf)
     a, b, c = above[met[met >= 0]].transpose(1, 0, 2)
     is_underside = np.cross(b - a, c - a)[:, 2] < 0
     return bool(is_underside.sum() >= ROOFED * len(places))

@@ -48,6 +48,8 @@ GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 CLUSTERS = 6
 ALIKE = 0.9  # cosine between normals of one screen
 FEWEST = 2  # rays of a screen
+BURIED = 0.9  # share of rays that meet the inner side of a thing close by, from which on a probe is within that thing
+CLOSE = 2.5  # cells
 WINDOW = np.float32(0.8)  # of degree 1 of things' light, which is read as it is: less of it below zero behind a bright thing
 
 
@@ -77,17 +79,19 @@ def _found(key, keys, patches):
 
 
 @njit
-def patch(met, far, origins, directions, normals, materials, low, cells, ground, table, count, ids):
+def patch(met, far, origins, directions, turn, normals, materials, low, cells, ground, table, count, ids):
     """The patch that each ray hits, into ids (K, N) int32, SKY or FAR_GROUND for none; returns how many patches there are then,
     of which there were `count` before, or -1 if there is no room for more.
 
-    met, far (K, N): triangle or -1, distance; low (3,), cells: of the patches' grid; ground (6,): its height, the box (lowest
-    and highest x and y) within which it has patches, whether there is one; table: see `patches.Table`.
+    met, far (K, N): triangle or -1, distance; directions, turn: see `kernels_trace.cast`; low (3,), cells: of the patches'
+    grid; ground (6,): its height, the box (lowest and highest x and y) within which it has patches, whether there is one;
+    table: see `patches.Table`.
     """
     m_ground = nb.int64(NO_MATERIAL)
-    for k in range(U(directions.shape[0])):
-        d = directions[k, U(0)], directions[k, U(1)], directions[k, U(2)]
+    for k in range(U(directions.shape[1])):
         for i in range(U(origins.shape[0])):
+            w = U(turn[i])
+            d = directions[w, k, U(0)], directions[w, k, U(1)], directions[w, k, U(2)]
             o = origins[i, U(0)], origins[i, U(1)], origins[i, U(2)]
             t, triangle, m = far[k, i], nb.int64(met[k, i]), m_ground
             normal = f4(0), f4(0), f4(1)
@@ -252,49 +256,68 @@ def look_up(bounces, places, normals, glow, inside):
 
 
 @njit(fastmath=FAST)
-def send(ids, weights, sky, far_ground, sent, light):
-    """What arrives at the probes: irradiance, columns 0 to THINGS of light (N, 48), from patches that send `sent` (M, 3), the
-    sky (K, 3) and the ground far away (3,). weights (K, 9): of each direction in the terms of irradiance.
+def send(ids, turn, own, weights, sky, far_ground, sent, light):
+    """What arrives at the probes: irradiance, columns 0 to THINGS of rows `own` (N,) of light (N, 48), from patches that send
+    `sent` (M, 3), the sky (W, K, 3) and the ground far away (3,). weights (W, K, 9): of each direction in the terms of
+    irradiance.
     """
     light[:, :THINGS] = f4(0)
     for k in range(U(ids.shape[0])):
         for i in range(U(ids.shape[1])):
-            own = ids[k, i]
+            met, at, which = ids[k, i], U(own[i]), U(turn[i])
             r, g, b = far_ground[0], far_ground[1], far_ground[2]
-            if own >= 0:
-                r, g, b = sent[U(own), U(0)], sent[U(own), U(1)], sent[U(own), U(2)]
-            elif own == SKY:
-                r, g, b = sky[k, U(0)], sky[k, U(1)], sky[k, U(2)]
+            if met >= 0:
+                r, g, b = sent[U(met), U(0)], sent[U(met), U(1)], sent[U(met), U(2)]
+            elif met == SKY:
+                r, g, b = sky[which, k, U(0)], sky[which, k, U(1)], sky[which, k, U(2)]
             for j in range(U(9)):
-                w = weights[k, j]
-                light[i, U(3) * j] += w * r
-                light[i, U(3) * j + U(1)] += w * g
-                light[i, U(3) * j + U(2)] += w * b
+                w = weights[which, k, j]
+                light[at, U(3) * j] += w * r
+                light[at, U(3) * j + U(1)] += w * g
+                light[at, U(3) * j + U(2)] += w * b
 
 
 @njit(fastmath=FAST)
-def send_sharply(ids, directions, patch_is_ground, sent, light):
+def send_sharply(ids, turn, own, directions, patch_is_ground, sent, light):
     """The other columns: light of things in each direction, and what they leave of the sky and of the ground."""
     light[:, THINGS:] = f4(0)
-    per = f4(1) / f4(directions.shape[0])
-    for k in range(U(directions.shape[0])):
-        x, y, z = directions[k, U(0)], directions[k, U(1)], directions[k, U(2)]
-        first = U(UPPER if z > f4(0) else LOWER)
+    per = f4(1) / f4(directions.shape[1])
+    for k in range(U(directions.shape[1])):
         for i in range(U(ids.shape[1])):
-            own = ids[k, i]
-            if own < 0 or patch_is_ground[U(own)]:
-                light[i, first] += per
-                light[i, first + U(1)] += per * x
-                light[i, first + U(2)] += per * y
-                light[i, first + U(3)] += per * z
+            met, at, which = ids[k, i], U(own[i]), U(turn[i])
+            x, y, z = directions[which, k, U(0)], directions[which, k, U(1)], directions[which, k, U(2)]
+            if met < 0 or patch_is_ground[U(met)]:
+                first = U(UPPER if z > f4(0) else LOWER)
+                light[at, first] += per
+                light[at, first + U(1)] += per * x
+                light[at, first + U(2)] += per * y
+                light[at, first + U(3)] += per * z
                 continue
             for c in range(U(3)):
-                radiance = sent[U(own), c] * per
-                at = U(THINGS) + c
-                light[i, at] += radiance
-                light[i, at + U(3)] += radiance * y * f4(3 * WINDOW)
-                light[i, at + U(6)] += radiance * z * f4(3 * WINDOW)
-                light[i, at + U(9)] += radiance * x * f4(3 * WINDOW)
+                radiance = sent[U(met), c] * per
+                column = U(THINGS) + c
+                light[at, column] += radiance
+                light[at, column + U(3)] += radiance * y * f4(3 * WINDOW)
+                light[at, column + U(6)] += radiance * z * f4(3 * WINDOW)
+                light[at, column + U(9)] += radiance * x * f4(3 * WINDOW)
+
+
+@njit
+def blur(light, opens, step, out):
+    """Half of each probe's light from the probe itself, a quarter from the one before and the one behind along an axis, `step`
+    probes away, as far as nothing lies between: opens (N,) is 1 where the way to the next one is free.
+    """
+    quarter = f4(0.25)
+    for i in range(light.shape[0]):
+        before = quarter * opens[i - step] if i >= step else f4(0)
+        behind = quarter * opens[i] if i + step < light.shape[0] else f4(0)
+        for c in range(light.shape[1]):
+            value = light[i, c] * (f4(1) - before - behind)
+            if before > f4(0):
+                value += light[i - step, c] * before
+            if behind > f4(0):
+                value += light[i + step, c] * behind
+            out[i, c] = value
 
 
 @inner
@@ -343,26 +366,46 @@ def _place_screen(own, octant, x, y, z, rows, columns, screens):
     screens[cell, 3 * CORNERS + bits] = -offset
 
 
+@inner
+def _close(octant, x, y, z, rows, columns, screens):
+    """Nothing of the cell that lies that way is seen from the probe at these places."""
+    bits = 7 - octant
+    u, v, w = x - (bits & 1), y - (bits >> 1 & 1), z - (bits >> 2 & 1)
+    if u >= 0 and v >= 0 and w >= 0:
+        screens[(w * rows + v) * columns + u, 3 * CORNERS + bits] = f4(-1)
+
+
 @njit(_nrt=True)
-def screen(met, far, directions, normals, cells, shape, screens):
+def screen(met, far, directions, turn, own, normals, cells, shape, screens, buried):
     """Fill Bounces.screens (N, 32): of the hits of each probe that lie in one of the eight cells around it, the plane of the
-    normal that most of them have. shape (3,): layers, rows, columns.
+    normal that most of them have. own (N,): which probe each column is; shape (3,): layers, rows, columns.
+
+    A probe within a small thing sees nothing of any cell: buried (N,) is 1 there, else 0.
     """
     rows, columns = shape[1], shape[2]
     screens[:, : 3 * CORNERS], screens[:, 3 * CORNERS :] = f4(0), f4(1)
     found = np.empty((8, CLUSTERS, 5), np.float32)
     for i in range(met.shape[1]):
         found[:] = f4(0)
-        hits = 0
-        for k in range(directions.shape[0]):
-            d, t = directions[k], far[k, i] * cells
-            if met[k, i] >= 0 and t * max(abs(d[0]), abs(d[1]), abs(d[2])) <= f4(1):
-                n = normals[met[k, i]]
-                _add_hit(found[_octant(d)], n, n[0] * d[0] + n[1] * d[1] + n[2] * d[2], t)
+        hits = inner_sides = 0
+        for k in range(directions.shape[1]):
+            d, t = directions[turn[i], k], far[k, i] * cells
+            if met[k, i] < 0 or t > f4(CLOSE):
+                continue
+            n = normals[met[k, i]]
+            along = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+            inner_sides += 1 if along > f4(0) else 0
+            if t * max(abs(d[0]), abs(d[1]), abs(d[2])) <= f4(1):
+                _add_hit(found[_octant(d)], n, along, t)
                 hits += 1
-        x, y, z = i % columns, i // columns % rows, i // (columns * rows)
-        for octant in range(8 if hits > 0 else 0):
-            _place_screen(found[octant], octant, x, y, z, rows, columns, screens)
+        at = own[i]
+        x, y, z = at % columns, at // columns % rows, at // (columns * rows)
+        buried[at] = 1 if inner_sides >= BURIED * directions.shape[1] else 0
+        for octant in range(8 if hits > 0 or buried[at] else 0):
+            if buried[at]:
+                _close(octant, x, y, z, rows, columns, screens)
+            else:
+                _place_screen(found[octant], octant, x, y, z, rows, columns, screens)
 
 
 @njit(fastmath=FAST)

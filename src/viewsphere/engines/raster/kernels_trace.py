@@ -197,16 +197,18 @@ def nearest(tree, o, d, limit, is_any, stack):
 
 
 @njit(_nrt=True)
-def cast(tree, origins, directions, limit, met, far):
-    """For each direction (K, 3) and each origin (N, 3): what is met first, as a place in the tree, into met (K, N) int32, -1
-    for nothing before `limit`; and how far away, in lengths of the direction, into far (K, N) float32.
+def cast(tree, origins, directions, turn, limit, met, far):
+    """For each k of K and each origin (N, 3): what is met first in direction `directions[turn, k]` (W, K, 3), as a place in the
+    tree, into met (K, N) int32, -1 for nothing before `limit`; and how far away, in lengths of the direction, into far (K, N)
+    float32. turn (N,): each origin's own.
 
-    Parallel rays one after another find the same boxes in the cache.
+    Parallel rays one after another find the same boxes in the cache: origins of one turn are best next to one another.
     """
     stack = np.empty((DEEP, 2), np.float32)
-    for k in range(U(directions.shape[0])):
-        d = directions[k, U(0)], directions[k, U(1)], directions[k, U(2)]
+    for k in range(U(directions.shape[1])):
         for i in range(U(origins.shape[0])):
+            w = U(turn[i])
+            d = directions[w, k, U(0)], directions[w, k, U(1)], directions[w, k, U(2)]
             o = origins[i, U(0)], origins[i, U(1)], origins[i, U(2)]
             found, t = nearest(tree, o, d, limit, False, stack)
             met[k, i], far[k, i] = found, t

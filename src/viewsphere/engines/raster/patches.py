@@ -34,10 +34,13 @@ class Table(NamedTuple):
 
 
 class Rays(NamedTuple):
-    """Rays from all origins (N, 3) in all directions (K, 3), and what they met: triangles (K, N), -1 for none, and how far."""
+    """Rays from origins (N, 3) in the K directions (W, K, 3) of each origin's turn (N,), and what they met: triangles (K, N),
+    -1 for none, and how far.
+    """
 
     origins: Float32
     directions: Float32
+    turn: Int32
     met: Int32
     far: Float32
 
@@ -127,7 +130,7 @@ def patches_of(bundles: list[Rays], normals: Float32, materials: Int32, low: Flo
         for rays in bundles:
             own = np.empty(rays.met.shape, np.int32)
             if count >= 0:
-                met = rays.met, rays.far, rays.origins, rays.directions
+                met = rays.met, rays.far, rays.origins, rays.directions, rays.turn
                 count = kernels.patch(*met, normals, materials, low, np.float32(cells), ground, table, count, own)
             ids.append(own)
         if count >= 0:

@@ -33,12 +33,13 @@ def tree_of(corners: Float32) -> Tree:
     return Tree(bounds[:nodes].copy(), links[:nodes].copy(), np.concatenate([a, b - a, c - a], axis=1), order)
 
 
-def cast(tree: Tree, origins: Float32, directions: Float32, limit: float) -> tuple[Int32, Float32]:
-    """What rays from all origins (N, 3) in all directions (K, 3) meet first: the triangle, (K, N) int32, -1 for nothing before
-    `limit`, and how far away it is, (K, N).
+def cast(tree: Tree, origins: Float32, directions: Float32, turn: Int32, limit: float) -> tuple[Int32, Float32]:
+    """What rays from all origins (N, 3) meet first, in the K directions (W, K, 3) of each origin's `turn` (N,): the triangle,
+    (K, N) int32, -1 for nothing before `limit`, and how far away it is, (K, N).
     """
-    met, far = np.empty((len(directions), len(origins)), np.int32), np.empty((len(directions), len(origins)), np.float32)
-    kernels.cast(tree, origins, directions, np.float32(limit), met, far)
+    shape = directions.shape[1], len(origins)
+    met, far = np.empty(shape, np.int32), np.empty(shape, np.float32)
+    kernels.cast(tree, origins, directions, turn, np.float32(limit), met, far)
     found = met >= 0
     met[found] = tree.order[met[found]]
     return met, far
