@@ -18,7 +18,7 @@ from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.viewpoints import PoseList
 
 PAGE = (ROOT / "docs" / "animation.md").read_text("utf-8")
-WALK, CAMERA = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+WALK, PEOPLE, CAMERA = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
 
 
 def test_recipes_are_valid(tmp_path, monkeypatch):
@@ -28,6 +28,8 @@ def test_recipes_are_valid(tmp_path, monkeypatch):
         Path(name).write_bytes(b"x")
     planned = plan(Recipe(**yaml.safe_load(WALK)))
     assert (planned.time_steps, planned.frames) == (3, 6)
+    people = Recipe(**yaml.safe_load(PEOPLE), viewpoints={"azimuth": [0], "elevation": [10], "distance": 4})
+    assert people.models[0].clip == "walk" and people.time is not None
     asked = Recipe(**yaml.safe_load(CAMERA))
     assert asked.models[0].poses == "moving"
     assert isinstance(asked.viewpoints, PoseList)

@@ -510,7 +510,6 @@ def test_a_recipe_says_motions():
         ({"motion": "spin"}, r"^models\[0\]\.motion: expected \{kind: \.\.\.\} or a list of these; found 'spin'$"),
         ({"motion": [{}]}, r"^models\[0\]\.motion\[0\]\.kind: expected a value; found nothing$"),
         ({"motion": {"kind": "random", "enter": 3, "leave": 2}}, r"^models\[0\]\.motion: expected leave after enter; found"),
-        ({"motion": {"kind": "clip"}}, "expected a file for the motion clip; found the zoo"),
     ],
 )
 def test_mistakes_of_recipes(fields, message):

@@ -16,7 +16,6 @@ import typer
 from viewsphere.cli.arguments import AsJson, cores
 from viewsphere.cli.terminal import print_json
 from viewsphere.errors import UserError
-from viewsphere.zoo.people import makehuman
 
 LEFT = 12
 
@@ -39,6 +38,8 @@ def doctor(
     if setup_blender:
         _set_up_blender()
     if setup_people:
+        from viewsphere.zoo.people import makehuman
+
         makehuman.set_up(lambda line: typer.echo(line, err=True))
     found = examine()
     if json_:
@@ -50,6 +51,8 @@ def doctor(
 
 def examine() -> dict[str, Any]:
     """The findings about this machine, as plain data."""
+    from viewsphere.zoo.people import makehuman
+
     return {
         "viewsphere": version("viewsphere"),
         "python": {"version": platform.python_version(), "executable": sys.executable},

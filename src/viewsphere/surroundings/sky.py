@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from viewsphere.model.scene import AnyLight, AnySky, Daylight, Environment, HemisphereLight, Sky, Sun
 from viewsphere.surroundings.daylight import daylight_picture, opening
-from viewsphere.surroundings.environment_file import read_environment
 from viewsphere.surroundings.sun import Distant, sun_light
 
 Float = NDArray[np.float64]
@@ -44,6 +43,8 @@ def sky_pictures(sky: AnySky, sun: Sun | None, lights: Sequence[AnyLight], has_g
     Without a ground there is grey below a made sky, which reflects the light that it receives. Raises RecipeError when a
     picture cannot be read.
     """
+    from viewsphere.surroundings.environment_file import read_environment  # whose kernels take a second to load
+
     even = even_light(lights)
     if isinstance(sky, Environment):
         seen = read_environment(Path(sky.file)).pixels * np.float32(sky.strength)
