@@ -459,15 +459,16 @@ def neighbourhood() -> None:
     save("zoo_neighbourhood.jpg", grid([s.rgb for s in samples], 3, 1276))
 
 
-def place(name: str, model: str, distance: float, elevation: float, fov: float, exposure: float) -> None:
-    """A model in six draws of a place."""
+def place(name: str, model: str, distance: tuple[float, float], elevation: float, fov: float, exposure: float) -> None:
+    """A model in six draws of a place, from where it is seen."""
     tiles: list[Any] = []
     for seed in range(6):
         made_of = Recipe(
             name=name,
             seed=seed,
             models=[{"source": model}],
-            viewpoints={"azimuth": 40 + 60 * seed, "elevation": elevation, "distance": distance},
+            viewpoints={"kind": "sphere", "count": 1, "elevation": elevation, "distance": distance},
+            min_visibility=0.5,
             camera={"size": [480, 320], "fov_deg": fov},
             scene={
                 "place": f"zoo:{name}",
@@ -535,9 +536,9 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_shop": partial(family, "shop", 30, width=1000),
     "zoo_fountain": partial(family, "fountain", 20, width=900, elevation=22),
     "zoo_person": partial(family, "person", 25),
-    "zoo_town": partial(place, "town", "zoo:car", 11.0, 11.0, 60.0, 0.3),
-    "zoo_room": partial(place, "room", "zoo:chair", 1.45, 14.0, 90.0, 1.0),
-    "zoo_table_top": partial(place, "table_top", "zoo:mug", 0.55, 28.0, 65.0, 1.0),
+    "zoo_town": partial(place, "town", "zoo:car", (9.0, 12.0), 11.0, 60.0, 0.3),
+    "zoo_room": partial(place, "room", "zoo:chair", (1.3, 2.2), 14.0, 85.0, 2.6),
+    "zoo_table_top": partial(place, "table_top", "zoo:mug", (0.5, 0.6), 28.0, 65.0, 2.4),
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 

