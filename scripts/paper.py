@@ -537,8 +537,8 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_fountain": partial(family, "fountain", 20, width=900, elevation=22),
     "zoo_person": partial(family, "person", 25),
     "zoo_town": partial(place, "town", "zoo:car", (9.0, 12.0), 11.0, 60.0, 0.3),
-    "zoo_room": partial(place, "room", "zoo:chair", (1.3, 2.2), 14.0, 85.0, 2.6),
-    "zoo_table_top": partial(place, "table_top", "zoo:mug", (0.5, 0.6), 28.0, 65.0, 2.4),
+    "zoo_room": partial(place, "room", "zoo:chair", (1.3, 2.2), 14.0, 85.0, 3.5),
+    "zoo_table_top": partial(place, "table_top", "zoo:mug", (0.5, 0.6), 28.0, 65.0, 3.8),
 }
 """What makes each picture; the pictures on the chairs' billboards are made first."""
 
