@@ -3,9 +3,9 @@
 Reference scene (bench_scene.py): a zoo car cut to about 75,000 triangles with 1,024 x 1,024 textures (base colour,
 occlusion-roughness-metallic, normals) on every material, the ground, an environment with a sun, 640x480; files: RGB PNG,
 instance PNG, float32 depth and normals, annotations. `--scaling` measures how cost grows instead and draws
-docs/images/scaling.svg. `--labels` measures each label (bench_labels.py), `--motion` sequences (bench_motion.py), `--training`
-how fast frames reach a training loop (bench_training.py, with PyTorch), `--exports` 25 formats at once (bench_exports.py),
-`--cycles` and `--endurance` the Cycles engine (bench_cycles.py).
+docs/images/scaling.svg. `--labels` measures each label (bench_labels.py), `--motion` sequences (bench_motion.py), `--bounces`
+light between surfaces (bench_bounces.py), `--training` how fast frames reach a training loop (bench_training.py, with PyTorch),
+`--exports` 25 formats at once (bench_exports.py), `--cycles` and `--endurance` the Cycles engine (bench_cycles.py).
 """
 
 from __future__ import annotations
@@ -276,6 +276,10 @@ def in_folder(args: argparse.Namespace, folder: Path) -> None:
         from bench_motion import motion
 
         motion(folder)
+    elif args.bounces:
+        from bench_bounces import light
+
+        light(folder)
     else:
         from bench_training import training
 
@@ -288,6 +292,7 @@ def main() -> None:
     options.add_argument("--workers", action="store_true", help="measure frames a second with one and two workers, too")
     options.add_argument("--scaling", action="store_true", help="measure how cost grows, and draw it")
     options.add_argument("--motion", action="store_true", help="measure what flow, states, tracks and moving pictures cost")
+    options.add_argument("--bounces", action="store_true", help="measure what light between surfaces costs")
     options.add_argument("--labels", action="store_true", help="measure what each label costs, with 1 and 20 objects")
     options.add_argument("--exports", action="store_true", help="measure 25 formats in one pass, and what they encode")
     options.add_argument("--training", action="store_true", help="measure reading and rendering for a training loop")
@@ -308,7 +313,7 @@ def main() -> None:
 
         report(max(1, args.frames // 12), embree)
         return
-    if args.motion or args.exports or args.training:
+    if args.motion or args.bounces or args.exports or args.training:
         with tempfile.TemporaryDirectory() as name:
             in_folder(args, Path(name))
         return

@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_probes as kernels
 from viewsphere.engines.raster.environment import Surrounding
-from viewsphere.engines.raster.kernels_bounce import terms
+from viewsphere.engines.raster.kernels_bounce import THINGS, terms
 from viewsphere.engines.raster.kernels_environment import LAMPS
+from viewsphere.engines.raster.kernels_lanterns import shine_at_probes, shine_down, shine_near
+from viewsphere.engines.raster.lanterns import Lanterns, lanterns_of
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.patches import Patches, Rays, patches_of
 from viewsphere.engines.raster.records import NO_BOUNCES, Bounces, Float32, Int32, Surfaces, Textures
@@ -40,6 +42,9 @@ TURNS = 8
 their rays (interleaved sampling, Keller and Heidrich 2001).
 """
 
+INSIDE_OUT = 0.5
+"""Share of probes within things from which on it is the room that they are in: it is modelled inside out."""
+
 PAD = 2
 """Cells around all things."""
 
@@ -60,6 +65,11 @@ UNCHANGED, ROUNDS = 0.004, 48
 
 SKY_ROUGHNESS = 0.3
 """Of a mirror that blurs the sky about as far as to the next ray."""
+
+TERMS = np.array([1 / 4, *[1 / 2] * 3, *[15 / 16] * 2, 5 / 64, 15 / 16, 15 / 64], np.float32) / np.float32(math.pi)
+"""Factors of the terms of irradiance / pi: the constants of spherical harmonics, squared, times the share of each degree that
+irradiance keeps (1, 2/3, 1/4).
+"""
 
 
 @dataclass(frozen=True)
@@ -84,7 +94,7 @@ class Hall:
 
 class _Seen(NamedTuple):
     """What depends on no light. own (N,): which probe each ray's origin is; opens (3, N): whether nothing lies between a probe
-    and the next one along x, y and z.
+    and the next one along x, y and z; below: rays of the ground's map.
     """
 
     bounces: Bounces
@@ -93,6 +103,7 @@ class _Seen(NamedTuple):
     own: Int32
     opens: Float32
     patches: Patches
+    below: Rays | None
 
 
 @dataclass(frozen=True)
@@ -130,12 +141,15 @@ def _bake(lighting: _Lighting) -> Bounces:
     sky = np.empty(rays.directions.shape, np.float32)
     kernels.sky_from(surrounding, rays.directions.reshape(-1, 3), np.float32(SKY_ROUGHNESS), sky.reshape(-1, 3))
     weights = irradiance_weights(rays.directions)
-    own = lit.emitted + lit.reflectance * lit.arrived / np.float32(math.pi)
+    lanterns = lanterns_of(hall.which, hall.surfaces, patches, lit.emitted, TURNS)
+    shining = _shining(seen, lanterns, lit.emitted, weights, off)
+    own = lit.emitted * (lanterns.froms == 0)[:, None] + lit.reflectance * lit.arrived / np.float32(math.pi)
     places, normals, sent = patches.places, patches.normals, own
     glow, inside = np.empty_like(own), np.empty(len(own), np.float32)
     sources = patches.ids[0], rays.turn, seen.own
     for _ in range(ROUNDS):
         kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
+        bounces.light[:, :THINGS] += shining[:, :THINGS]
         kernels.look_up(bounces, places, normals, glow, inside)
         before = sent
         sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * surrounding.up)
@@ -143,12 +157,26 @@ def _bake(lighting: _Lighting) -> Bounces:
             break
     kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
     kernels.send_sharply(*sources, rays.directions, patches.is_ground, sent, bounces.light)
+    bounces.light[:] += shining
     _smooth(bounces.light, seen.opens, bounces.grid)
-    if hall.has_map:
-        light = np.empty((bounces.floor.shape[0] ** 2, 4), np.float32)
-        kernels.send_down(patches.ids[1], sent, light)
-        bounces.floor[:] = light.reshape(bounces.floor.shape) * _window(len(bounces.floor))[..., None].astype(np.float32)
+    if seen.below is not None:
+        floor = np.empty((bounces.floor.shape[0] ** 2, 4), np.float32)
+        kernels.send_down(patches.ids[1], sent, floor)
+        lamps = lanterns.froms, lit.emitted, np.float32(off)
+        shine_down(seen.tree, seen.below.origins, TURNS, lanterns.points, patches.ids[1], seen.below.far, *lamps, floor)
+        bounces.floor[:] = floor.reshape(bounces.floor.shape) * _window(len(bounces.floor))[..., None].astype(np.float32)
     return bounces
+
+
+def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32, off: float) -> Float32:
+    """What arrives at the probes from what shines by itself, as rows of `Bounces.light`."""
+    light, rays = np.zeros_like(seen.bounces.light), seen.rays
+    if len(lanterns.points):
+        own = rays.turn, seen.own
+        points = lanterns.points, TERMS, np.float32(off)
+        shine_at_probes(seen.tree, rays.origins, *own, TURNS, *points, light)
+        shine_near(seen.patches.ids[0], rays.far, *own, weights, rays.directions, lanterns.froms, emitted, light)
+    return light
 
 
 def _smooth(light: Float32, opens: Float32, shape: NDArray[np.int64]) -> None:
@@ -169,16 +197,20 @@ def _look(hall: Hall) -> _Seen:
     directions = _turned(_sphere(FEW_RAYS if len(points) > MANY_PROBES else RAYS))
     met, far = cast(tree, points, directions, turn, np.inf)
     normals = hall.surfaces.normals[hall.which]
-    screens = np.empty((len(points), 32), np.float32)
-    buried = np.zeros(len(points), np.uint8)
-    kernels.screen(met, far, directions, turn, own, normals, np.float32(cells), shape, screens, buried)
+    screens = np.empty((len(points), 64), np.float32)
+    buried = np.empty(len(points), np.uint8)
+    kernels.bury(met, far, directions, turn, own, normals, np.float32(cells), buried)
+    if (buried > 0).mean() > INSIDE_OUT:
+        buried[buried == 1] = 0
+    kernels.screen(met, far, directions, turn, own, normals, np.float32(cells), shape, buried, screens)
     rays = Rays(points, directions, turn, _whole(hall, met), far)
-    bundles, floor, floor_frame = [rays], NO_BOUNCES.floor, NO_BOUNCES.floor_frame
+    bundles, below, floor, floor_frame = [rays], None, NO_BOUNCES.floor, NO_BOUNCES.floor_frame
     if hall.has_map and hall.ground_z is not None:
         places, floor_frame = _map(hall, hall.ground_z)
         floor, up, same = np.zeros((MAP, MAP, 4), np.float32), _dome(MAP_RAYS)[None], np.zeros(len(places), np.int32)
         met, far = cast(tree, places, up, same, np.inf)
-        bundles.append(Rays(places, up, same, _whole(hall, met), far))
+        below = Rays(places, up, same, _whole(hall, met), far)
+        bundles.append(below)
     patches = patches_of(
         bundles, hall.surfaces.normals, hall.surfaces.material, corner.astype(np.float32), cells * PATCHES, _ground(hall)
     )
@@ -191,6 +223,7 @@ def _look(hall: Hall) -> _Seen:
         own,
         _opens(tree, points, own, buried, cells, shape),
         patches,
+        below,
     )
 
 
@@ -235,7 +268,7 @@ def _opens(
         is_last = at[axis] == shape[2 - axis] - 1
         opens[axis, is_last] = 0
         step = int(np.prod(shape[3 - axis :]))
-        opens[axis][~is_last] *= 1 - np.maximum(buried[~is_last], buried[np.flatnonzero(~is_last) + step])
+        opens[axis][~is_last] *= (buried[~is_last] == 0) & (buried[np.flatnonzero(~is_last) + step] == 0)
     return opens
 
 
@@ -296,10 +329,7 @@ def irradiance_weights(directions: Float32) -> Float32:
     """
     x, y, z = np.moveaxis(directions.astype(np.float64), -1, 0)
     values = np.stack([np.ones_like(x), *terms(x, y, z)], axis=-1)
-    # The constants of spherical harmonics, squared, times the share of each degree that irradiance keeps.
-    squares = np.array([1 / 4, *[3 / 4] * 3, *[15 / 4] * 2, 5 / 16, 15 / 4, 15 / 16]) / math.pi
-    kept = np.array([1, *[2 / 3] * 3, *[1 / 4] * 5])
-    return (values * squares * kept * 4 * math.pi / directions.shape[-2]).astype(np.float32)
+    return (values * TERMS * 4 * math.pi / directions.shape[-2]).astype(np.float32)
 
 
 def _window(size: int) -> Float:

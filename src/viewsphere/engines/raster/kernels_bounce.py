@@ -3,7 +3,7 @@
 A probe holds the irradiance of every direction, spherical harmonics up to degree 2 (Ramamoorthi and Hanrahan 2001), the light
 that things alone send to it, up to degree 1, and how much they leave of the sky and of the ground. A sample reads the eight
 probes around it a little off its surface: those in front of the surface, and of these only such as see it. What a probe sees of
-a cell is bounded by one plane for each of the eight cells around it, from the rays it was baked with; without this a lit room
+a cell is bounded by two planes for each of the eight cells around it, from the rays it was baked with; without this a lit room
 would shine through its walls (cf. Majercik, Guertin, Nowrouzezahrai and McGuire 2019, who keep depths).
 """
 
@@ -55,11 +55,11 @@ COLUMNS = 48
 # Columns of Bounces.light: irradiance / pi in nine terms of red, green and blue, radiance of things in four, visible share and
 # mean direction above the horizon and below; the last is unused.
 IRRADIANCE, THINGS, UPPER, LOWER = 0, 27, 39, 43
-CORNERS = 8
+CORNERS, SCREENS = 8, 2
 BEHIND = 0.02  # least weight of a probe that lies behind the surface
 HIDDEN = 0.002  # least weight of a probe that does not see the surface
 SHARP = 30.0  # one over the depth behind a screen, in cells, at which a probe no longer counts
-SLACK = -0.01  # cells behind a screen that still count in full; less than none, so that probes within a wall never count
+SLACK = -0.02  # cells behind a screen that still count in full; less than none, so that probes within a wall never count
 OFF = 0.1  # cells off the surface from which a sample looks at the screens
 PLACE, FIRST_X, FIRST_Y, FIRST_Z = LX, LY, LZ, GLOW_R  # scratch; the cell's first corner
 _blend4, _blend48 = blend(4), blend(COLUMNS)
@@ -107,10 +107,10 @@ def _look(typing, screens, cell, x, y, z, b, at):
 
     def code(context, builder, signature, arguments):
         table, target = (context.make_array(signature.args[n])(context, builder, arguments[n]).data for n in (0, 5))
-        row = builder.mul(arguments[1], arguments[1].type(4 * CORNERS))
-        planes = [load(builder, table, builder.add(row, row.type(k * CORNERS)), CORNERS) for k in range(4)]
+        row = builder.mul(arguments[1], arguments[1].type(4 * SCREENS * CORNERS))
+        planes = [load(builder, table, builder.add(row, row.type(k * CORNERS)), CORNERS) for k in range(4 * SCREENS)]
         place = [spread(builder, value, CORNERS) for value in arguments[2:5]]
-        before = dot(planes[:3], place) + planes[3]
+        before = least(dot(planes[:3], place) + planes[3], dot(planes[4:7], place) + planes[7])
         seen = least(most((before + SLACK) * SHARP + 1, HIDDEN), 1)
         scatter(target, arguments[6], {k: k * BLOCK for k in range(CORNERS)}, seen)
         return context.get_dummy_value()

@@ -31,7 +31,7 @@ from viewsphere.engines.raster.kernels_block import (
     UNLIT,
     VX,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_bounce import CORNERS, LOWER, THINGS, UPPER, bounced
+from viewsphere.engines.raster.kernels_bounce import CORNERS, LOWER, SCREENS, THINGS, UPPER, bounced
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground
 from viewsphere.engines.raster.kernels_light import UNEXPOSED, light_around, weigh
 from viewsphere.engines.raster.kernels_material import material
@@ -48,8 +48,10 @@ GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 CLUSTERS = 6
 ALIKE = 0.9  # cosine between normals of one screen
 FEWEST = 2  # rays of a screen
-BURIED = 0.9  # share of rays that meet the inner side of a thing close by, from which on a probe is within that thing
-CLOSE = 2.5  # cells
+SECOND = 0.12  # share of the rays towards a cell that a second screen must have
+# Shares of rays that meet the inner side of a thing from which on a probe is within it: of any size, and of a small one,
+# where so many meet it within so many cells.
+BURIED, BURIED_CLOSE, CLOSE = 0.95, 0.8, 2.5
 WINDOW = np.float32(0.8)  # of degree 1 of things' light, which is read as it is: less of it below zero behind a bright thing
 
 
@@ -347,65 +349,78 @@ def _add_hit(own, n, along, far):
 
 
 @inner
-def _place_screen(own, octant, x, y, z, rows, columns, screens):
-    """The plane of the normal that most hits have, for the cell that lies that way from the probe at these places."""
+def _place_screen(found, which, least, bits, cell, screens):
+    """The plane of the normal that most hits have, as screen `which` of a cell's corner; there must be `least` of them, which
+    are forgotten then.
+    """
     best = 0
     for c in range(1, CLUSTERS):
-        if own[c, 4] > own[best, 4]:
+        if found[c, 4] > found[best, 4]:
             best = c
-    bits = 7 - octant  # which of the cell's corners the probe is
-    u, v, w = x - (bits & 1), y - (bits >> 1 & 1), z - (bits >> 2 & 1)
-    if own[best, 4] < f4(FEWEST) or u < 0 or v < 0 or w < 0:
+    own = found[best]
+    if own[4] < f4(least):
         return
-    per = f4(1) / np.sqrt(own[best, 0] ** 2 + own[best, 1] ** 2 + own[best, 2] ** 2)
-    offset, cell = own[best, 3] / own[best, 4], (w * rows + v) * columns + u
+    per = f4(1) / np.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
+    offset, first = own[3] / own[4], 4 * CORNERS * which + bits
     for axis in range(3):
-        n = own[best, axis] * per
-        screens[cell, CORNERS * axis + bits] = n
+        n = own[axis] * per
+        screens[cell, first + CORNERS * axis] = n
         offset += n * f4(bits >> axis & 1)
-    screens[cell, 3 * CORNERS + bits] = -offset
+    screens[cell, first + 3 * CORNERS] = -offset
+    own[4] = f4(0)
 
 
 @inner
-def _close(octant, x, y, z, rows, columns, screens):
-    """Nothing of the cell that lies that way is seen from the probe at these places."""
-    bits = 7 - octant
+def _cell_of(octant, at, rows, columns):
+    """The cell that lies this way from a probe, and which of its corners the probe is; no cell is below 0."""
+    bits, x, y, z = 7 - octant, at % columns, at // columns % rows, at // (columns * rows)
     u, v, w = x - (bits & 1), y - (bits >> 1 & 1), z - (bits >> 2 & 1)
-    if u >= 0 and v >= 0 and w >= 0:
-        screens[(w * rows + v) * columns + u, 3 * CORNERS + bits] = f4(-1)
+    return (w * rows + v) * columns + u if u >= 0 and v >= 0 and w >= 0 else -1, bits
+
+
+@njit
+def bury(met, far, directions, turn, own, normals, cells, buried):
+    """Which probes are within a thing, into buried (N,) uint8: 2 within a small one, 1 within one of any size, else 0."""
+    for i in range(met.shape[1]):
+        inner_sides = close = 0
+        for k in range(directions.shape[1]):
+            if met[k, i] < 0:
+                continue
+            d, n = directions[turn[i], k], normals[met[k, i]]
+            if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > f4(0):
+                inner_sides += 1
+                close += 1 if far[k, i] * cells <= f4(CLOSE) else 0
+        rays = directions.shape[1]
+        buried[own[i]] = 2 if close >= BURIED_CLOSE * rays else 1 if inner_sides >= BURIED * rays else 0
 
 
 @njit(_nrt=True)
-def screen(met, far, directions, turn, own, normals, cells, shape, screens, buried):
-    """Fill Bounces.screens (N, 32): of the hits of each probe that lie in one of the eight cells around it, the plane of the
-    normal that most of them have. own (N,): which probe each column is; shape (3,): layers, rows, columns.
-
-    A probe within a small thing sees nothing of any cell: buried (N,) is 1 there, else 0.
+def screen(met, far, directions, turn, own, normals, cells, shape, buried, screens):
+    """Fill Bounces.screens (N, 64): of the hits of each probe that lie in one of the eight cells around it, the planes of the
+    two normals that most of them have. own (N,): which probe each column is; shape (3,): layers, rows, columns. A buried probe
+    sees nothing of any cell.
     """
     rows, columns = shape[1], shape[2]
-    screens[:, : 3 * CORNERS], screens[:, 3 * CORNERS :] = f4(0), f4(1)
+    for k in range(4 * SCREENS * CORNERS):
+        screens[:, k] = f4(1) if k // CORNERS % 4 == 3 else f4(0)
     found = np.empty((8, CLUSTERS, 5), np.float32)
+    second = max(directions.shape[1] * SECOND / 8, FEWEST)
     for i in range(met.shape[1]):
         found[:] = f4(0)
-        hits = inner_sides = 0
+        hits = 0
         for k in range(directions.shape[1]):
             d, t = directions[turn[i], k], far[k, i] * cells
-            if met[k, i] < 0 or t > f4(CLOSE):
-                continue
-            n = normals[met[k, i]]
-            along = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
-            inner_sides += 1 if along > f4(0) else 0
-            if t * max(abs(d[0]), abs(d[1]), abs(d[2])) <= f4(1):
-                _add_hit(found[_octant(d)], n, along, t)
+            if met[k, i] >= 0 and t * max(abs(d[0]), abs(d[1]), abs(d[2])) <= f4(1):
+                n = normals[met[k, i]]
+                _add_hit(found[_octant(d)], n, n[0] * d[0] + n[1] * d[1] + n[2] * d[2], t)
                 hits += 1
-        at = own[i]
-        x, y, z = at % columns, at // columns % rows, at // (columns * rows)
-        buried[at] = 1 if inner_sides >= BURIED * directions.shape[1] else 0
-        for octant in range(8 if hits > 0 or buried[at] else 0):
-            if buried[at]:
-                _close(octant, x, y, z, rows, columns, screens)
-            else:
-                _place_screen(found[octant], octant, x, y, z, rows, columns, screens)
+        for octant in range(8 if hits > 0 or buried[own[i]] else 0):
+            cell, bits = _cell_of(octant, own[i], rows, columns)
+            if cell >= 0 and buried[own[i]]:
+                screens[cell, 3 * CORNERS + bits] = f4(-1)
+            elif cell >= 0:
+                _place_screen(found[octant], 0, FEWEST, bits, cell, screens)
+                _place_screen(found[octant], 1, second, bits, cell, screens)
 
 
 @njit(fastmath=FAST)

@@ -67,6 +67,11 @@ class Patches:
         return self.table.triangle[: self.count, 0] == kernels.GROUND
 
     @property
+    def triangles(self) -> Int32:
+        """One triangle of each, (M,); negative on the ground."""
+        return self.table.triangle[: self.count, 0]
+
+    @property
     def places(self) -> Float32:
         """Their middles, (M, 3)."""
         return self._mean(self.table.place)
