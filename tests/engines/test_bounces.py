@@ -287,6 +287,25 @@ def test_auto_is_on_indoors_only():
     assert is_bounced(stage_of(small, scene, street))
 
 
+def test_a_wide_place_has_probes_around_its_origin_only(monkeypatch):
+    """Half a metre apart at most, or little more; at their border a wall that stands in the open has the same light as without
+    them: nothing is seen of it.
+    """
+    monkeypatch.setattr(baking, "MOST", 4_000)
+    wide = mesh_of(
+        np.concatenate([rectangle((-200, -200, 0), (400, 0, 0), (0, 400, 0)), box((-40, 6, 0), (40, 7, 9))]), matt(0.3)
+    )
+    small = mesh_of(box((-0.2, -0.2, 0), (0.2, 0.2, 0.4)), matt(0.5))
+    scene = Scene(sun=None, sky=EVEN, finish=OUT)
+    stage = stage_of(small, scene, wide)
+    baked = stage.baked(0)
+    assert np.prod(baked.bounces.grid) <= 4_000
+    assert baked.unit / float(baked.bounces.frame[3]) < 1.0
+    view = camera(120, 40, 60, 0, 10, 16, (0, 0, 2.0))
+    row = painted(stage, view)[18].astype(int)
+    assert np.abs(np.diff(row, axis=0)).max() <= 6
+
+
 def test_a_green_ball_colours_the_ground_and_its_neighbour():
     green = replace(ball(0.4, (0, 0, 0.4)), materials=(replace(matt(0.5), base_color=(0.05, 0.6, 0.05, 1.0)),))
     scene = Scene(sun=Sun(azimuth_deg=0, elevation_deg=50), sky=EVEN, ground=Ground(), finish=OUT)
