@@ -22,6 +22,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, PointLight, Scene, Sky, Sun
 from viewsphere.model.thing import Thing
+from viewsphere.run import warm
 
 EVEN = Sky(zenith=(1, 1, 1), horizon=(1, 1, 1))
 OUT = Finish(background=BLACK)
@@ -304,6 +305,14 @@ def test_a_wide_place_has_probes_around_its_origin_only(monkeypatch):
     view = camera(120, 40, 60, 0, 10, 16, (0, 0, 2.0))
     row = painted(stage, view)[18].astype(int)
     assert np.abs(np.diff(row, axis=0)).max() <= 6
+
+
+def test_workers_of_a_place_find_these_kernels_compiled():
+    """Also when it is the place that decides: what is rendered beforehand has a roof."""
+    small = mesh_of(box((1, 1, 0), (1.5, 1.5, 0.4)), matt(0.5))
+    shot = stage_of(small, Scene(sun=None, sky=EVEN), room(0.5), bounces="auto").shot
+    tiny = warm._small(shot)
+    assert is_bounced(raster.stage(tiny, lambda spec, step=None: warm._card()))
 
 
 def test_a_green_ball_colours_the_ground_and_its_neighbour():
