@@ -22,6 +22,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, PointLight, Scene, Sky, Sun
 from viewsphere.model.thing import Thing
+from viewsphere.run import warm
 
 EVEN = Sky(zenith=(1, 1, 1), horizon=(1, 1, 1))
 OUT = Finish(background=BLACK)
@@ -285,6 +286,33 @@ def test_auto_is_on_indoors_only():
     assert not is_bounced(stage_of(small, scene, mesh_of(box((-4, -4, -1), (4, 4, 0)), matt(0.5)), bounces="auto"))
     assert not is_bounced(stage_of(small, scene, bounces="auto"))
     assert is_bounced(stage_of(small, scene, street))
+
+
+def test_a_wide_place_has_probes_around_its_origin_only(monkeypatch):
+    """Half a metre apart at most, or little more; at their border a wall that stands in the open has the same light as without
+    them: nothing is seen of it.
+    """
+    monkeypatch.setattr(baking, "MOST", 4_000)
+    wide = mesh_of(
+        np.concatenate([rectangle((-200, -200, 0), (400, 0, 0), (0, 400, 0)), box((-40, 6, 0), (40, 7, 9))]), matt(0.3)
+    )
+    small = mesh_of(box((-0.2, -0.2, 0), (0.2, 0.2, 0.4)), matt(0.5))
+    scene = Scene(sun=None, sky=EVEN, finish=OUT)
+    stage = stage_of(small, scene, wide)
+    baked = stage.baked(0)
+    assert np.prod(baked.bounces.grid) <= 4_000
+    assert baked.unit / float(baked.bounces.frame[3]) < 1.0
+    view = camera(120, 40, 60, 0, 10, 16, (0, 0, 2.0))
+    row = painted(stage, view)[18].astype(int)
+    assert np.abs(np.diff(row, axis=0)).max() <= 6
+
+
+def test_workers_of_a_place_find_these_kernels_compiled():
+    """Also when it is the place that decides: what is rendered beforehand has a roof."""
+    small = mesh_of(box((1, 1, 0), (1.5, 1.5, 0.4)), matt(0.5))
+    shot = stage_of(small, Scene(sun=None, sky=EVEN), room(0.5), bounces="auto").shot
+    tiny = warm._small(shot)
+    assert is_bounced(raster.stage(tiny, lambda spec, step=None: warm._card()))
 
 
 def test_a_green_ball_colours_the_ground_and_its_neighbour():

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 
 SIZE = 16
 BESIDE: Matrix4 = ((1.0, 0.0, 0.0, 0.1), *IDENTITY[1:])
+FLOOR: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, -1.0, 0.0, -1.0), IDENTITY[3])
+ROOF: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 1.0), IDENTITY[3])
 PACKAGE = Path(plugins.__file__).parent
 
 
@@ -87,7 +89,9 @@ def is_compiled(shot: Shot) -> bool:
 
 
 def load_kernels(shot: Shot) -> None:
-    """Render one tiny frame of two cards with the shot's engine, channels, scene and lens; the picture is thrown away."""
+    """Render one tiny frame of two cards with the shot's engine, channels, scene and lens, and of two more for a place; the
+    picture is thrown away.
+    """
     _render(_small(shot))
 
 
@@ -100,6 +104,9 @@ def _small(shot: Shot) -> Shot:
         sensors.append(Sensor(name="beside", intrinsics=sensors[0].intrinsics, rig_from_sensor=BESIDE))
     spec = ModelSpec(key="card", source="card", category="card", category_id=1)
     things = tuple(Thing(id=i, model=spec) for i in (1, 2))
+    if any(thing.scenery for thing in shot.things):  # a place is a floor and a roof
+        level = (Motion.still(pose) for pose in (FLOOR, ROOF))
+        things += tuple(Thing(id=0, model=spec, motion=motion, scenery=True) for motion in level)
     above = Viewpoint(index=0, azimuth_deg=0, elevation_deg=20, distance=2)
     first = looking(above, (0.0, 0.0, 0.0), index=0, finish=shot.finish(0))
     alike = {"key": "", "first": 0, "sequence": "", "rig": Rig(sensors=tuple(sensors)), "labels": {}}

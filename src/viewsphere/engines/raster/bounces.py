@@ -34,6 +34,11 @@ CELL = 0.2
 ALONG, MOST = 24, 40_000
 """Probes along the longest side, at least, and of a volume, at most."""
 
+WIDEST, DEPTH, HEIGHT, FADE = 0.5, 1.0, 6.0, 6.0
+"""Metres between probes at most: of a place that would have too many only the part around its origin has some, from so many
+metres below to so many above, whose light fades out over so many cells.
+"""
+
 RAYS, FEW_RAYS, MANY_PROBES = 384, 256, 24_000
 """Of a probe, and of one of so many."""
 
@@ -147,12 +152,14 @@ def _bake(lighting: _Lighting) -> Bounces:
     places, normals, sent = patches.places, patches.normals, own
     glow, inside = np.empty_like(own), np.empty(len(own), np.float32)
     sources = patches.ids[0], rays.turn, seen.own
+    facing = (1 + normals[:, 2:]) / 2
+    elsewhere = facing * surrounding.up + (1 - facing) * surrounding.below
     for _ in range(ROUNDS):
         kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
         bounces.light[:, :THINGS] += shining[:, :THINGS]
         kernels.look_up(bounces, places, normals, glow, inside)
         before = sent
-        sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * surrounding.up)
+        sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * elsewhere)
         if np.abs(sent - before).sum(dtype=np.float64) <= UNCHANGED * sent.sum(dtype=np.float64):
             break
     kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
@@ -192,7 +199,7 @@ def _look(hall: Hall) -> _Seen:
     """Cast all rays."""
     corners = hall.surfaces.vertices[hall.surfaces.triangles[hall.which], 11:14]
     tree = tree_of(corners)
-    corner, cells, shape = _grid(hall)
+    corner, cells, shape, fade = _grid(hall)
     points, turn, own = _points(corner, cells, shape)
     directions = _turned(_sphere(FEW_RAYS if len(points) > MANY_PROBES else RAYS))
     met, far = cast(tree, points, directions, turn, np.inf)
@@ -211,10 +218,16 @@ def _look(hall: Hall) -> _Seen:
         met, far = cast(tree, places, up, same, np.inf)
         below = Rays(places, up, same, _whole(hall, met), far)
         bundles.append(below)
+    last = corner + (shape[::-1] - 1) / cells
     patches = patches_of(
-        bundles, hall.surfaces.normals, hall.surfaces.material, corner.astype(np.float32), cells * PATCHES, _ground(hall)
+        bundles,
+        hall.surfaces.normals,
+        hall.surfaces.material,
+        np.array([*corner, *last], np.float32),
+        cells * PATCHES,
+        _ground(hall),
     )
-    frame = np.array([*corner, cells, PUSH, hall.ground_z is not None], np.float32)
+    frame = np.array([*corner, cells, PUSH, hall.ground_z is not None, 1 / fade], np.float32)
     light = np.zeros((len(points), 48), np.float32)
     return _Seen(
         Bounces(light, screens, shape, frame, floor, floor_frame),
@@ -232,16 +245,33 @@ def _whole(hall: Hall, met: Int32) -> Int32:
     return np.where(met >= 0, hall.which[met], np.int32(-1))
 
 
-def _grid(hall: Hall) -> tuple[Float, float, NDArray[np.int64]]:
-    """Where the first probe is, cells per length, and layers, rows and columns (3,)."""
-    size = hall.high - hall.low
-    cells = max(hall.unit / CELL, ALONG / float(size.max()))
-    while np.prod(np.ceil(size * cells) + 2 * PAD + 1) > MOST:
-        cells *= 0.95
-    # Half a cell off the corner: walls of even sizes then do not run along probes.
-    shape = (np.ceil(size * cells + 0.5) + 2 * PAD + 1).astype(np.int64)
+def _grid(hall: Hall) -> tuple[Float, float, NDArray[np.int64], float]:
+    """Where the first probe is, cells per length, layers, rows and columns (3,), and within how many cells light from elsewhere
+    fades in at the border.
+    """
+    low, high, cells = hall.low, hall.high, max(hall.unit / CELL, ALONG / float((hall.high - hall.low).max()))
+    fade = 1.0
+    if np.prod(_shape((high - low) * hall.unit / WIDEST)) > MOST:
+        low, high, fade = *_part(hall), FADE
+    size = high - low
+    while np.prod(_shape(size * cells)) > MOST:
+        cells *= 0.97
+    shape = _shape(size * cells)
     spare = (shape - 1) / cells - size
-    return hall.low - spare / 2, cells, shape[::-1].copy()
+    return low - spare / 2, cells, shape[::-1].copy(), fade
+
+
+def _shape(size: Float) -> NDArray[np.int64]:
+    """Columns, rows and layers (3,) around a box of this size in cells; walls of even sizes do not run along probes."""
+    return (np.ceil(size + 0.5) + 2 * PAD + 1).astype(np.int64)
+
+
+def _part(hall: Hall) -> tuple[Float, Float]:
+    """The part of a wide place around its origin, where targets stand, or around its middle, that may have enough probes."""
+    middle = np.zeros(3) if ((hall.low < 0) & (hall.high > 0)).all() else (hall.low + hall.high) / 2
+    below, above, side = DEPTH / hall.unit, HEIGHT / hall.unit, math.sqrt(MOST * WIDEST**3 / (DEPTH + HEIGHT)) / hall.unit
+    low, high = np.array([-side / 2, -side / 2, -below]), np.array([side / 2, side / 2, above])
+    return np.maximum(middle + low, hall.low), np.minimum(middle + high, hall.high)
 
 
 def _points(corner: Float, cells: float, shape: NDArray[np.int64]) -> tuple[Float32, Int32, Int32]:

@@ -79,7 +79,7 @@ def _place(frame, columns, rows, layers, b):
     own = [(b[PX + k * BLOCK] - frame.one(k)) * cells for k in range(3)]
     place = [at + n * push for at, n in zip(own, normal, strict=True)]
     most_of = [least(at, points - 1 - at) for at, points in zip(place, (columns, rows, layers), strict=True)]
-    b[INSIDE] = clamp(least(least(most_of[0], most_of[1]), most_of[2]))
+    b[INSIDE] = clamp(least(least(most_of[0], most_of[1]), most_of[2]) * frame.one(6))
     is_within = (most_of[0] > 0) & (most_of[1] > 0) & (most_of[2] > 0)
     # NaN is placed at the first point.
     place = [where(is_within, at, 0) for at in place]

@@ -43,6 +43,7 @@ f4 = nb.float32
 U = nb.uintp
 SKY, FAR_GROUND, GROUND = -1, -2, -3
 NO_MATERIAL = -1
+AWAY = 24  # patches outside of the probes' box from which on they are twice as wide
 HITS = 4  # of a patch that are shaded, at most
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 CLUSTERS = 6
@@ -56,16 +57,22 @@ WINDOW = np.float32(0.8)  # of degree 1 of things' light, which is read as it is
 
 
 @inner
-def _key(p, normal, cells, low, m):
-    """One number for a patch: its cell, the axis along which its normal is longest, and its material."""
-    axis = 0
-    for k in range(1, 3):
+def _key(p, normal, cells, box, m):
+    """One number for a patch: its cell, the axis along which its normal is longest, and its material. Patches outside of the
+    probes' box are the larger the farther they are.
+    """
+    axis, out = 0, f4(0)
+    for k in range(3):
         if abs(normal[k]) > abs(normal[axis]):
             axis = k
-    side = 2 * axis + (1 if normal[axis] > f4(0) else 0)
-    key = np.uint64(m % 4096 if m >= 0 else 4095) * np.uint64(8) + np.uint64(side)
+        out = max(out, box[k] - p[k], p[k] - box[k + 3])
+    side, level = 2 * axis + (1 if normal[axis] > f4(0) else 0), 0
+    while out * cells > f4(AWAY):
+        cells *= f4(0.5)
+        level += 1
+    key = np.uint64((m if m >= 0 else 4095) + 64 * level) % np.uint64(4096) * np.uint64(8) + np.uint64(side)
     for k in range(3):
-        at = nb.int64(np.floor((p[k] - low[k]) * cells + f4(0.25)))
+        at = nb.int64(np.floor((p[k] - box[k]) * cells + f4(0.25)))
         key = key * np.uint64(1 << 16) + np.uint64((at + 32768) & 65535)
     return key
 
@@ -81,13 +88,13 @@ def _found(key, keys, patches):
 
 
 @njit
-def patch(met, far, origins, directions, turn, normals, materials, low, cells, ground, table, count, ids):
+def patch(met, far, origins, directions, turn, normals, materials, box, cells, ground, table, count, ids):
     """The patch that each ray hits, into ids (K, N) int32, SKY or FAR_GROUND for none; returns how many patches there are then,
     of which there were `count` before, or -1 if there is no room for more.
 
-    met, far (K, N): triangle or -1, distance; directions, turn: see `kernels_trace.cast`; low (3,), cells: of the patches'
-    grid; ground (6,): its height, the box (lowest and highest x and y) within which it has patches, whether there is one;
-    table: see `patches.Table`.
+    met, far (K, N): triangle or -1, distance; directions, turn: see `kernels_trace.cast`; box (6,): lowest and highest x, y, z
+    of the probes, from the first of which patches are counted, `cells` in a length; ground (6,): its height, the box (lowest
+    and highest x and y) within which it has patches, whether there is one; table: see `patches.Table`.
     """
     m_ground = nb.int64(NO_MATERIAL)
     for k in range(U(directions.shape[1])):
@@ -111,7 +118,7 @@ def patch(met, far, origins, directions, turn, normals, materials, low, cells, g
                 m, x, y, z = nb.int64(materials[triangle]), normals[triangle, 0], normals[triangle, 1], normals[triangle, 2]
                 side = f4(-1) if x * d[0] + y * d[1] + z * d[2] > f4(0) else f4(1)
                 normal = x * side, y * side, z * side
-            key = _key(p, normal, cells, low, m)
+            key = _key(p, normal, cells, box, m)
             at = _found(key, table.keys, table.patch)
             if table.patch[at] < 0:
                 if 2 * count >= len(table.keys):

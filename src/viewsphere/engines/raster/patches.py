@@ -127,7 +127,7 @@ _ANY_VIEW = PictureRays(
 """A view whose rays have no grid: footprints are taken across each ray, see `kernels_material`."""
 
 
-def patches_of(bundles: list[Rays], normals: Float32, materials: Int32, low: Float32, cells: float, ground: Float32) -> Patches:
+def patches_of(bundles: list[Rays], normals: Float32, materials: Int32, box: Float32, cells: float, ground: Float32) -> Patches:
     """The patches that all these rays hit; arguments as in `kernels_probes.patch`."""
     size = ROOM
     while True:
@@ -136,7 +136,7 @@ def patches_of(bundles: list[Rays], normals: Float32, materials: Int32, low: Flo
             own = np.empty(rays.met.shape, np.int32)
             if count >= 0:
                 met = rays.met, rays.far, rays.origins, rays.directions, rays.turn
-                count = kernels.patch(*met, normals, materials, low, np.float32(cells), ground, table, count, own)
+                count = kernels.patch(*met, normals, materials, box, np.float32(cells), ground, table, count, own)
             ids.append(own)
         if count >= 0:
             return Patches(_cut(table, count), count, tuple(ids))

@@ -70,9 +70,10 @@ class Bounces(NamedTuple):
     light (cells, 48) float32: what each probe sees, columns named in `kernels_bounce`; screens (cells, 64): of the cell whose
     first corner a probe is, for each of its eight corners, what part of the cell that corner sees: the normal's x of all eight,
     y, z and offset of a plane, in cells from the first corner, and those of a second one; grid (3,) int64: layers, rows and
-    columns, 0 for no volume; frame (6,): x, y, z of the first probe, cells per length, how far from a surface it is read in
-    cells, whether there is a ground; floor (n, n, 4): radiance of a white matt ground lit by things alone; floor_frame (4,):
-    its cells per length, its corner's x and y, whether there is a map.
+    columns, 0 for no volume; frame (7,): x, y, z of the first probe, cells per length, how far from a surface it is read in
+    cells, whether there is a ground, one over the number of cells in which its light fades out at the border; floor (n, n, 4):
+    radiance of a white matt ground lit by things alone; floor_frame (4,): its cells per length, its corner's x and y, whether
+    there is a map.
     """
 
     light: Float32
@@ -87,7 +88,7 @@ NO_BOUNCES = Bounces(
     np.zeros((1, 48), np.float32),
     np.zeros((1, 64), np.float32),
     np.zeros(3, np.int64),
-    np.zeros(6, np.float32),
+    np.zeros(7, np.float32),
     np.zeros((2, 2, 4), np.float32),
     np.zeros(4, np.float32),
 )
