@@ -198,7 +198,7 @@ def _armrests(p: Sofa, coats: _Coats) -> list[Piece]:
     if p.arms == "wood":
         return [Piece("armrest", coats.wood, both_sides(_wooden(p)))]
     if p.arms == "rolled":
-        arm = moved(_rolled(p.arm / 1.45, low, p.arm_height, p.depth - 0.1), (-x - 0.55 * p.arm, -0.02, 0))
+        arm = moved(_rolled(p.arm / 1.45, low, p.arm_height, p.depth - 0.1), (-x - 0.4 * p.arm, -0.02, 0))
     elif p.arms == "sloped":
         arm = moved(_sloped(p, low), (-x - p.arm / 2, 0, 0))
     else:
