@@ -159,7 +159,7 @@ def _render(shot: Shot) -> None:
     card = _card()
     engine: Engine = plugins.load("engines", shot.engine)
     stage = engine.stage(shot, lambda spec, step=None, /: card)
-    boxes = [box_vertices(*card.bounds)] * len(shot.things)
+    boxes = [box_vertices(*card.bounds)] * len(shot.objects)
     views = ShotViews(shot, stage.at, lambda thing: card)
     for number in shot.samples:
         sample = render_sample(views, number, stage, boxes, [None] * len(boxes), [lambda: Traits(1.0)] * len(boxes))
