@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 from viewsphere import plugins
 from viewsphere.aside import aside, temporary
@@ -29,8 +29,6 @@ ZOO = "zoo:"
 
 Home = Literal["table", "floor", "street", "garden", "water", "place"]
 """Where a family is found; `place`: it is a place's ground or building, not a thing in it."""
-
-HOMES: tuple[Home, ...] = get_args(Home)
 
 
 def home(family: str) -> Home:

@@ -110,7 +110,7 @@ def _grained(
     rings = textures.noise(rng, size, 3.0, 10.0)
     if upright:
         grain, rings = grain.T, rings.T
-    tone = np.random.default_rng(count).normal(0, 1, count)[cell]
+    tone = rng.standard_normal(count)[cell]
     shade = (1 + 0.05 * tone + 0.045 * grain + 0.05 * rings) * (0.45 + 0.55 * gap)
     return textures.painted(name, color, np.clip(shade, 0.2, 1.5))
 

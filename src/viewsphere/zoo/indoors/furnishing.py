@@ -109,8 +109,6 @@ class Furnishing:
 
     def design(self, family: str, fits: Fits = lambda p: True) -> tuple[int, Any] | None:
         """A seed of the family and the parameters that it draws, which are as they are wanted; None where none is found."""
-        if family not in plugins.families():
-            return None
         draw = plugins.family(family).draw
         for _ in range(DRAWS):
             seed = int(self.rng.integers(1 << 31))
