@@ -157,10 +157,10 @@ class Scenes:
         @lru_cache(maxsize=64)
         def scene(names: Names, names_of_finish: tuple[Names, ...]) -> Scene:
             entry, rng_of = self.recipe.scene, self._rng_of(names)
-            sun, sky = drawn(entry.sun, rng_of, ("sun",)), self._sky(drawn(entry.sky, rng_of, ("sky",)), names)
-            at_night = drawn(entry.sky, rng_of, ("sky",))
+            sun, above = drawn(entry.sun, rng_of, ("sun",)), drawn(entry.sky, rng_of, ("sky",))
+            sky = self._sky(above, names)
             made = Scene(
-                sun=_moon(at_night.night, sun) if isinstance(at_night, NightSky) else _sun(sun, sky),
+                sun=_moon(above.night, sun) if isinstance(above, NightSky) else _sun(sun, sky),
                 sky=sky.model_copy(update={"strength": 0.0}) if isinstance(sky, Daylight) and is_night(sun) else sky,
                 lights=_lights(entry.lights, rng_of),
                 ground=self._ground(drawn(entry.ground, rng_of, ("ground",)), rng_of),
