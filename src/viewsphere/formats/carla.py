@@ -13,8 +13,8 @@ this tool's, with the names of CARLA's Python classes.
 
 Tags are those since version 0.9.14. Of stuff: sky Sky, ground Ground, road Roads, road marking RoadLine, pavement SideWalks,
 grass Terrain, vegetation Vegetation, building Building, fence Fence, pole Pole, traffic sign TrafficSign, street furniture
-Static, scenery Other. Categories that are called like a tag have it (person is Pedestrian); all others are Dynamic. Where
-nothing is, depth is 1000 m, as is what is farther.
+Static, vehicle Car, person Pedestrian, wall Wall, scenery and what is indoors Other. Categories that are called like a
+tag have it (person is Pedestrian); all others are Dynamic. Where nothing is, depth is 1000 m, as is what is farther.
 
 The world is Unreal's, left-handed, x ahead, y to the right, z up: (x, -y, z) of ours, metres. A transform is a location and a
 rotation, pitch, yaw and roll in degrees, as `carla.Transform` has them; a camera looks along its x, and so does an object; its
@@ -79,6 +79,10 @@ STUFF = {
     "pole": "Pole",
     "traffic sign": "TrafficSign",
     "street furniture": "Static",
+    "vehicle": "Car",
+    "person": "Pedestrian",
+    "wall": "Wall",
+    **dict.fromkeys(("floor", "ceiling", "door", "window", "furniture", "household item"), "Other"),
 }
 
 

@@ -15,8 +15,9 @@ has its own, turned so that the camera looks along y: y is ahead, x to the right
 
 Classes are SUNCG's 36 root classes as far as SSCNet tells them apart: ceiling 1, floor 2, wall 3, window 4, chair 6, bed 7,
 sofa 8, table 9, desk 10, cabinet (bookcase, dresser, ...) 11, television 16, and 36 for all other objects. The ground, roads,
-pavement and grass are floor, buildings, scenery and fences wall, all other stuff 36. 0 is empty, or outside of the picture;
-where there is a room (scenery above, and scenery or ground below), empty cells outside of it are 255.
+pavement and grass are floor, buildings, scenery and fences wall, furniture is 11, all other stuff 36. 0 is
+empty, or outside of the picture; where there is a room (scenery above, and scenery or ground below), empty cells outside of it
+are 255.
 
 SSCNet's own code takes pictures of 640 x 480 pixels of a camera with f = 518.8579 and its axis through the middle of pixel
 (320, 240): `camera: {K: [[518.8579, 0, 320.5], [0, 518.8579, 240.5], [0, 0, 1]], size: [640, 480]}`. Its writer leaves out one
@@ -79,7 +80,14 @@ STUFF = {
     "scenery": 3,
     "building": 3,
     "fence": 3,
-    **dict.fromkeys(("vegetation", "pole", "traffic sign", "street furniture"), OTHER),
+    "wall": 3,
+    "floor": 2,
+    "ceiling": 1,
+    "window": 4,
+    "furniture": 11,
+    **dict.fromkeys(
+        ("vegetation", "pole", "traffic sign", "street furniture", "vehicle", "person", "door", "household item"), OTHER
+    ),
 }
 
 

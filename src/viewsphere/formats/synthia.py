@@ -94,6 +94,9 @@ STUFF = {
     "pole": 7,
     "traffic sign": 9,
     "road marking": 12,
+    "vehicle": 8,
+    "person": 10,
+    **dict.fromkeys(("wall", "door", "window"), 2),
 }
 THINGS = {
     "building": 2,

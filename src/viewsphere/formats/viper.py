@@ -8,9 +8,9 @@
     <split>/camera/001.csv                    frame, projection (16 numbers), view (16 numbers), row by row
 
 Splits are train, val and test. The second sensor of a rig has a sequence 001-1, and so on. Classes are VIPER's 32. Of stuff:
-ground and grass are terrain, road markings road, pavement sidewalk, poles and street furniture infrastructure, scenery
-unlabeled (0). Categories that are called as one of its classes have it; others are numbered from 32 on, and listed in
-classes.csv. Objects keep their ids in a sequence; 0 is none.
+ground and grass are terrain, road markings road, pavement sidewalk, poles and street furniture infrastructure, vehicles cars,
+walls, doors and windows buildings, scenery and what else is indoors unlabeled (0). Categories that are called as one of its
+classes have it; others are numbered from 32 on, and listed in classes.csv. Objects keep their ids in a sequence; 0 is none.
 
 Flow is pixels, right and down, NaN where there is none; ptlflow passes over what is longer than 512. Its 16 bits are exact to
 one part in 2048. The view matrix leads from the axes that the camera has in the first frame of its sequence to those that it
@@ -103,6 +103,9 @@ STUFF = {
     "pole": 10,
     "traffic sign": 14,
     "street furniture": 10,
+    "vehicle": 24,
+    "person": 20,
+    **dict.fromkeys(("wall", "door", "window"), 9),
 }
 UPWARD = np.diag([1.0, -1, -1])
 

@@ -34,35 +34,81 @@ STUFF: dict[str, Color] = {
     "pole": (153, 153, 153),
     "traffic sign": (220, 220, 0),
     "street furniture": (250, 170, 30),
+    "vehicle": (0, 0, 142),
+    "person": (220, 20, 60),
+    "wall": (120, 120, 120),
+    "floor": (80, 50, 50),
+    "ceiling": (120, 120, 80),
+    "door": (8, 255, 51),
+    "window": (230, 230, 230),
+    "furniture": (224, 5, 255),
+    "household item": (255, 122, 8),
 }
-"""Names of stuff, in the order of their ids, and their colours, sRGB: those of Cityscapes where it has the class."""
+"""Names of stuff, in the order of their ids, and colours, sRGB: those of Cityscapes, else of ADE20K, where it has the class."""
 
 STUFF_IDS = {name: i for i, name in enumerate(STUFF, 1)}
 SKY, GROUND, SCENERY = (STUFF_IDS[name] for name in ("sky", "ground", "scenery"))
 
-_MARKS = dict.fromkeys(("centre_line", "edge_line", "zebra"), "road marking")
-_PAVED = dict.fromkeys(("gutter", "kerb", "edging", "pavement", "crossing"), "pavement")
+_MARKS = dict.fromkeys(("centre_line", "zebra"), "road marking")
+_PAVED = dict.fromkeys(("kerb", "pavement"), "pavement")
 _GREEN = dict.fromkeys(("lawn", "verge", "base"), "grass")
+_STREET = {"": "road", "edge_line": "road marking", **_MARKS, **_PAVED, **_GREEN}
+_TOWN = {
+    "": "road",
+    **dict.fromkeys(("stop_line", "parking"), "road marking"),
+    "yard": "pavement",
+    **_MARKS,
+    **_PAVED,
+    **_GREEN,
+}
+_DOOR = dict.fromkeys(("door", "door_frame", "door_handle"), "door")
+_WINDOW = dict.fromkeys(("window_frame", "window_handle", "sill"), "window")
+_FITTED = dict.fromkeys(("ceiling_lamp", "radiator", "curtain", "curtain_rod"), "furniture")
+_VEHICLES = ("bicycle", "boat", "bus", "car", "motorcycle", "truck")
+_STREET_FURNITURE = ("bench", "bollard", "fountain", "post box", "traffic cone", "wheelie bin")
+_FURNITURE = ("bed", "cabinet", "chair", "lamp", "refrigerator", "plain table", "sofa", "table")
+_HOUSEHOLD = (
+    "backpack",
+    "book",
+    "bottle",
+    "bowl",
+    "box",
+    "can",
+    "hair drier",
+    "laptop",
+    "monitor",
+    "mug",
+    "open box",
+    "plant",
+    "plate",
+)
 
-STUFF_OF: dict[str, dict[str, str]] = {
-    "street": {"": "road", **_MARKS, **_PAVED, **_GREEN},
+Parts = dict[str, str]
+
+STUFF_OF: dict[str, Parts] = {
+    "street": {**_STREET, **dict.fromkeys(("gutter", "edging", "crossing"), "pavement")},
+    "town ground": _TOWN,
     "landscape": {"": "grass", "road": "road", "thicket": "vegetation", "wood": "vegetation", "house": "building"},
+    "outskirts": {"": "grass", "thicket": "vegetation", "wood": "vegetation", "house": "building"},
     "driveway": {"": "pavement"},
     "house": {"": "building"},
+    "shop": {"": "building"},
     "tree": {"": "vegetation"},
     "hedge": {"": "vegetation"},
     "shrub": {"": "vegetation"},
     "fence": {"": "fence"},
-    "lamp_post": {"": "pole"},
-    "road_sign": {"": "traffic sign", "pole": "pole"},
-    "bench": {"": "street furniture"},
-    "post_box": {"": "street furniture"},
-    "wheelie_bin": {"": "street furniture"},
-    "shop": {"": "building"},
-    "traffic_light": {"": "traffic sign", "base": "pole", "post": "pole"},
-    "traffic_cone": {"": "street furniture"},
-    "bollard": {"": "street furniture"},
-    "fountain": {"": "street furniture"},
+    "lamp post": {"": "pole"},
+    "road sign": {"": "traffic sign", "pole": "pole"},
+    "traffic light": {"": "traffic sign", "base": "pole", "post": "pole"},
+    **dict.fromkeys(_STREET_FURNITURE, Parts({"": "street furniture"})),
+    **dict.fromkeys(_VEHICLES, Parts({"": "vehicle"})),
+    "person": {"": "person"},
+    "interior": {"": "wall", "floor": "floor", "ceiling": "ceiling", "outer_wall": "building", **_DOOR, **_WINDOW, **_FITTED},
+    **dict.fromkeys(_FURNITURE, Parts({"": "furniture"})),
+    "shelf": {"": "furniture", **dict.fromkeys(("book", "box", "vase"), "household item")},
+    "television": {"": "household item", **dict.fromkeys(("console", "door", "drawer", "handle", "leg"), "furniture")},
+    "rug": {"": "floor"},
+    **dict.fromkeys(_HOUSEHOLD, Parts({"": "household item"})),
 }
 """Stuff that the pieces of the zoo's places are, by their categories and names of parts; empty: all other parts."""
 
@@ -73,8 +119,8 @@ def stuff_of(category: str, part: str) -> int:
     Where the zoo does not say, names do: of a part, else of its category, without numbers at their end and what comes before a
     slash: Road.001 is road. Else it is scenery.
     """
-    if category in STUFF_OF:
-        known = STUFF_OF[category]
+    known = STUFF_OF.get(category.replace("_", " "))
+    if known is not None:
         return STUFF_IDS[known.get(part, known[""])]
     names = (re.sub(r"[\W\d_]+$", "", name.rpartition("/")[-1]).lower().replace("_", " ") for name in (part, category))
     return next((STUFF_IDS[name] for name in names if name in STUFF_IDS), SCENERY)

@@ -32,7 +32,8 @@ CATEGORY_IDS: dict[str, int] = dict(
 
 _OTHER_SPELLINGS = {
     **{"hairdryer": "hair drier", "bike": "bicycle", "motorbike": "motorcycle", "aeroplane": "airplane"},
-    **{"sofa": "couch", "tvmonitor": "tv", "television": "tv"},
+    **{"sofa": "couch", "tvmonitor": "tv", "television": "tv", "monitor": "tv"},
+    **{"mug": "cup", "plant": "potted plant", "table": "dining table"},
 }
 _FIRST_FREE_ID = 91
 

@@ -41,6 +41,8 @@ STUFF = {
     "building": "Building",
     "pole": "Pole",
     "traffic sign": "TrafficSign",
+    "vehicle": "Car",
+    **dict.fromkeys(("wall", "door", "window"), "Building"),
 }
 """What stuff is there; all else is Misc."""
 
