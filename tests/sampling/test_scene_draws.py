@@ -123,6 +123,13 @@ def test_every_entry_becomes_a_part_of_the_scene(scene, parts):
     assert found == Scene(ground=Ground()).model_copy(update=parts)
 
 
+@pytest.mark.parametrize(("place", "stops"), [(None, 0), ("zoo:neighbourhood", 0), ("zoo:room", 3.5), ("zoo:table_top", 3.5)])
+def test_a_room_is_exposed_as_what_is_indoors_unless_the_recipe_says_otherwise(place, stops):
+    scene = {"place": place} if place else {}
+    assert scene_of(scene).finish.view.exposure == stops
+    assert scene_of({**scene, "view": {"exposure": -1.0}}).finish.view.exposure == -1
+
+
 def test_lamps_stand_where_cameras_of_their_angles_would():
     at = {"azimuth_deg": 90, "elevation_deg": 30, "distance": 2}
     (lamp,) = scene_of({"lights": {"at": at, "strength": 1}}).lights

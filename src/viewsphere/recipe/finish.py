@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -86,8 +86,15 @@ class SmootherEntry(entry_of(Smoother), PerFrame):
     """What is done to the border between the targets and their background."""
 
 
+Stops = Drawn[Annotated[float, Field(strict=True, ge=-16, le=16)]] | Literal["auto"]
+
+
 class ViewEntry(entry_of(ViewTransform), PerFrame):
     """From light to a picture."""
+
+    exposure: Stops = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        default="auto", description="stops: 1 is twice as bright; auto: 0, and in rooms of the zoo as much as shows them by day"
+    )
 
 
 class EffectsEntry(entry_of(Effects, without=("seed",)), PerFrame):

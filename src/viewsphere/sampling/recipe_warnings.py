@@ -65,7 +65,7 @@ def no_light(scene: SceneEntry) -> Iterator[str]:
 def hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
     """A warning for an exposure that makes white black, or black white."""
     lit = [light for light in _lights(scene) if light[1] > 0]
-    if not lit or scene.blend is not None:
+    if not lit or scene.blend is not None or scene.view.exposure == "auto":
         return
     low, high = span(scene.view.exposure)
     if max(light[1] for light in lit) * 2**low < DARK:

@@ -38,12 +38,12 @@ from viewsphere.model.substance import Substance
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.draws import RngOf, alternatives, drawn, is_random
 from viewsphere.recipe.entries import concrete, pictures_of
-from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame
+from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame, ViewEntry
 from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, NightEntry, NightSky, SunEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.surface import GroundEntry, MaterialEntry
 from viewsphere.sampling.pictures import Kind, Pictures
-from viewsphere.sampling.scenery import draw_names
+from viewsphere.sampling.scenery import draw_names, usual_exposure
 from viewsphere.sampling.seeds import Names, scene_generators, share
 from viewsphere.sampling.sun import sun_position
 from viewsphere.sampling.weather import weathered
@@ -212,7 +212,11 @@ class Scenes:
         @lru_cache(maxsize=256)
         def part(field: str, names: Names) -> Frozen:
             entry = drawn(getattr(self.recipe.scene, field), self._rng_of(names), (field,))
-            return self._background(entry, names) if isinstance(entry, BackgroundEntry) else concrete(entry)
+            if isinstance(entry, BackgroundEntry):
+                return self._background(entry, names)
+            if isinstance(entry, ViewEntry) and entry.exposure == "auto":
+                return concrete(entry, exposure=usual_exposure(self.recipe.scene.place))
+            return concrete(entry)
 
         return part
 

@@ -7,6 +7,9 @@ import numpy as np
 from viewsphere.zoo.indoors.places import around_free_floor
 from viewsphere.zoo.places import Place
 
+EXPOSURE = 3.5
+"""Stops at which a room by day is as bright as a street."""
+
 
 def flat(seed: int = 0) -> Place:
     """The flat of this seed; its floor is z = 0, the origin in the middle of the widest free floor of a room."""
