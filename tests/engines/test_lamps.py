@@ -80,6 +80,8 @@ def test_what_glows_shines_and_a_share_of_windows_is_lit():
     lamps = lit(posts([(0, 0), (9, 9)]), [lantern()] * 2, Lamps())
     assert lamps[0] is lamps[1] and lamps[0].materials[0].emissive == pytest.approx((0.5 * GLOW, 0.4 * GLOW, 0.3 * GLOW))
     assert lit(posts([(0, 0)]), [house], Lamps(windows=0.0))[0] is house
+    screen = replace(lantern(), materials=(Material("screen", emissive=(0.4, 0.4, 0.4)),))
+    assert lit(posts([(0, 0)]), [screen], Lamps())[0] is screen
 
 
 def night(**scene) -> Recipe:

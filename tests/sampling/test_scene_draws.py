@@ -130,6 +130,15 @@ def test_a_room_is_exposed_as_what_is_indoors_unless_the_recipe_says_otherwise(p
     assert scene_of({**scene, "view": {"exposure": -1.0}}).finish.view.exposure == -1
 
 
+def test_weather_stays_outdoors_of_a_room_and_its_light_comes_in():
+    weather = {"rain": 12, "fog": 200}
+    inside, outside = (scene_of({"place": place, **weather}) for place in ("zoo:room", "zoo:neighbourhood"))
+    assert outside.rain and outside.fog and outside.wet
+    assert (inside.rain, inside.fog, inside.wet, inside.snow) == (None,) * 4
+    assert (inside.sun, inside.sky) == (outside.sun, outside.sky) != (scene_of({}).sun, scene_of({}).sky)
+    assert scene_of({"place": "zoo:room", "sky": "night"}).lamps is not None
+
+
 def test_lamps_stand_where_cameras_of_their_angles_would():
     at = {"azimuth_deg": 90, "elevation_deg": 30, "distance": 2}
     (lamp,) = scene_of({"lights": {"at": at, "strength": 1}}).lights

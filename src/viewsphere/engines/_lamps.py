@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.scene import Scene, SpotLight
 from viewsphere.model.thing import Thing
@@ -20,7 +20,10 @@ LENS, WINDOW = "lens", "window"
 """Names of parts of scenery: what a lamp shines through, and what may be lit from inside."""
 
 GLOW = 9.0
-"""How much brighter what glows by day is made."""
+"""How much brighter what glows by day is made, but for screens."""
+
+SCREEN = "screen"
+"""Name of the material of screens, which people do not turn up at night."""
 
 ROOM = (0.62, 0.42, 0.2)
 """Radiance of a window that is lit from inside: linear."""
@@ -75,12 +78,20 @@ def lit(things: Sequence[Thing], meshes: Sequence[Mesh], lamps: Lamps) -> tuple[
 
 
 def _glowing(mesh: Mesh) -> Mesh:
-    if not any(max(material.emissive) for material in mesh.materials):
+    if not any(map(_is_lamp, mesh.materials)):
         return mesh
-    materials = (
-        replace(m, emissive=(GLOW * m.emissive[0], GLOW * m.emissive[1], GLOW * m.emissive[2])) for m in mesh.materials
+    return replace(
+        mesh, materials=tuple(_brighter(material) if _is_lamp(material) else material for material in mesh.materials)
     )
-    return replace(mesh, materials=tuple(materials))
+
+
+def _is_lamp(material: Material) -> bool:
+    return max(material.emissive) > 0 and material.name != SCREEN
+
+
+def _brighter(material: Material) -> Material:
+    r, g, b = material.emissive
+    return replace(material, emissive=(GLOW * r, GLOW * g, GLOW * b))
 
 
 def _with_windows(mesh: Mesh, thing: Thing, share: float) -> Mesh:

@@ -137,11 +137,9 @@ def place_surfaces(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tu
     return tuple(replace(one, world_from_surface=composed(world_from_place, one.world_from_surface)) for one in laid)
 
 
-def usual_exposure(entry: PlaceEntry | None) -> float:
-    """Stops at which a place is neither dark nor bright by day: what its module says as EXPOSURE, else 0."""
-    if entry is None or entry.name not in plugins.places():
-        return 0.0
-    return getattr(plugins.place(entry.name), "EXPOSURE", 0.0)
+def is_indoors(entry: PlaceEntry | None) -> bool:
+    """Whether targets are in a room: whether the place's module says INDOORS."""
+    return entry is not None and entry.name in plugins.places() and getattr(plugins.place(entry.name), "INDOORS", False)
 
 
 def _carried(lane: Lane, world_from_place: NDArray[np.float64]) -> Lane:

@@ -43,13 +43,16 @@ from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, NightEn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.surface import GroundEntry, MaterialEntry
 from viewsphere.sampling.pictures import Kind, Pictures
-from viewsphere.sampling.scenery import draw_names, usual_exposure
+from viewsphere.sampling.scenery import draw_names, is_indoors
 from viewsphere.sampling.seeds import Names, scene_generators, share
 from viewsphere.sampling.sun import sun_position
-from viewsphere.sampling.weather import weathered
+from viewsphere.sampling.weather import through_windows, weathered
 
 PARTS = tuple(Finish.model_fields)
 """The parts of a finish, which have their names in a recipe's scene, too."""
+
+INDOOR_STOPS = 3.5
+"""The exposure at which a room by day is as bright as a street."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +154,10 @@ class Scenes:
         return tuple(getattr(self.recipe.scene, name) for name in PARTS)
 
     @cached_property
+    def _is_indoors(self) -> bool:
+        return is_indoors(self.recipe.scene.place)
+
+    @cached_property
     def _scene(self) -> Callable[[Names, tuple[Names, ...]], Scene]:
         """Scenes by what they are drawn for; the last are kept, because many shots share one."""
 
@@ -166,7 +173,8 @@ class Scenes:
                 ground=self._ground(drawn(entry.ground, rng_of, ("ground",)), rng_of),
                 finish=self._finish(names_of_finish, ()) if names_of_finish else Finish(),
             )
-            return weathered(made, entry, rng_of, lambda use: int(share(self.recipe.seed, "weather", use, *names) * 2**32))
+            outdoors = weathered(made, entry, rng_of, lambda use: int(share(self.recipe.seed, "weather", use, *names) * 2**32))
+            return through_windows(made, outdoors) if self._is_indoors else outdoors
 
         return scene
 
@@ -215,7 +223,7 @@ class Scenes:
             if isinstance(entry, BackgroundEntry):
                 return self._background(entry, names)
             if isinstance(entry, ViewEntry) and entry.exposure == "auto":
-                return concrete(entry, exposure=usual_exposure(self.recipe.scene.place))
+                return concrete(entry, exposure=INDOOR_STOPS if self._is_indoors else 0.0)
             return concrete(entry)
 
         return part

@@ -49,6 +49,11 @@ def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -
     return scene.model_copy(update={"sun": sun, "sky": sky, "lights": lights} | changes | _wet(scene, wet, rain, seed_of))
 
 
+def through_windows(scene: Scene, outdoors: Scene) -> Scene:
+    """The scene of a room: of the weather outdoors only light comes in."""
+    return scene.model_copy(update={"sun": outdoors.sun, "sky": outdoors.sky, "lamps": outdoors.lamps})
+
+
 def _lamps(entry: SceneEntry, rng_of: RngOf) -> dict[str, Lamps]:
     """Lit lamps, in a scene's field: by default at night."""
     lamps = drawn(entry.lamps, rng_of, ("lamps",))

@@ -177,7 +177,7 @@ def _filled(o: Opening, joinery: Joinery, rng: np.random.Generator) -> list[Piec
 def _ceiling_lamp(p: Interior, room: Room) -> list[Piece]:
     """A bowl of milk glass under the middle of the ceiling."""
     x, y = (room.low[0] + room.high[0]) / 2, (room.low[1] + room.high[1]) / 2
-    glass = lamp("ceiling_lamp", (0.98, 0.96, 0.9), 0.35)
+    glass = lamp("ceiling_lamp", (0.98, 0.94, 0.84), 1.2)
     plate = lathe([(0, 0), (0.12, 0), (0.12, -0.02), (0, -0.02)][::-1], 20)
     bowl = lathe([(0, -0.1), (0.08, -0.095), (0.14, -0.07), (0.165, -0.03), (0.165, -0.012), (0, -0.012)], 24)
     chrome = metal("steel", (0.72, 0.72, 0.72), 0.3)

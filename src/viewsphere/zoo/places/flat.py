@@ -7,8 +7,7 @@ import numpy as np
 from viewsphere.zoo.indoors.places import around_free_floor
 from viewsphere.zoo.places import Place
 
-EXPOSURE = 3.5
-"""Stops at which a room by day is as bright as a street."""
+INDOORS = True
 
 
 def flat(seed: int = 0) -> Place:

@@ -10,8 +10,7 @@ from viewsphere.zoo.indoors.places import drawn, laid_out
 from viewsphere.zoo.indoors.plan import Room
 from viewsphere.zoo.places import Place
 
-EXPOSURE = 3.5
-"""Stops at which a room by day is as bright as a street."""
+INDOORS = True
 
 LEAST = (0.9, 0.55)
 """Width and depth of the table, metres, at least."""
