@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import sys
+from collections.abc import Iterable
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -33,8 +34,7 @@ PACKAGES: dict[Kind, str] = {
 
 def names(kind: Kind) -> tuple[str, ...]:
     """Names of all plug-ins of this kind, sorted; none is imported."""
-    package = importlib.import_module(PACKAGES[kind])
-    own = {m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_")}
+    own = {name for name, _ in _found(PACKAGES[kind]) if not name.startswith("_")}
     return tuple(sorted(own | {e.name for e in entry_points(group=f"viewsphere.{kind}")}))
 
 
@@ -57,7 +57,7 @@ def entry_points(group: str) -> metadata.EntryPoints:
 
     Those of all packages are read once, and again after one was installed or removed: reading them takes 10 ms.
     """
-    return _installed(tuple((path, _changed(path)) for path in sys.path)).select(group=group)
+    return _installed(_as_changed(sys.path)).select(group=group)
 
 
 @lru_cache(maxsize=1)
@@ -66,8 +66,22 @@ def _installed(_paths: tuple[tuple[str, int], ...]) -> Any:
     return metadata.entry_points()
 
 
+def _found(package: str) -> tuple[tuple[str, bool], ...]:
+    """Names of all modules in a package, and whether each is a package; read once, and again after files came or went."""
+    return _listed(_as_changed(importlib.import_module(package).__path__))
+
+
+@lru_cache(maxsize=32)
+def _listed(paths: tuple[tuple[str, int], ...]) -> tuple[tuple[str, bool], ...]:
+    return tuple((module.name, module.ispkg) for module in pkgutil.iter_modules([path for path, _ in paths]))
+
+
+def _as_changed(paths: Iterable[str]) -> tuple[tuple[str, int], ...]:
+    """Folders, and when each was last changed, ns; 0 where there is none."""
+    return tuple((path, _changed(path)) for path in paths)
+
+
 def _changed(path: str) -> int:
-    """When a folder was last changed, ns; 0 where there is none."""
     try:
         return Path(path).stat().st_mtime_ns
     except OSError:
@@ -101,8 +115,7 @@ def place(name: str) -> Any:
 
 
 def _modules(package: str) -> tuple[str, ...]:
-    path = importlib.import_module(package).__path__
-    return tuple(sorted(m.name for m in pkgutil.iter_modules(path) if not m.ispkg))
+    return tuple(sorted(name for name, is_package in _found(package) if not is_package))
 
 
 def _module(package: str, what: str, name: str) -> Any:

@@ -91,8 +91,11 @@ class Stages:
     def model(self, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
         """The normalised model at a time step (None: as it rests); raises ModelError if its file cannot be used."""
         name = _name(spec, step)
-        mesh = self._models.pop(name, None) or self._loaded(spec, step)
+        known = self._models.pop(name, None)
+        mesh = known or self._loaded(spec, step)
         self._models[name] = mesh  # the last used comes last
+        if known:
+            return known
         if name not in self._boxes:
             self._boxes[name] = box_vertices(*mesh.bounds)
         held = sum(map(_size, self._models.values()))

@@ -48,7 +48,8 @@ def _stable_ways(corners: bytes) -> tuple[Float, Float]:
     solid: Any = trimesh.convex.convex_hull(hull, repair=True) if np.linalg.matrix_rank(hull - hull[0], 1e-9) == 3 else None
     if solid is None:  # flat, or a line
         return np.eye(3)[None], np.ones(1)
-    found, chances = solid.compute_stable_poses(n_samples=1, seed=0)
+    with np.errstate(invalid="ignore"):  # of triangles so thin that rounding makes their chance no number; such are passed over
+        found, chances = solid.compute_stable_poses(n_samples=1, seed=0)
     turns, chances = found[:, :3, :3], np.round(chances, 6)
     order = np.lexsort([*np.round(turns[:, 2], 6).T, -chances]).tolist()  # the same where two are as likely
     kept = [i for i in order if chances[i] >= min(RAREST, chances.max())]

@@ -10,7 +10,7 @@ and played as any other. Sub-packages hold the parts that families are built fro
 from __future__ import annotations
 
 import hashlib
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -131,14 +131,15 @@ def rooms_of(spec: ModelSpec) -> tuple[NDArray[np.float64], ...]:
 
     A family with rooms has a function `rooms` that gives them by its parameters.
     """
+    return _rooms(spec.source.removeprefix(ZOO), spec.seed) if spec.source.startswith(ZOO) else ()
+
+
+@lru_cache(maxsize=64)
+def _rooms(family: str, seed: int | None) -> tuple[NDArray[np.float64], ...]:
     import numpy as np
 
-    if not spec.source.startswith(ZOO):
-        return ()
-    module = plugins.family(spec.source.removeprefix(ZOO))
-    if not hasattr(module, "rooms"):
-        return ()
-    return module.rooms(module.draw(np.random.default_rng(spec.seed)))
+    module = plugins.family(family)
+    return module.rooms(module.draw(np.random.default_rng(seed))) if hasattr(module, "rooms") else ()
 
 
 def real_size(mesh: Mesh) -> tuple[float, float, float]:
