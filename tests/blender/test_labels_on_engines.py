@@ -84,6 +84,24 @@ def test_all_labels_are_the_same_on_raster_and_in_cycles(blender, tmp_path, reci
     assert_same_labels((recipe("raster"), recipe(CYCLES)), tmp_path)
 
 
+def heap_recipe(engine):
+    """Mugs and books that fell on the table of a room."""
+    return still_recipe(
+        engine,
+        models=[{"source": ["zoo:mug", "zoo:book"], "count": 2, "symmetries": "found", "keypoints": 8}],
+        scenes={"count": 1, "objects": 4, "repeat": True, "layout": "fall"},
+        viewpoints={"kind": "sphere", "count": 2, "elevation": [35, 60], "distance": [0.7, 0.9]},
+        min_visibility=0.3,
+        scene={"place": "zoo:table_top"},
+    )
+
+
+@pytest.mark.slow
+def test_all_labels_of_things_that_fell_in_a_room_are_the_same_on_raster_and_in_cycles(blender, tmp_path):
+    pytest.importorskip("mujoco")
+    assert_same_labels((heap_recipe("raster"), heap_recipe(CYCLES)), tmp_path)
+
+
 @pytest.mark.parametrize("recipe", [still_recipe, moving_recipe])
 def test_labels_in_a_blend_file_are_those_of_its_meshes_on_raster(made, tmp_path, recipe):
     """The file as Cycles opens it, and its meshes alone as a place on raster."""
