@@ -481,6 +481,35 @@ def place(name: str, model: str, distance: tuple[float, float], elevation: float
     save(f"zoo_{name}.jpg", grid(tiles, 3, 1440), 80)
 
 
+def conditions() -> None:
+    """Each place under four conditions: one shot a row, whose labels are the same in all."""
+    low, high = {"azimuth_deg": 60, "elevation_deg": 14}, {"azimuth_deg": 75, "elevation_deg": 42}
+    day: dict[str, Any] = {"sky": {"daylight": {"turbidity": 2.5}}}
+    out = {"morning": {"sun": low}, "rain": {"rain": 30}, "fog": {"fog": 60}, "night": {"sky": "night", "sun": "auto"}}
+    clouds = {"sky": {"daylight": {"clouds": 1}}}
+    rooms = {"morning": {"sun": low}, "noon": {"sun": high}, "overcast": clouds, "night": out["night"]}
+    tiles: list[Any] = []
+    for name, model, distance, elevation, changes in (
+        ("neighbourhood", "zoo:car", 9.0, 12.0, out),
+        ("town", "zoo:car", 10.0, 11.0, out),
+        ("room", "zoo:chair", 2.0, 14.0, rooms),
+        ("flat", "zoo:chair", 2.0, 14.0, rooms),
+        ("table_top", "zoo:mug", 0.55, 28.0, rooms),
+    ):
+        made_of = Recipe(
+            name=name,
+            seed=4,
+            models=[{"source": model}],
+            viewpoints={"kind": "sphere", "count": 1, "elevation": elevation, "distance": distance},
+            min_visibility=0.5,
+            camera={"size": [480, 320], "fov_deg": 62 if changes is out else 80},
+            scene={"place": f"zoo:{name}", "sun": high, **day},
+            variations=changes,
+        )
+        tiles += [titled(sample.rgb, f"{name}, {sample.variation}") for sample in render(made_of)]
+    save("conditions.jpg", grid(tiles, 4, 1440), 80)
+
+
 def engines() -> None:
     """Five chairs by the raster engine and by Cycles, whose Python VIEWSPHERE_BLENDER_PYTHON names; one row an engine."""
     picks = [Pick(0, 30, 20, 4), Pick(1, 60, 10, 4), Pick(2, 140, 30, 4), Pick(3, 20, 40, 4), Pick(4, 110, 20, 4)]
@@ -517,7 +546,7 @@ HOUSEHOLD = ("mug", "bottle", "bowl", "can", "plate", "book", "box", "laptop", "
 PICTURES: dict[str, Callable[[], None]] = {
     **{
         f.__name__: f
-        for f in (neighbourhood, car, bike, chair, boat, hairdryer, fig1, fig2, fig3, street, chairs, engines, materials)
+        for f in (neighbourhood, car, bike, chair, boat, hairdryer, fig1, fig2, fig3, street, chairs, engines, materials, conditions)
     },
     "zoo_car": partial(family, "car"),
     "zoo_bicycle": partial(family, "bicycle", 50),
