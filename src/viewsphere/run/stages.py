@@ -29,13 +29,14 @@ from viewsphere.model.sample import Float, Sample, Taken
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.traits import Traits
+from viewsphere.run.walls import check_rooms, check_way
 from viewsphere.sampling.camera import inside_box
 from viewsphere.store import ModelInfo, Store
 from viewsphere.surroundings.ground import ground_stamps
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.shot_views import ShotViews
 from viewsphere.truth.visibility import with_ground
-from viewsphere.zoo import build_zoo_model, rooms_of
+from viewsphere.zoo import build_zoo_model
 
 if TYPE_CHECKING:
     from viewsphere.engines import Engine, Stage  # which takes a third of a worker's start
@@ -185,7 +186,7 @@ class Stages:
         if own is None:
             return
         model = transform(own.world_from_object, self.box(own.model, own.step)).mean(axis=0)
-        _check_rooms(things, model, cameras)
+        check_rooms(things, model, cameras)
         for thing in things:
             box = transform(thing.world_from_object, self.box(thing.model, thing.step))
             for i in np.flatnonzero(inside_box(box, cameras)):
@@ -200,12 +201,17 @@ class Stages:
                     )
 
     def _check_shot(self, shot: Shot) -> None:
-        """Raise RecipeError where a camera of a shot is inside of something; what stands still is looked at once."""
+        """Raise RecipeError where a camera of a shot is inside of something, or a trajectory leads through a wall; what stands
+        still is looked at once.
+        """
         instants, sensors = range(len(shot.instants)), range(len(shot.rig.sensors))
         for poses in dict.fromkeys(map(shot.poses_at, instants)):
             together = [instant for instant in instants if shot.poses_at(instant) == poses]
             cameras = [shot.camera(instant, sensor).center for instant in together for sensor in sensors]
             self._check_cameras([thing for thing in shot.things_at(together[0]) if thing.is_there], np.array(cameras))
+        if shot.sequence:
+            way = np.array([shot.camera(instant, 0).center for instant in instants])
+            check_way(shot.things, lambda t: self.box(t.model, t.step), lambda t: self.model(t.model, t.step), way)
 
     def is_free(self, shot: Shot, instant: int) -> bool:
         """Whether no camera of a shot is inside of something at an instant, counted from 0 in the shot."""
@@ -259,19 +265,6 @@ def _stamps(shot: Shot) -> tuple[Stamp, ...]:
     """Of the files that the surfaces of a shot show."""
     ground = () if shot.scene.ground is None else ground_stamps(shot.scene.ground)
     return ground + repaint_stamps(repaint for thing in shot.things for repaint in thing.repaints)
-
-
-def _check_rooms(things: Sequence[Thing], model: Float, cameras: Float) -> None:
-    """Raise RecipeError for the first of the cameras (N, 3) that is in no room, where the model's middle (3,) is in one."""
-    rooms = [transform(thing.world_from_object, box) for thing in things if thing.scenery for box in rooms_of(thing.model)]
-    if not any(inside_box(room, model[None])[0] for room in rooms):
-        return
-    for i in np.flatnonzero(~np.any([inside_box(room, cameras) for room in rooms], axis=0)):
-        raise RecipeError(
-            f"viewpoints: expected the camera in a room of the place, as the model is; found it beyond the walls at "
-            f"({', '.join(f'{v:.3g}' for v in cameras[i])}): go nearer; with min_visibility, frames that are drawn at random "
-            "are drawn again"
-        )
 
 
 def _size(mesh: Mesh) -> int:

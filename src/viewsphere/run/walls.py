@@ -1,0 +1,86 @@
+"""What walls forbid cameras: to be beyond those of the model's room, and to go through any."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.classes import STUFF_IDS, stuff_of
+from viewsphere.model.thing import Thing
+from viewsphere.sampling.camera import inside_box
+from viewsphere.zoo import rooms_of
+
+Float = NDArray[np.float64]
+
+WALLS = {STUFF_IDS[name] for name in ("building", "wall", "floor", "ceiling")}
+"""Classes of scenery that nobody goes through: leaves and hedges are none."""
+
+
+def check_rooms(things: Sequence[Thing], model: Float, cameras: Float) -> None:
+    """Raise RecipeError for the first of the cameras (N, 3) that is in no room, where the model's middle (3,) is in one."""
+    rooms = [transform(thing.world_from_object, box) for thing in things if thing.scenery for box in rooms_of(thing.model)]
+    if not any(inside_box(room, model[None])[0] for room in rooms):
+        return
+    for i in np.flatnonzero(~np.any([inside_box(room, cameras) for room in rooms], axis=0)):
+        raise RecipeError(
+            f"viewpoints: expected the camera in a room of the place, as the model is; found it beyond the walls at "
+            f"{_shown(cameras[i])}: go nearer; with min_visibility, frames that are drawn at random are drawn again"
+        )
+
+
+def check_way(things: Sequence[Thing], box_of: Callable[[Thing], Float], mesh_of: Callable[[Thing], Mesh], way: Float) -> None:
+    """Raise RecipeError where the straight line between two points of a way (N, 3), one after the other, goes through a wall.
+
+    `box_of`, `mesh_of`: a thing's box (8, 3) and its mesh, in its own axes.
+    """
+    starts, ends = way[:-1], way[1:]
+    for thing in things:
+        if not thing.scenery or not thing.motion.is_still:
+            continue
+        around = transform(thing.world_from_object, box_of(thing))
+        if (way.min(axis=0) > around.max(axis=0)).any() or (way.max(axis=0) < around.min(axis=0)).any():
+            continue
+        mesh = mesh_of(thing)
+        walls = _walls(thing.model.category, mesh)
+        if not len(walls):
+            continue
+        corners = transform(thing.world_from_object, mesh.vertices.astype(np.float64))[walls]
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        for i, (a, b) in enumerate(zip(starts, ends, strict=True)):
+            near = (np.minimum(a, b) <= high).all(axis=1) & (np.maximum(a, b) >= low).all(axis=1)
+            if near.any() and _is_crossed(corners[near], a, b):
+                raise RecipeError(
+                    f"viewpoints: expected the camera's way clear of walls; found it going through {thing.model.category} "
+                    f"{thing.key} between {_shown(a)} and {_shown(b)}, pictures {i} and {i + 1} of the shot: lead the "
+                    "trajectory around"
+                )
+
+
+def _walls(category: str, mesh: Mesh) -> NDArray[np.int32]:
+    """The triangles (T, 3) of scenery that nobody goes through."""
+    solid = np.array([stuff_of(category, part) in WALLS for part in mesh.parts], np.bool_)
+    return mesh.triangles[solid[mesh.triangle_part]] if solid.any() else mesh.triangles[:0]
+
+
+def _is_crossed(corners: Float, a: Float, b: Float) -> bool:
+    """Whether the line from a to b (3,) goes through any of the triangles (T, 3, 3): Moeller and Trumbore 1997."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    across = np.cross(b - a, second)
+    volume = (first * across).sum(axis=1)
+    kept = volume != 0
+    first, second, across, volume = first[kept], second[kept], across[kept], volume[kept]
+    to_a = a - corners[kept, 0]
+    u = (to_a * across).sum(axis=1) / volume
+    turned = np.cross(to_a, first)
+    v = turned @ (b - a) / volume
+    t = (second * turned).sum(axis=1) / volume
+    return bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0) & (t <= 1)).any())
+
+
+def _shown(point: Float) -> str:
+    return f"({', '.join(f'{v:.3g}' for v in point)})"
