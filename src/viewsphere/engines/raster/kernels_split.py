@@ -97,7 +97,7 @@ def _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, 
     if is_matte:
         ambient_matte(count, surrounding, is_bounced, b)
     else:
-        ambient(count, surrounding, is_bounced, b)
+        ambient(count, surrounding, bounces, b)
 
 
 @njit(fastmath=FAST, _nrt=True)
