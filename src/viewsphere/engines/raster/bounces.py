@@ -172,7 +172,11 @@ def _bake(lighting: _Lighting) -> Bounces:
     spread_views(rays.turn, seen.own, rays.directions, FOLD, views)
     for known in (bounces.light, views.reshape(len(views), -1)):
         _smooth(known, seen.opens, bounces.grid)
-        kernels.fill(seen.rank, bounces.grid, known)
+    chosen = np.empty(len(views), np.int32)
+    kernels.choose(seen.rank, bounces.grid, bounces.light, chosen)
+    buried = seen.rank == 0
+    for known in (bounces.light, views):
+        known[buried] = known[chosen[buried]]
     if seen.below is not None:
         floor = np.empty((bounces.floor.shape[0] ** 2, 4), np.float32)
         kernels.send_down(patches.ids[1], sent, floor)

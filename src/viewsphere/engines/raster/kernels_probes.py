@@ -51,9 +51,9 @@ CLUSTERS = 6
 ALIKE = 0.9  # cosine between normals of one screen
 FEWEST = 2  # rays of a screen
 SECOND = 0.12  # share of the rays towards a cell that a second screen must have
-# Shares of rays that meet the inner side of a thing from which on a probe is within it: of any size, and of a small one,
-# where so many meet it within so many cells.
-WITHIN, WITHIN_CLOSE, CLOSE = 0.95, 0.5, 3.5
+# Shares of rays from which on a probe is within a thing: that meet the inner side of one of any size, or of one that is so many
+# cells away at most; or that meet anything so close, as in a cupboard.
+WITHIN, WITHIN_CLOSE, SHUT_IN, CLOSE = 0.95, 0.5, 0.97, 3.5
 OPEN_SKY = 0.4  # share of the rays up that meet nothing from which on a probe knows nothing of what it does not see
 
 
@@ -305,11 +305,15 @@ def blur(light, opens, step, out):
             out[i, c] = value
 
 
-@njit
-def fill(rank, shape, light):
-    """Give buried probes what those around them know: the mean of their neighbours of the highest rank, see `screen`."""
+@njit(_nrt=True)
+def choose(rank, shape, light, chosen):
+    """Which probe each knows the light of, into chosen (N,) int32: itself, but a buried one that of a neighbour, of the highest
+    rank there is (see `screen`): one that is darker than most, since light that leaks is seen more than darkness.
+    """
     layers, rows, columns = shape[0], shape[1], shape[2]
+    levels, places = np.empty(27, np.float32), np.empty(27, np.int32)
     for at in range(light.shape[0]):
+        chosen[at] = at
         if rank[at] > 0:
             continue
         z, y, x = at // (rows * columns), at // columns % rows, at % columns
@@ -320,10 +324,14 @@ def fill(rank, shape, light):
                     k = (w * rows + v) * columns + u
                     if rank[k] < best:
                         continue
-                    count = count + 1 if rank[k] == best and count > 0 else 1
-                    best, per = rank[k], f4(1) / f4(count)
-                    for c in range(light.shape[1]):
-                        light[at, c] = light[at, c] + (light[k, c] - light[at, c]) * per
+                    count = count if rank[k] == best else 0
+                    best = rank[k]
+                    levels[count], places[count] = light[k, 0] + light[k, 1] + light[k, 2], k
+                    count += 1
+        if count > 0:
+            for _ in range(count // 4):
+                levels[np.argmin(levels[:count])] = f4(np.inf)
+            chosen[at] = places[np.argmin(levels[:count])]
 
 
 @inner
@@ -386,16 +394,18 @@ def _cell_of(octant, at, rows, columns):
 def bury(met, far, directions, turn, own, normals, cells, buried):
     """Which probes are within a thing, into buried (N,) uint8: 2 within a small one, 1 within one of any size, else 0."""
     for i in range(met.shape[1]):
-        inner_sides = close = 0
+        inner_sides = close = shut = 0
         for k in range(directions.shape[1]):
             if met[k, i] < 0:
                 continue
             d, n = directions[turn[i], k], normals[met[k, i]]
+            shut += 1 if far[k, i] * cells <= f4(CLOSE) else 0
             if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > f4(0):
                 inner_sides += 1
                 close += 1 if far[k, i] * cells <= f4(CLOSE) else 0
         rays = directions.shape[1]
-        buried[own[i]] = 2 if close >= WITHIN_CLOSE * rays else 1 if inner_sides >= WITHIN * rays else 0
+        is_small = close >= WITHIN_CLOSE * rays or shut >= SHUT_IN * rays
+        buried[own[i]] = 2 if is_small else 1 if inner_sides >= WITHIN * rays else 0
 
 
 @njit(_nrt=True)
