@@ -54,8 +54,8 @@ THING = (((2.85, 0.85, 0), (3.15, 1.15, 0.3), (0.7, 0.7, 0.7)),)
 
 
 @lru_cache
-def boxes(solids: tuple[Any, ...]) -> Mesh:
-    """Boxes with flat faces, each of its own colour."""
+def boxes(solids: tuple[Any, ...], roughness: float = 0.8) -> Mesh:
+    """Boxes with flat faces, each of its own colour, the first one of this roughness."""
     faces = np.array([face for a, b, c, d in FACES.values() for face in ((a, b, c), (a, c, d))])
     corners = np.concatenate([box_vertices(low, high)[faces] for low, high, _ in solids]).astype(np.float32)
     a, b, c = corners.transpose(1, 0, 2)
@@ -67,13 +67,15 @@ def boxes(solids: tuple[Any, ...]) -> Mesh:
         normals=np.repeat(normal, 3, axis=0).astype(np.float32),
         triangle_material=np.repeat(np.arange(len(solids), dtype=np.int32), len(faces)),
         triangle_part=np.zeros(len(corners), np.int32),
-        materials=tuple(Material("paint", (*color, 1.0)) for _, _, color in solids),
+        materials=tuple(
+            Material("paint", (*color, 1.0), roughness=0.8 if i else roughness) for i, (_, _, color) in enumerate(solids)
+        ),
     )
 
 
-def room_shot(how: str, azimuth_deg: float) -> tuple[Shot, dict[str, Mesh]]:
+def room_shot(how: str, azimuth_deg: float, roughness: float) -> tuple[Shot, dict[str, Mesh]]:
     """A small box in the room, seen from beside the window."""
-    meshes = {"thing": boxes(THING), "room": boxes(ROOM)}
+    meshes = {"thing": boxes(THING), "room": boxes(ROOM, roughness)}
     spec = {key: ModelSpec(key=key, source=key, category="thing", category_id=i) for i, key in enumerate(meshes)}
     things = Thing(id=1, model=spec["thing"]), Thing(id=0, model=spec["room"], scenery=True)
     eye, target = np.array([3.9, 0.4, 1.6]), np.array([1.0, 3.0, 0.9])
@@ -91,8 +93,8 @@ def room_shot(how: str, azimuth_deg: float) -> tuple[Shot, dict[str, Mesh]]:
     return Shot(key="room", things=things, rig=Rig.of(lens), instants=(instant,), scene=scene, **more), meshes
 
 
-def staged(how: str, azimuth_deg: float = 18.0) -> RasterStage:
-    shot, meshes = room_shot(how, azimuth_deg)
+def staged(how: str, azimuth_deg: float = 18.0, roughness: float = 0.8) -> RasterStage:
+    shot, meshes = room_shot(how, azimuth_deg, roughness)
     return raster.stage(shot, lambda spec, step=None: meshes[spec.key])
 
 
@@ -140,6 +142,8 @@ def light(folder: Path) -> None:
     print(f"| room: stage with the sun elsewhere, ms | | {moved:.0f} | |")
     room = frames(rooms)
     print(f"| room: frame, ms | {room['off']:.1f} | {room['on']:.1f} | {room['on'] / room['off']:.2f} |")
+    room = frames({how: staged(how, roughness=0.2) for how in ("off", "on")})
+    print(f"| room: frame, the floor polished, ms | {room['off']:.1f} | {room['on']:.1f} | {room['on'] / room['off']:.2f} |")
     cars = {how: car_stage(folder, how) for how in ("off", "on")}
     bakes = {how: baked(stage) for how, stage in cars.items()}
     print(f"| car: stage, ms | {bakes['off']:.0f} | {bakes['on']:.0f} | |")

@@ -239,6 +239,41 @@ def test_light_through_a_window_is_less_than_the_sky():
     assert means[1] > 2 * means[0] > 0
 
 
+def test_a_mirror_in_a_closed_box_that_glows_evenly_is_as_bright_as_its_walls():
+    """What probes see in all directions, blurred or not, is the same."""
+    low, high = (-1.0, -0.8, -0.6), (1.0, 0.8, 0.6)
+    chrome = replace(ball(0.25, (0, 0, 0)), materials=(Material("chrome", (1, 1, 1, 1), roughness=0.4, metallic=1.0),))
+    stage = stage_of(chrome, Scene(sun=None, sky=DARK), painted_mesh((inside_out(box(low, high)), matt(0.0, 1.0))))
+    picture = painted(stage, camera(40, 30, 26, 20, 15, 0.8), OUT).astype(int)
+    assert np.abs(picture - picture[0, 0]).max() <= 3
+
+
+def test_the_sky_is_not_mirrored_where_it_is_not_seen():
+    """The glossy underside of a board, whose normal says that half of what it faces is far away, in a room without a window."""
+    board = mesh_of(box((1.2, 1.0, 1.6), (2.6, 1.6, 1.65)), Material("lacquer", (0.02, 0.02, 0.02, 1.0), roughness=0.3))
+    view = camera(48, 36, 40, 0, -25, 1.4, (1.9, 1.3, 1.6))
+    stage = stage_of(board, Scene(sun=None, sky=EVEN, finish=OUT), room(0.5, window=False))
+    assert painted(stage, view).max() <= 1
+
+
+def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():
+    """A probe within it, a little below the ceiling that closes it, knows nothing of the ceiling beside it."""
+    small = mesh_of(box((3.0, 1.0, 0.5), (3.2, 1.2, 0.7)), matt(0.5))
+    scene, place = Scene(sun=None, sky=DARK), room(0.6, window=False)
+    empty = stage_of(small, scene, place).baked(0)
+    first, cell = empty.bounces.frame[:3] * empty.unit + empty.origin, empty.unit / float(empty.bounces.frame[3])
+    x, y, z = first + cell * np.floor((np.array([1.5, 1.4, 2.4]) - first) / cell)
+    shade = box((x - 0.06, y - 0.06, z - 0.02), (x + 0.06, y + 0.06, 2.4))
+    lamp = painted_mesh((shade[(shade[..., 2] < z).any(axis=1)], matt(0.5, 30.0)))
+    stage, u = stage_of(small, scene, both(place, lamp)), np.linspace(-1, 1, 40)
+    square = np.concatenate([np.stack(side, axis=1) for s in (-1, 1) for side in ((u, 0 * u + s), (0 * u + s, u))])
+    near, far = (
+        np.median(probed(stage, np.column_stack([square * reach + (x, y), np.full(160, 2.4)]), [(0, 0, -1)] * 160))
+        for reach in (0.09, 0.16)
+    )
+    assert near < 1.15 * far
+
+
 @pytest.mark.parametrize("window", [True, False])
 def test_a_dark_room_beside_a_lit_one_stays_dark(window):
     """A partition of 10 cm, less than half of what lies between probes; without a window a lamp stands in the first room."""

@@ -9,8 +9,8 @@ from test_physics import camera, stage_of
 
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.wetting import DARKEST, UPRIGHT, darkened, wet, wetted
-from viewsphere.engines.raster.mirroring import WATER, mirror
 from viewsphere.engines.raster.painting import paint
+from viewsphere.engines.raster.wet_ground import WATER, mirror_in_water
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.scene import Ground, Scene, Sky
@@ -28,7 +28,7 @@ def light(meshes, water, view):
     seen, radiance = rasterize(stage.at(0), view), np.empty((view.width * view.height, 4), np.float32)
 
     def more(light):
-        mirror(stage.baked(0), view, seen, water, light)
+        mirror_in_water(stage.baked(0), view, seen, water, light)
 
     paint(stage.baked(0), view, seen, False, True, radiance, more=more if water else None)
     return radiance[:, :3].reshape(view.height, view.width, 3), seen

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_probes as kernels
 from viewsphere.engines.raster.environment import Surrounding
-from viewsphere.engines.raster.kernels_bounce import THINGS, terms
+from viewsphere.engines.raster.kernels_bounce import COLUMNS, terms
 from viewsphere.engines.raster.kernels_environment import LAMPS
 from viewsphere.engines.raster.kernels_lanterns import shine_at_probes, shine_down, shine_near
+from viewsphere.engines.raster.kernels_views import FOLD, NODES, send_views, spread_views
 from viewsphere.engines.raster.lanterns import Lanterns, lanterns_of
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.patches import Patches, Rays, patches_of
@@ -99,7 +100,7 @@ class Hall:
 
 class _Seen(NamedTuple):
     """What depends on no light. own (N,): which probe each ray's origin is; opens (3, N): whether nothing lies between a probe
-    and the next one along x, y and z; below: rays of the ground's map.
+    and the next one along x, y and z; rank (N,): see `kernels_probes.screen`; below: rays of the ground's map.
     """
 
     bounces: Bounces
@@ -107,6 +108,7 @@ class _Seen(NamedTuple):
     rays: Rays
     own: Int32
     opens: Float32
+    rank: NDArray[np.uint8]
     patches: Patches
     below: Rays | None
 
@@ -140,14 +142,15 @@ def _bake(lighting: _Lighting) -> Bounces:
     hall, surrounding = lighting.hall, lighting.surrounding
     seen = _look.__wrapped__(hall) if hall.key is None else _look(hall)
     bounces, patches, rays = seen.bounces, seen.patches, seen.rays
-    bounces = bounces._replace(light=np.zeros_like(bounces.light), floor=np.zeros_like(bounces.floor))
+    light, views = np.zeros_like(bounces.light), np.zeros((len(bounces.light), NODES, 4), np.float32)
+    bounces = bounces._replace(light=light, views=views.reshape(-1, 4), floor=np.zeros_like(bounces.floor))
     off = SHADOWS / float(bounces.frame[3])
     lit = patches.lit(hall.surfaces, hall.textures, hall.floor, surrounding.albedo, seen.tree, lighting.lights, off)
     sky = np.empty(rays.directions.shape, np.float32)
     kernels.sky_from(surrounding, rays.directions.reshape(-1, 3), np.float32(SKY_ROUGHNESS), sky.reshape(-1, 3))
     weights = irradiance_weights(rays.directions)
     lanterns = lanterns_of(hall.which, hall.surfaces, patches, lit.emitted, TURNS)
-    shining = _shining(seen, lanterns, lit.emitted, weights, off)
+    shining, near = _shining(seen, lanterns, lit.emitted, weights, off)
     own = lit.emitted * (lanterns.froms == 0)[:, None] + lit.reflectance * lit.arrived / np.float32(math.pi)
     places, normals, sent = patches.places, patches.normals, own
     glow, inside = np.empty_like(own), np.empty(len(own), np.float32)
@@ -156,16 +159,24 @@ def _bake(lighting: _Lighting) -> Bounces:
     elsewhere = facing * surrounding.up + (1 - facing) * surrounding.below
     for _ in range(ROUNDS):
         kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
-        bounces.light[:, :THINGS] += shining[:, :THINGS]
+        bounces.light[:] += shining
         kernels.look_up(bounces, places, normals, glow, inside)
         before = sent
         sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * elsewhere)
         if np.abs(sent - before).sum(dtype=np.float64) <= UNCHANGED * sent.sum(dtype=np.float64):
             break
     kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
-    kernels.send_sharply(*sources, rays.directions, patches.is_ground, sent, bounces.light)
     bounces.light[:] += shining
-    _smooth(bounces.light, seen.opens, bounces.grid)
+    send_views(*sources, rays.directions, patches.is_ground, sent, FOLD, views)
+    views += near
+    spread_views(rays.turn, seen.own, rays.directions, FOLD, views)
+    for known in (bounces.light, views.reshape(len(views), -1)):
+        _smooth(known, seen.opens, bounces.grid)
+    chosen = np.empty(len(views), np.int32)
+    kernels.choose(seen.rank, bounces.grid, bounces.light, chosen)
+    buried = seen.rank == 0
+    for known in (bounces.light, views):
+        known[buried] = known[chosen[buried]]
     if seen.below is not None:
         floor = np.empty((bounces.floor.shape[0] ** 2, 4), np.float32)
         kernels.send_down(patches.ids[1], sent, floor)
@@ -175,15 +186,17 @@ def _bake(lighting: _Lighting) -> Bounces:
     return bounces
 
 
-def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32, off: float) -> Float32:
-    """What arrives at the probes from what shines by itself, as rows of `Bounces.light`."""
+def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32, off: float) -> tuple[Float32, Float32]:
+    """What arrives at the probes from what shines by itself: irradiance, as `Bounces.light`, and sums of what rays see."""
     light, rays = np.zeros_like(seen.bounces.light), seen.rays
+    views = np.zeros((len(light), NODES, 4), np.float32)
     if len(lanterns.points):
         own = rays.turn, seen.own
-        points = lanterns.points, TERMS, np.float32(off)
-        shine_at_probes(seen.tree, rays.origins, *own, TURNS, *points, light)
-        shine_near(seen.patches.ids[0], rays.far, *own, weights, rays.directions, lanterns.froms, emitted, light)
-    return light
+        points = lanterns.points, TERMS, np.float32(off), np.float32(4 * math.pi / rays.directions.shape[1])
+        shine_at_probes(seen.tree, rays.origins, *own, TURNS, *points, FOLD, light, views)
+        near = lanterns.froms, emitted, FOLD
+        shine_near(seen.patches.ids[0], rays.far, *own, weights, rays.directions, *near, light, views)
+    return light, views
 
 
 def _smooth(light: Float32, opens: Float32, shape: NDArray[np.int64]) -> None:
@@ -204,12 +217,13 @@ def _look(hall: Hall) -> _Seen:
     directions = _turned(_sphere(FEW_RAYS if len(points) > MANY_PROBES else RAYS))
     met, far = cast(tree, points, directions, turn, np.inf)
     normals = hall.surfaces.normals[hall.which]
-    screens = np.empty((len(points), 64), np.float32)
+    screens = np.empty((len(points), 72), np.float32)
     buried = np.empty(len(points), np.uint8)
     kernels.bury(met, far, directions, turn, own, normals, np.float32(cells), buried)
     if (buried > 0).mean() > INSIDE_OUT:
         buried[buried == 1] = 0
-    kernels.screen(met, far, directions, turn, own, normals, np.float32(cells), shape, buried, screens)
+    rank = np.zeros_like(buried)
+    kernels.screen(met, far, directions, turn, own, normals, np.float32(cells), shape, buried, screens, rank)
     rays = Rays(points, directions, turn, _whole(hall, met), far)
     bundles, below, floor, floor_frame = [rays], None, NO_BOUNCES.floor, NO_BOUNCES.floor_frame
     if hall.has_map and hall.ground_z is not None:
@@ -228,13 +242,14 @@ def _look(hall: Hall) -> _Seen:
         _ground(hall),
     )
     frame = np.array([*corner, cells, PUSH, hall.ground_z is not None, 1 / fade], np.float32)
-    light = np.zeros((len(points), 48), np.float32)
+    light = np.zeros((len(points), COLUMNS), np.float32)
     return _Seen(
-        Bounces(light, screens, shape, frame, floor, floor_frame),
+        Bounces(light, NO_BOUNCES.views, screens, shape, frame, floor, floor_frame),
         tree,
         rays,
         own,
         _opens(tree, points, own, buried, cells, shape),
+        rank,
         patches,
         below,
     )

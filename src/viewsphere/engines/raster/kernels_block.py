@@ -38,6 +38,8 @@ SCENERY = 83 * BLOCK
 # Position and shading normal in the axes in which what hides the sky was baked.
 OX, OY, OZ, ONX, ONY, ONZ = range(84 * BLOCK, 90 * BLOCK, BLOCK)
 # Light that things throw at the sample: radiance of a white matt surface, the share of it that replaces the sky's own light;
-# then what the nearest probes see, see `kernels_bounce`. The last row is room for vectors that begin in the row before.
+# then what the nearest probes see, and from KEPT on their weights and place, see `kernels_bounce`. The last row is room for
+# vectors that begin in the row before.
 GLOW_R, GLOW_G, GLOW_B, INSIDE, PROBES = range(90 * BLOCK, 95 * BLOCK, BLOCK)
-ROWS = 94 + 48 + 1
+KEPT = PROBES + 28 * BLOCK
+ROWS = 94 + 28 + 9 + 1

@@ -1,7 +1,7 @@
 """Light that things throw at one another, as the samples of a block find it: in a volume of probes and a map of the ground.
 
-A probe holds the irradiance of every direction, spherical harmonics up to degree 2 (Ramamoorthi and Hanrahan 2001), the light
-that things alone send to it, up to degree 1, and how much they leave of the sky and of the ground. A sample reads the eight
+A probe holds the irradiance of every direction, spherical harmonics up to degree 2 (Ramamoorthi and Hanrahan 2001), and what it
+sees in each, for mirrors (`kernels_views`). A sample reads the eight
 probes around it a little off its surface: those in front of the surface, and of these only such as see it. What a probe sees of
 a cell is bounded by two planes for each of the eight cells around it, from the rays it was baked with; without this a lit room
 would shine through its walls (cf. Majercik, Guertin, Nowrouzezahrai and McGuire 2019, who keep depths).
@@ -16,7 +16,6 @@ from viewsphere.engines.raster.kernels_blend import blend
 from viewsphere.engines.raster.kernels_block import (
     AO,
     BLOCK,
-    BOUNCE,
     GLOW_B,
     GLOW_G,
     GLOW_R,
@@ -24,6 +23,7 @@ from viewsphere.engines.raster.kernels_block import (
     GY,
     GZ,
     INSIDE,
+    KEPT,
     LX,
     LY,
     LZ,
@@ -43,7 +43,7 @@ from viewsphere.engines.raster.kernels_block import (
     T6,
     T7,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_occlusion import GAIN, HORIZON
+from viewsphere.engines.raster.kernels_views import CORNERS
 from viewsphere.kernels.jit import inner
 from viewsphere.kernels.lanes import FAST, clamp, dot, lanewise, least, load, most, scatter, spread, where
 
@@ -51,18 +51,16 @@ f4 = nb.float32
 i4 = nb.int32
 U = nb.uintp
 
-COLUMNS = 48
-# Columns of Bounces.light: irradiance / pi in nine terms of red, green and blue, radiance of things in four, visible share and
-# mean direction above the horizon and below; the last is unused.
-IRRADIANCE, THINGS, UPPER, LOWER = 0, 27, 39, 43
-CORNERS, SCREENS = 8, 2
+COLUMNS = 28  # of Bounces.light: irradiance / pi in nine terms of red, green and blue; the last is unused
+SCREENS = 2
 BEHIND = 0.02  # least weight of a probe that lies behind the surface
-HIDDEN = 0.002  # least weight of a probe that does not see the surface
-SHARP = 30.0  # one over the depth behind a screen, in cells, at which a probe no longer counts
+# Least weights of a probe that does not see the surface: of most, of one within a thing, of one under the open sky.
+HIDDEN, BURIED, OUTDOORS = 2e-3, 2e-5, 2e-7
+SHARP = 20.0  # one over the depth behind a screen, in cells, at which a probe no longer counts
 SLACK = -0.02  # cells behind a screen that still count in full; less than none, so that probes within a wall never count
 OFF = 0.1  # cells off the surface from which a sample looks at the screens
 PLACE, FIRST_X, FIRST_Y, FIRST_Z = LX, LY, LZ, GLOW_R  # scratch; the cell's first corner
-_blend4, _blend48 = blend(4), blend(COLUMNS)
+_blend4, _blend28 = blend(4), blend(COLUMNS)
 WEIGHTS = (T0, T1, T2, T3, T4, T5, T6, T7)
 
 
@@ -107,11 +105,11 @@ def _look(typing, screens, cell, x, y, z, b, at):
 
     def code(context, builder, signature, arguments):
         table, target = (context.make_array(signature.args[n])(context, builder, arguments[n]).data for n in (0, 5))
-        row = builder.mul(arguments[1], arguments[1].type(4 * SCREENS * CORNERS))
-        planes = [load(builder, table, builder.add(row, row.type(k * CORNERS)), CORNERS) for k in range(4 * SCREENS)]
+        row = builder.mul(arguments[1], arguments[1].type((4 * SCREENS + 1) * CORNERS))
+        planes = [load(builder, table, builder.add(row, row.type(k * CORNERS)), CORNERS) for k in range(4 * SCREENS + 1)]
         place = [spread(builder, value, CORNERS) for value in arguments[2:5]]
         before = least(dot(planes[:3], place) + planes[3], dot(planes[4:7], place) + planes[7])
-        seen = least(most((before + SLACK) * SHARP + 1, HIDDEN), 1)
+        seen = least(most((before + SLACK) * SHARP + 1, planes[8]), 1)
         scatter(target, arguments[6], {k: k * BLOCK for k in range(CORNERS)}, seen)
         return context.get_dummy_value()
 
@@ -130,7 +128,9 @@ def _screen(count, screens, b):
 def _weigh(b):
     shares = [b[row] * b[PROBES, k * BLOCK] for k, row in enumerate(WEIGHTS)]
     scale = 1 / most(sum(shares[1:], shares[0]), 1e-12)
-    b.put(WEIGHTS, [share * scale for share in shares])
+    for k, share in enumerate(shares):
+        b[WEIGHTS[k]] = b[KEPT, k * BLOCK] = share * scale
+    b[KEPT, CORNERS * BLOCK] = b[PLACE]
 
 
 @inner(fastmath=FAST)
@@ -142,7 +142,7 @@ def _read(count, light, columns, layer, b):
         q, r = p + columns, p + layer
         s = r + columns
         near, far = (b[T0 + i], b[T1 + i], b[T2 + i], b[T3 + i]), (b[T4 + i], b[T5 + i], b[T6 + i], b[T7 + i])
-        _blend48(light, (p, p + one, q, q + one, r, r + one, s, s + one), (*near, *far), b, U(PROBES) + i)
+        _blend28(light, (p, p + one, q, q + one, r, r + one, s, s + one), (*near, *far), b, U(PROBES) + i)
 
 
 def terms(x, y, z):
@@ -151,23 +151,15 @@ def terms(x, y, z):
 
 
 @lanewise
-def _shine(frame, b):
-    """GLOW; OPEN and BOUNCE lose what the probes do not see of the sky and of the ground."""
-    normal, inside, open_, has_ground = b.get(NX, NY, NZ), b[INSIDE], b[OPEN], frame.one(5)
-    polynomials = terms(*normal)
+def _shine(b):
+    """GLOW."""
+    inside, open_ = b[INSIDE], b[OPEN]
+    polynomials = terms(*b.get(NX, NY, NZ))
     for k, row in enumerate((GLOW_R, GLOW_G, GLOW_B)):
-        value = b[PROBES, (IRRADIANCE + k) * BLOCK]
+        value = b[PROBES, k * BLOCK]
         for j, polynomial in enumerate(polynomials, 1):
-            value = value + polynomial * b[PROBES, (IRRADIANCE + 3 * j + k) * BLOCK]
+            value = value + polynomial * b[PROBES, (3 * j + k) * BLOCK]
         b[row] = most(value, 0) * inside * open_
-    parts = []
-    for column in (UPPER, LOWER):
-        share, *way = (b[PROBES, (column + k) * BLOCK] for k in range(4))
-        parts.append(share + 2 * dot(way, normal))
-    whole = clamp((parts[0] + parts[1]) * GAIN)
-    for row, part, facing in ((OPEN, parts[0], normal[2]), (BOUNCE, parts[1], -normal[2])):
-        seen = clamp((part * GAIN + HORIZON) / (0.5 + 0.5 * facing + HORIZON))
-        b[row] = b[row] * (1 + (whole + (seen - whole) * has_ground - 1) * inside)
 
 
 @lanewise
@@ -184,8 +176,8 @@ def _place_on_floor(frame, across, b):
     b.put((T1, T2, T3, T4), (1 - fu - fv + right, fu - right, fv - right, right))
     for row in (GLOW_R, GLOW_G, GLOW_B, INSIDE):
         b[row] = 0
-    for k in range(THINGS, UPPER):
-        b[PROBES, k * BLOCK] = 0
+    for k in range(CORNERS + 1):
+        b[KEPT, k * BLOCK] = 0
 
 
 @inner(fastmath=FAST)
@@ -210,7 +202,8 @@ def _darken(b):
 
 @inner
 def bounced(count, bounces, is_ground, b):
-    """Fill GLOW and INSIDE of a block that has been occluded, and rows PROBES + THINGS on: light from things alone.
+    """Fill GLOW and INSIDE of a block that has been occluded, and from KEPT on the weights of the eight probes around and which
+    is the first.
 
     Overwrites the rows of a light.
     """
@@ -223,21 +216,4 @@ def bounced(count, bounces, is_ground, b):
     _screen(count, bounces.screens, b)
     _weigh(count, b)
     _read(count, bounces.light, columns, rows * columns, b)
-    _shine(count, bounces.frame, b)
-
-
-@lanewise
-def near_light(b):
-    """GLOW: the light that things send from the direction T0 to T2."""
-    x, y, z, inside = b.get(T0, T1, T2, INSIDE)
-    for k, row in enumerate((GLOW_R, GLOW_G, GLOW_B)):
-        base, *way = (b[PROBES, (THINGS + 3 * j + k) * BLOCK] for j in range(4))
-        b[row] = most(base + dot((way[0], way[1], way[2]), (y, z, x)), 0) * inside
-
-
-@lanewise
-def add_near_light(b):
-    """Add GLOW to T3 to T5, light from afar of which the share T7 arrives."""
-    for k, row in enumerate((GLOW_R, GLOW_G, GLOW_B)):
-        b[T3 + k * BLOCK] = b[T3 + k * BLOCK] * b[T7] + b[row]
-    b[T7] = 1
+    _shine(count, b)

@@ -10,9 +10,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from viewsphere.engines.raster.kernels_bounce import THINGS
-from viewsphere.engines.raster.kernels_probes import WINDOW
 from viewsphere.engines.raster.kernels_trace import DEEP, nearest
+from viewsphere.engines.raster.kernels_views import add_view
 from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
@@ -45,9 +44,10 @@ def _shine(tree, point, p, off, stack):
 
 
 @njit(_nrt=True)
-def shine_at_probes(tree, places, turn, own, turns, points, squares, off, light):
-    """Add to rows `own` (N,) of light (N, 48) what arrives at probes (N, 3) from every `turns`-th of the points (J,
-    POINT_COLUMNS), beginning with that of the probe's turn. squares (9,): factors of the terms of irradiance / pi.
+def shine_at_probes(tree, places, turn, own, turns, points, squares, off, per, fold, light, views):
+    """Add to rows `own` (N,) of light (N, 28) and views (N, NODES, 4) what arrives at probes (N, 3) from every `turns`-th of
+    the points (J, POINT_COLUMNS), beginning with that of the probe's turn. squares (9,): factors of the terms of irradiance /
+    pi; per: a ray's share of the sphere; fold: see `kernels_views`.
     """
     stack = np.empty((DEEP, 2), np.float32)
     for i in range(places.shape[0]):
@@ -61,19 +61,16 @@ def shine_at_probes(tree, places, turn, own, turns, points, squares, off, light)
                 power = points[j, POWER_R + c] * factor
                 for k in range(9):
                     light[at, 3 * k + c] += power * squares[k] * t[k]
-                radiance = power * f4(1 / (4 * np.pi))
-                light[at, THINGS + c] += radiance
-                for k in range(1, 4):
-                    light[at, THINGS + 3 * k + c] += radiance * f4(3 * WINDOW) * t[k]
+            q = points[j, POWER_R : POWER_R + 3]
+            add_view(views[at], fold, x, y, z, q[0] * factor / per, q[1] * factor / per, q[2] * factor / per, f4(0))
 
 
 @njit
-def shine_near(ids, far, turn, own, weights, directions, froms, emitted, light):
-    """Add to light (N, 48) what arrives along rays that hit lanterns close by. froms (M,): the square of the distance from
-    which on points stand for a patch, 0 for patches that are no lanterns; emitted (M, 3); the others as in
-    `kernels_probes.send`.
+def shine_near(ids, far, turn, own, weights, directions, froms, emitted, fold, light, views):
+    """Add to light (N, 28) and views (N, NODES, 4) what arrives along rays that hit lanterns close by. froms (M,): the square
+    of the distance from which on points stand for a patch, 0 for patches that are no lanterns; emitted (M, 3); the others as in
+    `kernels_probes.send` and `kernels_views`.
     """
-    per = f4(1) / f4(ids.shape[0])
     for k in range(ids.shape[0]):
         for i in range(ids.shape[1]):
             met = ids[k, i]
@@ -84,11 +81,7 @@ def shine_near(ids, far, turn, own, weights, directions, froms, emitted, light):
             for c in range(3):
                 for j in range(9):
                     light[at, 3 * j + c] += weights[which, k, j] * emitted[met, c]
-                radiance = emitted[met, c] * per
-                light[at, THINGS + c] += radiance
-                light[at, THINGS + 3 + c] += radiance * y * f4(3 * WINDOW)
-                light[at, THINGS + 6 + c] += radiance * z * f4(3 * WINDOW)
-                light[at, THINGS + 9 + c] += radiance * x * f4(3 * WINDOW)
+            add_view(views[at], fold, x, y, z, emitted[met, 0], emitted[met, 1], emitted[met, 2], f4(0))
 
 
 @njit(_nrt=True)

@@ -21,8 +21,8 @@ from viewsphere.engines.raster.kernels_block import (
     FACE_R, GLOW_R, GREEN, GX, GY, GZ, IB, IG, INSIDE, IR, LOBE, LX, LY, LZ, METAL, NX, NY, NZ, OPEN, OPENX, OPENY, RED,
     RIM, ROUGH, SHARE, SR, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION, UNLIT, VX, VY, VZ, WIDTH,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_bounce import add_near_light, near_light
 from viewsphere.engines.raster.kernels_environment import ABOVE, BELOW, LAMPS, SCALE, TURN
+from viewsphere.engines.raster.kernels_views import add_near_light, near_light
 from viewsphere.kernels.lanes import clamp, cross, dot, lanewise, least, most, root, size, where
 from viewsphere.kernels.lanes import FAST
 from viewsphere.kernels.jit import inner
@@ -328,13 +328,15 @@ def _shine_coat(b):
 
 
 @inner(fastmath=FAST)
-def ambient(count, surrounding, is_bounced, b):
-    """Add the light of the surroundings to DR to SB; the block must be weighed before. Reads OPEN and BOUNCE, and where
-    `is_bounced` what `kernels_bounce.bounced` fills.
+def ambient(count, surrounding, bounces, b):
+    """Add the light of the surroundings to DR to SB; the block must be weighed before. Reads OPEN and BOUNCE, and where light
+    bounces what `kernels_bounce.bounced` fills.
 
     Leaves in T3 to T5 the light behind a transmissive surface, and overwrites the rows of a light.
     """
-    has_coat, has_glass = _any(count, COAT, b), _any(count, THROUGH, b)
+    has_coat, has_glass, is_bounced = _any(count, COAT, b), _any(count, THROUGH, b), bounces.grid[0] > 0
+    columns = U(bounces.grid[2])
+    across = U(bounces.grid[1]) * columns
     # The order is matt, mirror, coat, behind; one loop around one call, so that the call is compiled once.
     for layer in range(4):
         if (layer == 2 and not has_coat) or (layer == 3 and not has_glass):
@@ -345,9 +347,9 @@ def ambient(count, surrounding, is_bounced, b):
             _look_through(count, b)
         else:
             _mirror(count, U(CX if layer == 2 else NX), U(COAT_ROUGH if layer == 2 else ROUGH), b)
-        is_near = is_bounced and layer in (1, 2)
+        is_near = is_bounced and layer > 0
         if is_near:
-            near_light(count, b)
+            near_light(count, bounces.views, columns, across, b)
         light_around(count, surrounding, b)
         if is_near:
             add_near_light(count, b)

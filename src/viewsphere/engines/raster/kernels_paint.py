@@ -205,7 +205,7 @@ def shade(
             ambient_matte(count, surrounding, is_bounced, b)
             _finish_matte(count, b)
         else:
-            ambient(count, surrounding, is_bounced, b)
+            ambient(count, surrounding, bounces, b)
             compose(count, b)
         _lay_all(start, count, is_ground, slots, radiance, b)
 

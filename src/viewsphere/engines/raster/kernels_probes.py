@@ -31,11 +31,12 @@ from viewsphere.engines.raster.kernels_block import (
     UNLIT,
     VX,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_bounce import CORNERS, LOWER, SCREENS, THINGS, UPPER, bounced
+from viewsphere.engines.raster.kernels_bounce import BURIED, HIDDEN, OUTDOORS, SCREENS, bounced
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground
 from viewsphere.engines.raster.kernels_light import UNEXPOSED, light_around, weigh
 from viewsphere.engines.raster.kernels_material import material
 from viewsphere.engines.raster.kernels_trace import DEEP, nearest
+from viewsphere.engines.raster.kernels_views import CORNERS
 from viewsphere.kernels.jit import inner, njit
 from viewsphere.kernels.lanes import FAST
 
@@ -50,10 +51,10 @@ CLUSTERS = 6
 ALIKE = 0.9  # cosine between normals of one screen
 FEWEST = 2  # rays of a screen
 SECOND = 0.12  # share of the rays towards a cell that a second screen must have
-# Shares of rays that meet the inner side of a thing from which on a probe is within it: of any size, and of a small one,
-# where so many meet it within so many cells.
-BURIED, BURIED_CLOSE, CLOSE = 0.95, 0.8, 2.5
-WINDOW = np.float32(0.8)  # of degree 1 of things' light, which is read as it is: less of it below zero behind a bright thing
+# Shares of rays from which on a probe is within a thing: that meet the inner side of one of any size, or of one that is so many
+# cells away at most; or that meet anything so close, as in a cupboard.
+WITHIN, WITHIN_CLOSE, SHUT_IN, CLOSE = 0.95, 0.5, 0.97, 3.5
+OPEN_SKY = 0.4  # share of the rays up that meet nothing from which on a probe knows nothing of what it does not see
 
 
 @inner
@@ -266,11 +267,11 @@ def look_up(bounces, places, normals, glow, inside):
 
 @njit(fastmath=FAST)
 def send(ids, turn, own, weights, sky, far_ground, sent, light):
-    """What arrives at the probes: irradiance, columns 0 to THINGS of rows `own` (N,) of light (N, 48), from patches that send
+    """What arrives at the probes: irradiance, rows `own` (N,) of light (N, 28), from patches that send
     `sent` (M, 3), the sky (W, K, 3) and the ground far away (3,). weights (W, K, 9): of each direction in the terms of
     irradiance.
     """
-    light[:, :THINGS] = f4(0)
+    light[:] = f4(0)
     for k in range(U(ids.shape[0])):
         for i in range(U(ids.shape[1])):
             met, at, which = ids[k, i], U(own[i]), U(turn[i])
@@ -284,31 +285,6 @@ def send(ids, turn, own, weights, sky, far_ground, sent, light):
                 light[at, U(3) * j] += w * r
                 light[at, U(3) * j + U(1)] += w * g
                 light[at, U(3) * j + U(2)] += w * b
-
-
-@njit(fastmath=FAST)
-def send_sharply(ids, turn, own, directions, patch_is_ground, sent, light):
-    """The other columns: light of things in each direction, and what they leave of the sky and of the ground."""
-    light[:, THINGS:] = f4(0)
-    per = f4(1) / f4(directions.shape[1])
-    for k in range(U(directions.shape[1])):
-        for i in range(U(ids.shape[1])):
-            met, at, which = ids[k, i], U(own[i]), U(turn[i])
-            x, y, z = directions[which, k, U(0)], directions[which, k, U(1)], directions[which, k, U(2)]
-            if met < 0 or patch_is_ground[U(met)]:
-                first = U(UPPER if z > f4(0) else LOWER)
-                light[at, first] += per
-                light[at, first + U(1)] += per * x
-                light[at, first + U(2)] += per * y
-                light[at, first + U(3)] += per * z
-                continue
-            for c in range(U(3)):
-                radiance = sent[U(met), c] * per
-                column = U(THINGS) + c
-                light[at, column] += radiance
-                light[at, column + U(3)] += radiance * y * f4(3 * WINDOW)
-                light[at, column + U(6)] += radiance * z * f4(3 * WINDOW)
-                light[at, column + U(9)] += radiance * x * f4(3 * WINDOW)
 
 
 @njit
@@ -327,6 +303,35 @@ def blur(light, opens, step, out):
             if behind > f4(0):
                 value += light[i + step, c] * behind
             out[i, c] = value
+
+
+@njit(_nrt=True)
+def choose(rank, shape, light, chosen):
+    """Which probe each knows the light of, into chosen (N,) int32: itself, but a buried one that of a neighbour, of the highest
+    rank there is (see `screen`): one that is darker than most, since light that leaks is seen more than darkness.
+    """
+    layers, rows, columns = shape[0], shape[1], shape[2]
+    levels, places = np.empty(27, np.float32), np.empty(27, np.int32)
+    for at in range(light.shape[0]):
+        chosen[at] = at
+        if rank[at] > 0:
+            continue
+        z, y, x = at // (rows * columns), at // columns % rows, at % columns
+        best, count = 1, 0
+        for w in range(max(z - 1, 0), min(z + 2, layers)):
+            for v in range(max(y - 1, 0), min(y + 2, rows)):
+                for u in range(max(x - 1, 0), min(x + 2, columns)):
+                    k = (w * rows + v) * columns + u
+                    if rank[k] < best:
+                        continue
+                    count = count if rank[k] == best else 0
+                    best = rank[k]
+                    levels[count], places[count] = light[k, 0] + light[k, 1] + light[k, 2], k
+                    count += 1
+        if count > 0:
+            for _ in range(count // 4):
+                levels[np.argmin(levels[:count])] = f4(np.inf)
+            chosen[at] = places[np.argmin(levels[:count])]
 
 
 @inner
@@ -389,40 +394,48 @@ def _cell_of(octant, at, rows, columns):
 def bury(met, far, directions, turn, own, normals, cells, buried):
     """Which probes are within a thing, into buried (N,) uint8: 2 within a small one, 1 within one of any size, else 0."""
     for i in range(met.shape[1]):
-        inner_sides = close = 0
+        inner_sides = close = shut = 0
         for k in range(directions.shape[1]):
             if met[k, i] < 0:
                 continue
             d, n = directions[turn[i], k], normals[met[k, i]]
+            shut += 1 if far[k, i] * cells <= f4(CLOSE) else 0
             if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > f4(0):
                 inner_sides += 1
                 close += 1 if far[k, i] * cells <= f4(CLOSE) else 0
         rays = directions.shape[1]
-        buried[own[i]] = 2 if close >= BURIED_CLOSE * rays else 1 if inner_sides >= BURIED * rays else 0
+        is_small = close >= WITHIN_CLOSE * rays or shut >= SHUT_IN * rays
+        buried[own[i]] = 2 if is_small else 1 if inner_sides >= WITHIN * rays else 0
 
 
 @njit(_nrt=True)
-def screen(met, far, directions, turn, own, normals, cells, shape, buried, screens):
-    """Fill Bounces.screens (N, 64): of the hits of each probe that lie in one of the eight cells around it, the planes of the
+def screen(met, far, directions, turn, own, normals, cells, shape, buried, screens, rank):
+    """Fill Bounces.screens (N, 72): of the hits of each probe that lie in one of the eight cells around it, the planes of the
     two normals that most of them have. own (N,): which probe each column is; shape (3,): layers, rows, columns. A buried probe
-    sees nothing of any cell.
+    sees nothing of any cell. Fill rank (N,) uint8: 0 of buried probes, 1 of those under the open sky, 2 of others.
     """
     rows, columns = shape[1], shape[2]
-    for k in range(4 * SCREENS * CORNERS):
-        screens[:, k] = f4(1) if k // CORNERS % 4 == 3 else f4(0)
+    for k in range(screens.shape[1]):
+        screens[:, k] = f4(HIDDEN) if k >= 4 * SCREENS * CORNERS else f4(1) if k // CORNERS % 4 == 3 else f4(0)
     found = np.empty((8, CLUSTERS, 5), np.float32)
     second = max(directions.shape[1] * SECOND / 8, FEWEST)
     for i in range(met.shape[1]):
         found[:] = f4(0)
-        hits = 0
+        hits = up = open_ = 0
         for k in range(directions.shape[1]):
             d, t = directions[turn[i], k], far[k, i] * cells
+            up += 1 if d[2] > f4(0) else 0
+            open_ += 1 if d[2] > f4(0) and met[k, i] < 0 else 0
             if met[k, i] >= 0 and t * max(abs(d[0]), abs(d[1]), abs(d[2])) <= f4(1):
                 n = normals[met[k, i]]
                 _add_hit(found[_octant(d)], n, n[0] * d[0] + n[1] * d[1] + n[2] * d[2], t)
                 hits += 1
-        for octant in range(8 if hits > 0 or buried[own[i]] else 0):
+        rank[own[i]] = 0 if buried[own[i]] else 1 if open_ > OPEN_SKY * up else 2
+        least = f4(BURIED) if rank[own[i]] == 0 else f4(OUTDOORS) if rank[own[i]] == 1 else f4(HIDDEN)
+        for octant in range(8 if hits > 0 or rank[own[i]] < 2 else 0):
             cell, bits = _cell_of(octant, own[i], rows, columns)
+            if cell >= 0:
+                screens[cell, 4 * SCREENS * CORNERS + bits] = least
             if cell >= 0 and buried[own[i]]:
                 screens[cell, 3 * CORNERS + bits] = f4(-1)
             elif cell >= 0:

@@ -15,13 +15,19 @@ from viewsphere.engines.raster.kernels_block import (
     BLOCK,
     BLUE,
     DR,
+    EDGE_R,
     ER,
+    FACE_R,
     FADE,
     GREEN,
+    LOBE,
     METAL,
     RED,
+    RIM,
     ROUGH,
     ROWS,
+    SR,
+    TAKEN,
     UNLIT,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_bounce import bounced
@@ -97,7 +103,7 @@ def _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, 
     if is_matte:
         ambient_matte(count, surrounding, is_bounced, b)
     else:
-        ambient(count, surrounding, is_bounced, b)
+        ambient(count, surrounding, bounces, b)
 
 
 @njit(fastmath=FAST, _nrt=True)
@@ -179,3 +185,34 @@ def substance(view, surfaces, textures, floor, is_ground, slots, triangle, depth
         for i in range(U(count)):
             q = U(slots[U(start) + i])
             out[q, U(0)], out[q, U(1)] = b[U(ROUGH) + i], b[U(METAL) + i]
+
+
+@lanewise
+def _cover(b):
+    """The shares that base and coat mirror of light from where their mirror images are, into FACE_R to FACE_B."""
+    for k in range(0, 3 * BLOCK, BLOCK):
+        b[FACE_R + k] = b[FACE_R + k] * b[LOBE] + b[EDGE_R + k] * b[RIM] + b[TAKEN]
+
+
+@njit(fastmath=FAST, _nrt=True)
+def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
+    """Set rows `slots` of `out` (S, 7) float32 to what samples mirror of their surroundings: its shares of red, green and blue,
+    the light that they are taken to mirror, and the roughness.
+    """
+    b = np.zeros(ROWS * BLOCK, np.float32)
+    own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    for start in range(0, slots.shape[0], BLOCK):
+        count = min(slots.shape[0] - start, BLOCK)
+        locate(view, start, count, slots, depth, b, own)
+        gather(surfaces, count, triangle, b, own, which)
+        material(count, view, surfaces, textures, b, which)
+        weigh(count, surrounding.albedo, b)
+        occlude(count, occlusion, b)
+        bounced(count, bounces, False, b)
+        ambient(count, surrounding, bounces, b)
+        _cover(count, b)
+        for i in range(U(count)):
+            q = U(slots[U(start) + i])
+            for c in range(U(3)):
+                out[q, c], out[q, U(3) + c] = b[U(FACE_R) + c * U(BLOCK) + i], b[U(SR) + c * U(BLOCK) + i]
+            out[q, U(6)] = b[U(ROUGH) + i]

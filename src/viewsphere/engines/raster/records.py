@@ -67,16 +67,18 @@ class PictureRays(NamedTuple):
 class Bounces(NamedTuple):
     """Light that things throw at one another: a volume of probes, and a map of level ground below things that stand on it.
 
-    light (cells, 48) float32: what each probe sees, columns named in `kernels_bounce`; screens (cells, 64): of the cell whose
-    first corner a probe is, for each of its eight corners, what part of the cell that corner sees: the normal's x of all eight,
-    y, z and offset of a plane, in cells from the first corner, and those of a second one; grid (3,) int64: layers, rows and
-    columns, 0 for no volume; frame (7,): x, y, z of the first probe, cells per length, how far from a surface it is read in
-    cells, whether there is a ground, one over the number of cells in which its light fades out at the border; floor (n, n, 4):
-    radiance of a white matt ground lit by things alone; floor_frame (4,): its cells per length, its corner's x and y, whether
-    there is a map.
+    light (cells, 28) float32: irradiance at each probe, columns named in `kernels_bounce`; views (cells * NODES, 4): what each
+    probe sees in each direction, see `kernels_views`: radiance of things, and the share that they leave of what is far away;
+    screens (cells, 72): of the cell whose first corner a probe is, for each of its eight corners, what part of the cell that
+    corner sees: the normal's x of all eight, y, z and offset of a plane, in cells from the first corner, those of a second one,
+    and how much it counts where it sees nothing; grid (3,) int64: layers, rows and columns, 0 for no volume; frame (7,): x, y
+    and z of the first probe, cells per length, how far from a surface it is read in cells, whether there is a ground, one over
+    the number of cells in which its light fades out at the border; floor (n, n, 4): radiance of a white matt ground lit by
+    things alone; floor_frame (4,): its cells per length, its corner's x and y, whether there is a map.
     """
 
     light: Float32
+    views: Float32
     screens: Float32
     grid: NDArray[np.int64]
     frame: Float32
@@ -85,8 +87,9 @@ class Bounces(NamedTuple):
 
 
 NO_BOUNCES = Bounces(
-    np.zeros((1, 48), np.float32),
-    np.zeros((1, 64), np.float32),
+    np.zeros((1, 28), np.float32),
+    np.zeros((1, 4), np.float32),
+    np.zeros((1, 72), np.float32),
     np.zeros(3, np.int64),
     np.zeros(7, np.float32),
     np.zeros((2, 2, 4), np.float32),

@@ -15,12 +15,13 @@ from viewsphere.engines._arranged import Arranged, Arrangements
 from viewsphere.engines._passes import shading_of
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
 from viewsphere.engines.raster.blurring import Blur
-from viewsphere.engines.raster.mirroring import mirror
 from viewsphere.engines.raster.options import Options, parse_options
 from viewsphere.engines.raster.painting import Baked, materials, paint
+from viewsphere.engines.raster.polish import mirror_in_polish
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.surface import Lengths
 from viewsphere.engines.raster.thing_occlusion import TargetShades
+from viewsphere.engines.raster.wet_ground import mirror_in_water
 from viewsphere.imaging.background import display_background, shows_sky
 from viewsphere.imaging.falling import fall_in
 from viewsphere.imaging.finish import finished
@@ -152,7 +153,9 @@ class RasterStage:
 
     def _paint_one(self, baked: Baked, camera: Camera, seen: Visibility, has_sky: bool, radiance: Float32) -> None:
         scene = self.shot.scene
-        more = None if scene.wet is None else partial(mirror, baked, camera, seen, scene.wet)
+        more = partial(mirror_in_polish, baked, camera, seen)
+        if scene.wet is not None:
+            more = partial(mirror_in_water, baked, camera, seen, scene.wet)
         paint(baked, camera, seen, self.options.antialias == 4, has_sky, radiance, fog=scene.fog, more=more)
 
     def _canvas(self, pixels: int) -> Float32:
