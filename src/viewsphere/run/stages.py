@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,6 +75,17 @@ class StoredBoxes:
             return self._known[spec.key].at(step and step.frame).box3d_object
         except ValueError as error:
             raise ModelError(f"{self.store.root}: {error}: render again") from None
+
+
+@dataclass(frozen=True, eq=False)
+class _Stand:
+    """Where a still thing stands: its box (8, 3), and those of its rooms, world metres."""
+
+    box: Float
+    rooms: tuple[Float, ...]
+
+
+NONE_KNOWN: Mapping[int, _Stand] = MappingProxyType({})
 
 
 @dataclass(eq=False)
@@ -171,8 +183,9 @@ class Stages:
         with planned.recipe.located():
             self._check_cameras(things, cameras)
 
-    def _check_cameras(self, things: Sequence[Thing], cameras: Float) -> None:
-        """Raise RecipeError for the first of the cameras (N, 3) that is inside of something.
+    def _check_cameras(self, things: Sequence[Thing], cameras: Float, known: Mapping[int, _Stand] = NONE_KNOWN) -> None:
+        """Raise RecipeError for the first of the cameras (N, 3) that is inside of something; known: where some of the things
+        stand, by their identity.
 
         Inside of a target means its box. Inside of scenery means that it hides the sky from the camera, but not from the
         frame's model: under a tree, among hills or in the room where the model stands a camera may well be. So cameras are not
@@ -181,11 +194,13 @@ class Stages:
         own = next((thing for thing in things if not thing.scenery), None)
         if own is None:
             return
-        model = transform(own.world_from_object, self.box(own.model, own.step)).mean(axis=0)
-        _check_rooms(things, model, cameras)
-        for thing in things:
-            box = transform(thing.world_from_object, self.box(thing.model, thing.step))
-            for i in np.flatnonzero(inside_box(box, cameras)):
+        stands = [known.get(id(thing)) or self._stand(thing) for thing in things]
+        boxes, model = np.array([stand.box for stand in stands]), (known.get(id(own)) or self._stand(own)).box.mean(axis=0)
+        _check_rooms([room for stand in stands for room in stand.rooms], model, cameras)
+        low, high = cameras.min(axis=0), cameras.max(axis=0)
+        for k in np.flatnonzero(((boxes.min(axis=1) <= high) & (boxes.max(axis=1) >= low)).all(axis=1)).tolist():
+            thing = things[k]
+            for i in np.flatnonzero(inside_box(boxes[k], cameras)):
                 if not thing.scenery or (self._roofs(thing, cameras[i]) and not self._roofs(thing, model)):
                     what = f"{thing.model.category or 'piece'} {thing.key}"
                     x, y = np.array(thing.world_from_object)[:2, 3]
@@ -199,10 +214,17 @@ class Stages:
     def _check_shot(self, shot: Shot) -> None:
         """Raise RecipeError where a camera of a shot is inside of something; what stands still is looked at once."""
         instants, sensors = range(len(shot.instants)), range(len(shot.rig.sensors))
+        still = {id(thing): self._stand(thing) for thing in shot.things if thing.motion.is_still}
         for poses in dict.fromkeys(map(shot.poses_at, instants)):
             together = [instant for instant in instants if shot.poses_at(instant) == poses]
             cameras = [shot.camera(instant, sensor).center for instant in together for sensor in sensors]
-            self._check_cameras([thing for thing in shot.things_at(together[0]) if thing.is_there], np.array(cameras))
+            there = [thing for thing in shot.things_at(together[0]) if thing.is_there]
+            self._check_cameras(there, np.array(cameras), still)
+
+    def _stand(self, thing: Thing) -> _Stand:
+        pose = thing.world_from_object
+        rooms = tuple(transform(pose, box) for box in rooms_of(thing.model.source, thing.model.seed)) if thing.scenery else ()
+        return _Stand(transform(pose, self.box(thing.model, thing.step)), rooms)
 
     def is_free(self, shot: Shot, instant: int) -> bool:
         """Whether no camera of a shot is inside of something at an instant, counted from 0 in the shot."""
@@ -258,9 +280,8 @@ def _stamps(shot: Shot) -> tuple[Stamp, ...]:
     return ground + repaint_stamps(repaint for thing in shot.things for repaint in thing.repaints)
 
 
-def _check_rooms(things: Sequence[Thing], model: Float, cameras: Float) -> None:
-    """Raise RecipeError for the first of the cameras (N, 3) that is in no room, where the model's middle (3,) is in one."""
-    rooms = [transform(thing.world_from_object, box) for thing in things if thing.scenery for box in rooms_of(thing.model)]
+def _check_rooms(rooms: Sequence[Float], model: Float, cameras: Float) -> None:
+    """Raise RecipeError for the first camera of (N, 3) in none of the rooms (8, 3), if the model's middle (3,) is in one."""
     if not any(inside_box(room, model[None])[0] for room in rooms):
         return
     for i in np.flatnonzero(~np.any([inside_box(room, cameras) for room in rooms], axis=0)):
