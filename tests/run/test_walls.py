@@ -45,21 +45,17 @@ class Still:
 
     def __init__(self, category, mesh):
         self.model, self.mesh = type("Spec", (), {"category": category}), mesh
-        self.motion = type("Rest", (), {"is_still": True})
 
 
 def checked(thing, points):
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     low, high = (np.array(v, float) for v in thing.mesh.bounds)
-    check_way([thing], lambda _: low + corners * (high - low), lambda t: t.mesh, np.array(points, float))
+    check_way([(thing, low + corners * (high - low))], lambda t: t.mesh, np.array(points, float))
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_way_through_a_wall_is_told_and_one_within_a_room_is_not(seed):
-    from viewsphere.model.model_spec import ModelSpec
-
-    spec = ModelSpec(key="m", source="zoo:interior", seed=seed, category="interior", category_id=0)
-    (room, *_) = rooms_of(spec)
+    (room, *_) = rooms_of("zoo:interior", seed)
     interior = Still("interior", build("interior", np.random.default_rng(seed)))
     low, high = room.min(axis=0), room.max(axis=0)
     middle = (low + high) / 2

@@ -111,7 +111,7 @@ class Arrangements:
     @classmethod
     def build(cls, shot: Shot, load: Load) -> Arrangements:
         """Of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
-        ring = Ring(shot.scene.ground is not None, shot.label_alpha)
+        ring = Ring(shot.scene.ground is not None, shot.label_alpha, keeps_scenery=not shot.sequence)
         soaked = 0.0 if shot.scene.wet is None else shot.scene.wet.amount
         meshes = _dressed(shot.things, placed_meshes(shot.things, load), soaked)
         if shot.scene.lamps is not None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,7 +37,7 @@ from viewsphere.surroundings.ground import ground_stamps
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.shot_views import ShotViews
 from viewsphere.truth.visibility import with_ground
-from viewsphere.zoo import build_zoo_model
+from viewsphere.zoo import build_zoo_model, rooms_of
 
 if TYPE_CHECKING:
     from viewsphere.engines import Engine, Stage  # which takes a third of a worker's start
@@ -75,6 +76,17 @@ class StoredBoxes:
             return self._known[spec.key].at(step and step.frame).box3d_object
         except ValueError as error:
             raise ModelError(f"{self.store.root}: {error}: render again") from None
+
+
+@dataclass(frozen=True, eq=False)
+class _Stand:
+    """Where a still thing stands: its box (8, 3), and those of its rooms, world metres."""
+
+    box: Float
+    rooms: tuple[Float, ...]
+
+
+NONE_KNOWN: Mapping[int, _Stand] = MappingProxyType({})
 
 
 @dataclass(eq=False)
@@ -175,8 +187,9 @@ class Stages:
         with planned.recipe.located():
             self._check_cameras(things, cameras)
 
-    def _check_cameras(self, things: Sequence[Thing], cameras: Float) -> None:
-        """Raise RecipeError for the first of the cameras (N, 3) that is inside of something.
+    def _check_cameras(self, things: Sequence[Thing], cameras: Float, known: Mapping[int, _Stand] = NONE_KNOWN) -> None:
+        """Raise RecipeError for the first of the cameras (N, 3) that is inside of something; known: where some of the things
+        stand, by their identity.
 
         Inside of a target means its box. Inside of scenery means that it hides the sky from the camera, but not from the
         frame's model: under a tree, among hills or in the room where the model stands a camera may well be. So cameras are not
@@ -185,11 +198,13 @@ class Stages:
         own = next((thing for thing in things if not thing.scenery), None)
         if own is None:
             return
-        model = transform(own.world_from_object, self.box(own.model, own.step)).mean(axis=0)
-        check_rooms(things, model, cameras)
-        for thing in things:
-            box = transform(thing.world_from_object, self.box(thing.model, thing.step))
-            for i in np.flatnonzero(inside_box(box, cameras)):
+        stands = [known.get(id(thing)) or self._stand(thing) for thing in things]
+        boxes, model = np.array([stand.box for stand in stands]), (known.get(id(own)) or self._stand(own)).box.mean(axis=0)
+        check_rooms([room for stand in stands for room in stand.rooms], model, cameras)
+        low, high = cameras.min(axis=0), cameras.max(axis=0)
+        for k in np.flatnonzero(((boxes.min(axis=1) <= high) & (boxes.max(axis=1) >= low)).all(axis=1)).tolist():
+            thing = things[k]
+            for i in np.flatnonzero(inside_box(boxes[k], cameras)):
                 if not thing.scenery or (self._roofs(thing, cameras[i]) and not self._roofs(thing, model)):
                     what = f"{thing.model.category or 'piece'} {thing.key}"
                     x, y = np.array(thing.world_from_object)[:2, 3]
@@ -205,13 +220,21 @@ class Stages:
         still is looked at once.
         """
         instants, sensors = range(len(shot.instants)), range(len(shot.rig.sensors))
+        still = {id(thing): self._stand(thing) for thing in shot.things if thing.motion.is_still}
         for poses in dict.fromkeys(map(shot.poses_at, instants)):
             together = [instant for instant in instants if shot.poses_at(instant) == poses]
             cameras = [shot.camera(instant, sensor).center for instant in together for sensor in sensors]
-            self._check_cameras([thing for thing in shot.things_at(together[0]) if thing.is_there], np.array(cameras))
+            there = [thing for thing in shot.things_at(together[0]) if thing.is_there]
+            self._check_cameras(there, np.array(cameras), still)
         if shot.sequence:
             way = np.array([shot.camera(instant, 0).center for instant in instants])
-            check_way(shot.things, lambda t: self.box(t.model, t.step), lambda t: self.model(t.model, t.step), way)
+            fixed = [(thing, still[id(thing)].box) for thing in shot.things if id(thing) in still]
+            check_way(fixed, lambda thing: self.model(thing.model, thing.step), way)
+
+    def _stand(self, thing: Thing) -> _Stand:
+        pose = thing.world_from_object
+        rooms = tuple(transform(pose, box) for box in rooms_of(thing.model.source, thing.model.seed)) if thing.scenery else ()
+        return _Stand(transform(pose, self.box(thing.model, thing.step)), rooms)
 
     def is_free(self, shot: Shot, instant: int) -> bool:
         """Whether no camera of a shot is inside of something at an instant, counted from 0 in the shot."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.classes import STUFF_IDS, stuff_of
 from viewsphere.model.thing import Thing
 from viewsphere.sampling.camera import inside_box
-from viewsphere.zoo import rooms_of
 
 Float = NDArray[np.float64]
 
@@ -21,9 +20,8 @@ WALLS = {STUFF_IDS[name] for name in ("building", "wall", "floor", "ceiling")}
 """Classes of scenery that nobody goes through: leaves and hedges are none."""
 
 
-def check_rooms(things: Sequence[Thing], model: Float, cameras: Float) -> None:
-    """Raise RecipeError for the first of the cameras (N, 3) that is in no room, where the model's middle (3,) is in one."""
-    rooms = [transform(thing.world_from_object, box) for thing in things if thing.scenery for box in rooms_of(thing.model)]
+def check_rooms(rooms: Sequence[Float], model: Float, cameras: Float) -> None:
+    """Raise RecipeError for the first camera of (N, 3) in none of the rooms (8, 3), if the model's middle (3,) is in one."""
     if not any(inside_box(room, model[None])[0] for room in rooms):
         return
     for i in np.flatnonzero(~np.any([inside_box(room, cameras) for room in rooms], axis=0)):
@@ -33,17 +31,14 @@ def check_rooms(things: Sequence[Thing], model: Float, cameras: Float) -> None:
         )
 
 
-def check_way(things: Sequence[Thing], box_of: Callable[[Thing], Float], mesh_of: Callable[[Thing], Mesh], way: Float) -> None:
+def check_way(things: Iterable[tuple[Thing, Float]], mesh_of: Callable[[Thing], Mesh], way: Float) -> None:
     """Raise RecipeError where the straight line between two points of a way (N, 3), one after the other, goes through a wall.
 
-    `box_of`, `mesh_of`: a thing's box (8, 3) and its mesh, in its own axes.
+    `things`: those that stand still, each with its box (8, 3) in the world; `mesh_of`: a thing's mesh in its own axes.
     """
     starts, ends = way[:-1], way[1:]
-    for thing in things:
-        if not thing.scenery or not thing.motion.is_still:
-            continue
-        around = transform(thing.world_from_object, box_of(thing))
-        if (way.min(axis=0) > around.max(axis=0)).any() or (way.max(axis=0) < around.min(axis=0)).any():
+    for thing, box in things:
+        if not thing.scenery or (way.min(axis=0) > box.max(axis=0)).any() or (way.max(axis=0) < box.min(axis=0)).any():
             continue
         mesh = mesh_of(thing)
         walls = _walls(thing.model.category, mesh)

@@ -107,7 +107,12 @@ def present(things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[Mesh]:
 
 
 def build_geometry(
-    things: Sequence[Thing], meshes: Sequence[Mesh], ground: bool, label_alpha: float, floor: Floor | None = None
+    things: Sequence[Thing],
+    meshes: Sequence[Mesh],
+    ground: bool,
+    label_alpha: float,
+    floor: Floor | None = None,
+    keeps_scenery: bool = True,
 ) -> Geometry:
     """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none), or where
     `floor` says: something that jumps leaves it.
@@ -116,14 +121,15 @@ def build_geometry(
     where alpha >= label_alpha, a MASK material where alpha >= its cutoff; transmission always counts as surface. Fully
     transparent triangles (no texel is surface) are kept but never seen. Raises ValueError for other ids.
 
-    The last scenery is kept: where only objects change, it is not placed again.
+    The last scenery is kept, unless it is of no use to others: where only objects change, it is not placed again.
     """
     count = sum(p.id > 0 for p in things)
     if [p.id for p in things] != [*range(1, count + 1), *[BACKGROUND] * (len(meshes) - count)]:
         raise ValueError(f"things: expected ids 1..N in order, then 0, got {[p.id for p in things]}")
     parts = [_placed(tuple(things[:count]), tuple(meshes[:count]), label_alpha)]
     if count < len(meshes):
-        parts.append(_scenery(tuple(things[count:]), tuple(meshes[count:]), label_alpha))
+        placed = _scenery if keeps_scenery else _placed
+        parts.append(placed(tuple(things[count:]), tuple(meshes[count:]), label_alpha))
     return _stacked([*parts, _ground(np.concatenate([part.bounds for part in parts]), floor)] if ground else parts)
 
 

@@ -56,11 +56,12 @@ class Ring:
     """Gives the geometries of one scene's things, which are the same but for where they are, and for how their meshes are
     deformed. Arrays of a geometry are written to again when those of three other instants were asked for since.
 
-    `ground` and `label_alpha`: see `build_geometry`, to whose result all are equal to the bit.
+    `ground`, `label_alpha` and `keeps_scenery`: see `build_geometry`, to whose result all are equal to the bit.
     """
 
     ground: bool
     label_alpha: float
+    keeps_scenery: bool = True
     _rooms: list[_Room] = field(default_factory=list[_Room])
     _passing: list[_Room] = field(default_factory=list[_Room])
 
@@ -72,14 +73,14 @@ class Ring:
         room = self._held(things, meshes, floor)
         if room is None:
             fitting = [room for room in self._rooms if room.fits(things, meshes)]
-            room = self._made(things, meshes, floor, fitting, self._rooms.pop(0) if len(self._rooms) == ROOMS else None)
+            room = self._made(things, meshes, floor, fitting, self._rooms.pop(0) if len(self._rooms) == ROOMS else None, True)
         self._rooms.append(room)  # the last asked for comes last
         return room.geometry
 
     def passing(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None = None) -> Geometry:
         """The same between two instants: the arrays are written to again by the next call of this."""
         fitting = [room for room in (*self._passing, *self._rooms) if room.fits(things, meshes)]
-        room = self._made(things, meshes, floor, fitting, self._passing.pop() if self._passing else None)
+        room = self._made(things, meshes, floor, fitting, self._passing.pop() if self._passing else None, False)
         self._passing.append(room)
         return room.geometry
 
@@ -90,16 +91,29 @@ class Ring:
         return None
 
     def _made(
-        self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None, fitting: list[_Room], free: _Room | None
+        self,
+        things: Sequence[Thing],
+        meshes: Sequence[Mesh],
+        floor: Floor | None,
+        fitting: list[_Room],
+        free: _Room | None,
+        shares: bool,
     ) -> _Room:
-        """Made of one of the fitting rooms, of the free one if it is the first of them."""
+        """Made of one of the fitting rooms, of the free one if it is the first of them. One that `shares` has the coordinates
+        of another where these are the same.
+        """
         if not fitting:
-            geometry = build_geometry(things, present(things, meshes), self.ground, self.label_alpha, floor)
+            geometry = build_geometry(things, present(things, meshes), self.ground, self.label_alpha, floor, self.keeps_scenery)
             return _Room(things, meshes, floor, geometry)
         room = fitting[0] if fitting[0] is free else fitting[-1]
         geometry = room.geometry
-        if room is not free:
-            geometry = replace(geometry, **{name: getattr(geometry, name).copy() for name in MOVED})
+        is_deformed = any(a is not b for a, b in zip(room.meshes, meshes, strict=True))
+        copied = set(MOVED if room is not free else ())
+        if shares and not is_deformed:  # coordinates are those of the meshes, wherever things are
+            copied.discard("coordinates")
+        elif any(other.geometry.coordinates is geometry.coordinates for other in fitting if other is not room):
+            copied.add("coordinates")
+        geometry = replace(geometry, **{name: getattr(geometry, name).copy() for name in copied})
         for i in room.changed(things, meshes):
             place(geometry, i, things[i], meshes[i])
         return _Room(things, meshes, floor, replace(lay_ground(geometry, floor)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -20,6 +21,10 @@ SCAN_CELLS = 128
 
 EDGE_ON = 1e-9
 """A camera's height above the ground, as a share of its distance from the origin and a metre, that is nothing but rounding."""
+
+
+OUTSIDE = (-1e9, 0.0, 1.0, 1.0)
+"""`homogeneous` of a vertex that is far from the picture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +94,13 @@ def rasterize(
     """
     everything = (0, _last_drawn(geometry, camera), 0, len(geometry.vertices))
     part = _range(geometry, object_id) if object_id else everything
-    q = homogeneous(geometry, camera, *part[2:]) if corners is None or part != everything else corners
+    is_whole = part == everything and window is None
+    if is_whole:
+        q = homogeneous(geometry, camera) if corners is None else corners
+    else:
+        q = homogeneous(geometry, camera, *part[2:])
     nearest, seen = _draw(geometry, camera, subdivision, part, window, q)
-    known = q if part == everything else None
+    known = q if is_whole else None
     return Visibility(seen, nearest.astype(np.float32), known, nearest if keeps_exact else None)
 
 
@@ -129,16 +138,49 @@ def _range(geometry: Geometry, object_id: int) -> tuple[int, int, int, int]:
 def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
     """Vertices [base, stop) before the perspective division, and the inverse of their third coordinate, (n, 4).
 
-    K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens. The inverse is infinite unless positive.
+    K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens. The inverse is infinite unless positive. Of all
+    vertices, those of things that lie outside of a pinhole's picture are at `OUTSIDE`, wherever they are.
     """
     from viewsphere.truth import kernels_draw as kernels
 
-    stop = len(geometry.vertices) if stop is None else stop
-    q = np.empty((stop - base, 4))
+    end = len(geometry.vertices) if stop is None else stop
+    q = np.empty((end - base, 4))
     k = camera.K if camera.distortion is None else np.eye(3)
     moved = np.column_stack((camera.R, camera.t))
-    kernels.transform(geometry.vertices, base, stop, k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2], q)
+    m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
+    if base or stop is not None or camera.distortion is not None:
+        kernels.transform(geometry.vertices, base, end, m, q)
+        return q
+    for first, last, is_outside in _runs(geometry.vertex_start, end, outside(geometry, camera, m)):
+        if is_outside:
+            q[first:last] = OUTSIDE
+        else:
+            kernels.transform(geometry.vertices, first, last, m, q[first:last])
     return q
+
+
+def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which things of a geometry lie wholly outside of a pinhole's picture, a pixel away from it, or behind the camera: all
+    corners of their boxes do.
+    """
+    which = np.indices((2, 2, 2)).reshape(3, 8).T
+    corners = geometry.bounds[:, which, np.arange(3)]  # (N, 8, 3)
+    with np.errstate(invalid="ignore"):  # of things without triangles
+        u, v, w = (corners[..., 0] * m[0] + corners[..., 1] * m[1] + corners[..., 2] * m[2] + m[3] for m in pixels_from_world)
+        sides = u < -w, u > (camera.width + 1) * w, v < -w, v > (camera.height + 1) * w, w < 0
+        return np.logical_or.reduce([side.all(axis=1) for side in sides])
+
+
+def _runs(starts: tuple[int, ...], end: int, flags: NDArray[np.bool_]) -> Iterator[tuple[int, int, bool]]:
+    """Runs [first, stop) of what things own from these starts on, up to the end, which things of one flag own; False beyond."""
+    first, flag = 0, False
+    for start, own in zip(starts, (*flags.tolist(), False), strict=True):
+        if own != flag:
+            if start > first:
+                yield first, start, flag
+            first, flag = start, own
+    if end > first:
+        yield first, end, flag
 
 
 def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int32]:
@@ -242,8 +284,18 @@ def _draw(
         table, unit = t.arrays, has_unit_rays(camera.distortion)
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
         return nearest, seen
-    cell = np.empty((stop - base, 4), np.int32)
-    kernels.cells(q, samples, x0, y0, x1 - x0, y1 - y0, cell)
-    cell[geometry.vertex_start[-1] - base :] = kernels.BEHIND
-    kernels.draw(q, cell, geometry.triangles, span, (samples, x0, y0), *cut, nearest, seen)
+    cell, canvas = np.empty((stop - base, 4), np.int32), (x0, y0, x1 - x0, y1 - y0)
+    vertices, triangles = [(0, stop - base, False)], [(first, last, False)]
+    if 0 < len(q) == len(geometry.vertices):  # of a thing that is outside the first vertex is, too
+        start = np.array(geometry.vertex_start[:-1], np.intp)
+        hidden = (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1)
+        vertices = list(_runs(geometry.vertex_start, stop, hidden))
+        triangles = list(_runs(geometry.triangle_start, last, hidden))
+    for begin, end, is_outside in vertices:
+        if not is_outside:
+            kernels.cells(q[begin:end], samples, *canvas, cell[begin:end])
+    cell[max(geometry.vertex_start[-1] - base, 0) :] = kernels.BEHIND
+    for begin, end, is_outside in triangles:
+        if not is_outside:
+            kernels.draw(q, cell, geometry.triangles, (begin, end, base), (samples, x0, y0), *cut, nearest, seen)
     return nearest, seen

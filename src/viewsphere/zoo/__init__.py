@@ -126,20 +126,24 @@ def _sources() -> str:
     return digest.hexdigest()
 
 
-def rooms_of(spec: ModelSpec) -> tuple[NDArray[np.float64], ...]:
-    """The air of the rooms in a member of the zoo, each a box (8, 3) in its own axes, metres; none where it has no rooms.
+@lru_cache(maxsize=1024)
+def rooms_of(source: str, seed: int | None) -> tuple[NDArray[np.float64], ...]:
+    """The air of the rooms in the member of the zoo of this source and seed, each a box (8, 3) in its own axes, metres; none
+    where it has no rooms.
 
     A family with rooms has a function `rooms` that gives them by its parameters.
     """
-    return _rooms(spec.source.removeprefix(ZOO), spec.seed) if spec.source.startswith(ZOO) else ()
-
-
-@lru_cache(maxsize=64)
-def _rooms(family: str, seed: int | None) -> tuple[NDArray[np.float64], ...]:
     import numpy as np
 
-    module = plugins.family(family)
-    return module.rooms(module.draw(np.random.default_rng(seed))) if hasattr(module, "rooms") else ()
+    if not source.startswith(ZOO):
+        return ()
+    module = plugins.family(source.removeprefix(ZOO))
+    if not hasattr(module, "rooms"):
+        return ()
+    rooms: tuple[NDArray[np.float64], ...] = module.rooms(module.draw(np.random.default_rng(seed)))
+    for room in rooms:
+        room.setflags(write=False)  # kept for the next call
+    return rooms
 
 
 def real_size(mesh: Mesh) -> tuple[float, float, float]:

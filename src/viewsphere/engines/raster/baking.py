@@ -16,7 +16,7 @@ from viewsphere.engines._lamps import lamplight
 from viewsphere.engines.raster import kernels_paint
 from viewsphere.engines.raster.bounces import bake_bounces
 from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
-from viewsphere.engines.raster.halls import hall_of
+from viewsphere.engines.raster.halls import Halls
 from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
 from viewsphere.engines.raster.lights import Casters, Extent, bake_lights
 from viewsphere.engines.raster.occlusion import bake_occlusion, of_ground_alone, with_ground_light
@@ -108,8 +108,10 @@ def sequence_lengths(meshes: Sequence[Mesh]) -> Lengths:
     return Lengths((0.0, 0.0, 0.0), 2.0 ** math.ceil(math.log2(unit)))
 
 
-def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades) -> Baked:
-    """What pictures of things are painted from, as they are arranged. `shades` keeps what targets of a sequence hide."""
+def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, halls: Halls) -> Baked:
+    """What pictures of things are painted from, as they are arranged. `shades` keeps what targets of a sequence hide, `halls`
+    what throws light.
+    """
     geometry, surfaces, lengths = packed.arranged.geometry, packed.surfaces, packed.lengths
     has_ground = scene.ground is not None
     casters = _casters(packed, has_ground)
@@ -125,7 +127,7 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades) -
         occlusion = shades.bake(packed.arranged, casters, lengths.unit, has_ground, options.ambient_occlusion)
     else:
         occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
-    hall = hall_of(packed.arranged, casters, floor, lengths, has_ground, options.bounces)
+    hall = halls.of(packed.arranged, casters, floor, lengths, has_ground, options.bounces)
     bounces = NO_BOUNCES if hall is None else bake_bounces(hall, surrounding, lights)
     if hall is not None and hall.has_map:
         occlusion = of_ground_alone(occlusion)

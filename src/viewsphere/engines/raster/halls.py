@@ -5,17 +5,23 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from operator import is_
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from viewsphere.assets.mesh import Mesh
 from viewsphere.engines._arranged import Arranged
 from viewsphere.engines.raster.bounces import Hall
 from viewsphere.engines.raster.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.lights import Casters
-from viewsphere.engines.raster.records import Float32
+from viewsphere.engines.raster.records import Float32, Int32, Surfaces
 from viewsphere.engines.raster.surface import Lengths
 from viewsphere.engines.raster.tracing import cast, tree_of
+from viewsphere.model.thing import Thing
+
+Float = NDArray[np.float64]
 
 LATTICE = 24
 """Places, each way, from which one looks up for a roof."""
@@ -30,38 +36,79 @@ UP = np.array([[[1e-3, 2e-3, 1]]], np.float32)
 """Nearly: no ray runs along a wall."""
 
 
-def hall_of(
+@dataclass(frozen=True, eq=False)
+class _Throwing:
+    """Things that stand still, and which of a stage's triangles of theirs throw light (T,), between low and high (3,)."""
+
+    things: tuple[Thing, ...]
+    meshes: tuple[Mesh, ...]
+    lengths: Lengths
+    triangles: NDArray[np.uint32]
+    which: Int32
+    low: Float
+    high: Float
+
+
+@dataclass(frozen=True, eq=False)
+class Halls:
+    """Finds the things that throw light at one another. The last ones are kept: to find them takes a look at all triangles."""
+
+    _last: list[_Throwing] = field(default_factory=list[_Throwing])
+
+    def of(
+        self,
+        arranged: Arranged,
+        casters: Casters,
+        floor: Float32,
+        lengths: Lengths,
+        has_ground: bool,
+        bounces: Literal["auto", "on", "off"],
+    ) -> Hall | None:
+        """The scenery that stands still, which lights whatever else is there; in a picture without scenery all targets. None
+        where light is not to bounce: it shall not, or only indoors. All calls have the same `bounces`.
+        """
+        if bounces == "off" or (bounces == "auto" and not arranged.has_scenery):
+            return None
+        own = self._throwing(arranged, casters.surfaces, lengths, bounces == "auto")
+        if not len(own.which):
+            return None
+        height = arranged.geometry.ground_z if has_ground else None
+        ground_z = None if height is None else (height - lengths.origin[2]) / lengths.unit
+        key = (own.things, own.meshes), lengths, ground_z, floor.tobytes()
+        has_map = ground_z is not None and not arranged.has_scenery
+        limits = own.which, own.low, own.high
+        return Hall(key, casters.surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map)
+
+    def _throwing(self, arranged: Arranged, surfaces: Surfaces, lengths: Lengths, only_indoors: bool) -> _Throwing:
+        still = _still(arranged)
+        things, meshes = tuple(arranged.things[i] for i in still), tuple(arranged.whole[i] for i in still)
+        for last in self._last:
+            same = len(last.things) == len(things) and all(map(is_, last.things, things)) and all(map(is_, last.meshes, meshes))
+            if same and last.lengths == lengths and last.triangles is surfaces.triangles:
+                return last
+        found = _thrown(arranged, still, (things, meshes), surfaces, lengths, only_indoors)
+        self._last[:] = [found]
+        return found
+
+
+def _thrown(
     arranged: Arranged,
-    casters: Casters,
-    floor: Float32,
+    still: list[int],
+    own: tuple[tuple[Thing, ...], tuple[Mesh, ...]],
+    surfaces: Surfaces,
     lengths: Lengths,
-    has_ground: bool,
-    bounces: Literal["auto", "on", "off"],
-) -> Hall | None:
-    """The scenery that stands still, which lights whatever else is there; in a picture without scenery all targets. None where
-    light is not to bounce: it shall not, or only indoors.
-    """
-    if bounces == "off" or (bounces == "auto" and not arranged.has_scenery):
-        return None
-    geometry, surfaces = arranged.geometry, casters.surfaces
-    still = _still(arranged)
-    if not still:
-        return None
-    start = geometry.triangle_start
-    which = np.concatenate([np.arange(start[i], start[i + 1], dtype=np.int32) for i in still])
+    only_indoors: bool,
+) -> _Throwing:
+    start, low, high = arranged.geometry.triangle_start, np.zeros(3), np.zeros(3)
+    parts = [np.arange(start[i], start[i + 1], dtype=np.int32) for i in still]
+    which = np.concatenate([np.empty(0, np.int32), *parts])
     which = which[surfaces.looks[surfaces.material[which], L_CASTS_FROM] <= 1]
-    if not len(which):
-        return None
-    things = tuple(arranged.things[i] for i in still), tuple(arranged.whole[i] for i in still)
-    corners = surfaces.vertices[surfaces.triangles[which], 11:14]
-    if bounces == "auto" and not _is_roofed(_Roof((things, lengths), corners)):
-        return None
-    low, high = (np.asarray(f(corners.reshape(-1, 3), axis=0), np.float64) for f in (np.nanmin, np.nanmax))
-    height = geometry.ground_z if has_ground else None
-    ground_z = None if height is None else (height - lengths.origin[2]) / lengths.unit
-    key = things, lengths, ground_z, floor.tobytes()
-    has_map = ground_z is not None and not arranged.has_scenery
-    return Hall(key, surfaces, casters.textures, which, low, high, floor, lengths.unit, ground_z, has_map)
+    if len(which):
+        corners = surfaces.vertices[surfaces.triangles[which], 11:14]
+        if only_indoors and not _is_roofed(_Roof((own, lengths), corners)):
+            which = which[:0]
+        low, high = (np.asarray(f(corners.reshape(-1, 3), axis=0), np.float64) for f in (np.nanmin, np.nanmax))
+    return _Throwing(*own, lengths, surfaces.triangles, which, low, high)
 
 
 def _still(arranged: Arranged) -> list[int]:

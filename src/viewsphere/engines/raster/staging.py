@@ -15,6 +15,7 @@ from viewsphere.engines._arranged import Arranged, Arrangements
 from viewsphere.engines._passes import shading_of
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
 from viewsphere.engines.raster.blurring import Blur
+from viewsphere.engines.raster.halls import Halls
 from viewsphere.engines.raster.options import Options, parse_options
 from viewsphere.engines.raster.painting import Baked, materials, paint
 from viewsphere.engines.raster.polish import mirror_in_polish
@@ -42,6 +43,7 @@ class RasterStage:
     _packed: list[Packed] = field(default_factory=list[Packed])
     _baked: dict[tuple[Geometry, bool], Baked] = field(default_factory=dict[tuple[Geometry, bool], Baked])
     _shades: TargetShades = field(default_factory=TargetShades)
+    _halls: Halls = field(default_factory=Halls)
     _canvases: dict[int, Float32] = field(default_factory=dict[int, Float32])
 
     @property
@@ -63,7 +65,7 @@ class RasterStage:
         key = arranged.geometry, arranged.is_sequence
         if key not in self._baked:
             self._baked.clear()
-            self._baked[key] = bake(self._pack(arranged), self.shot.scene, self.options, self._shades)
+            self._baked[key] = bake(self._pack(arranged), self.shot.scene, self.options, self._shades, self._halls)
         return self._baked[key]
 
     def _pack(self, arranged: Arranged) -> Packed:
@@ -140,7 +142,7 @@ class RasterStage:
         blur = Blur(self.arrangements, instant, sensor)
 
         def paint_moment(arranged: Arranged, camera: Camera, seen: Visibility, light: Float32) -> None:
-            baked = bake(self._pack(arranged), self.shot.scene, self.options, self._shades)
+            baked = bake(self._pack(arranged), self.shot.scene, self.options, self._shades, self._halls)
             self._paint_one(baked, camera, seen, has_sky, light)
 
         count = blur.count(self.at(instant), visibility)

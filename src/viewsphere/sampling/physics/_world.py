@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -105,11 +105,13 @@ class World:
         at, speed = self._data.qpos.reshape(-1, 7)[number], self._data.qvel.reshape(-1, 6)[number]
         at[:3], at[3:], speed[:] = matrix[:3, 3] * self._scale, quaternion_from_matrix(matrix[:3, :3]), 0.0
 
-    def take_fences_away(self) -> None:
-        """Let bodies go where fences were."""
+    def take_fences_away(self) -> bool:
+        """Let bodies go where fences were; whether any leant on one."""
+        leant = bool(np.isin(self._data.contact.geom[: self._data.ncon], self._fences).any())
         for number in self._fences:
             self._model.geom_contype[number] = self._model.geom_conaffinity[number] = 0
         self._fences = []
+        return leant
 
     @property
     def has_fences(self) -> bool:
@@ -129,15 +131,23 @@ class World:
             if self.is_damped and self._steps * STEP_S > DAMPED_S:
                 self._data.qvel *= 1 - DAMPING * STEP_S
 
-    def settle(self, longest_s: float = LONGEST_S, each: int = LOOK, look: Any = None) -> bool:
-        """Let time go by until all bodies are at rest; whether they are before so many simulated seconds are over. `look` is
-        called every so many steps.
+    def settle(
+        self,
+        longest_s: float = LONGEST_S,
+        each: int = LOOK,
+        look: Callable[[], None] | None = None,
+        ends: Callable[[], bool] | None = None,
+    ) -> bool:
+        """Let time go by until all bodies are at rest; whether they are before so many simulated seconds are over, and before
+        `ends` says that it is of no use. `look` is called every so many steps, and `ends` after it.
         """
         calm: list[Float] = []
         for step in range(each, int(longest_s / STEP_S) + 1, each):
             self.step(each)
             if look is not None:
                 look()
+            if ends is not None and ends():
+                return False
             if step % LOOK < each:
                 calm = [*calm, self._data.qpos.reshape(-1, 7).copy()] if self._is_slow else []
                 if len(calm) >= CALM_LOOKS and _is_still(calm[-CALM_LOOKS], calm[-1]):

@@ -121,8 +121,7 @@ class Drop:
             return self._flying(world, number), None
         film = _Film(world) if self.room.moves else None
         calm = world.settle(each=RECORDED, look=film.shoot) if film else world.settle()
-        if fences and calm:
-            world.take_fences_away()
+        if fences and calm and (world.take_fences_away() or self._beside(world, self.ground.height)):
             calm = world.settle(each=RECORDED, look=film.shoot) if film else self._kept(world, number, places)
         made: dict[str, Any] = {"poses": world.poses}
         return made | ({"ways": film.ways} if film else {}), self._problem(world, calm, bool(film))
@@ -223,10 +222,12 @@ class Drop:
         for i, pose in enumerate(world.poses):
             middle = transform(np.array(pose), self._spheres(i)[0])
             is_on = (np.abs((middle[:2] - within.center) @ within.axes.T) <= within.half).all()
-            lowest = float(transform(np.array(pose), self._bodies[i].corners)[:, 2].min())
-            if not is_on or middle[2] < 0 or lowest > height:
+            if not is_on or middle[2] < 0 or (height < math.inf and self._lowest(i, pose) > height):
                 found.append(i)
         return found
+
+    def _lowest(self, slot: int, pose: Matrix4) -> float:
+        return float(transform(np.array(pose), self._bodies[slot].corners)[:, 2].min())
 
 
 class _Film:

@@ -125,11 +125,15 @@ def _tried(
     bodies = [_body(cast[slot], shapes[slot], slot, rng, options) for slot in slots]
     typical = float(np.median([shapes[slot].length for slot in slots]))
     world = World(bodies, [starts[i] for i in range(len(slots))], (), typical)
-    calm = world.settle() and world.deepest <= MOST_OVERLAP
-    fallen = {i for pair in world.touching if -1 in pair for i in pair} - {-1, order[0]}
+
+    def fallen() -> frozenset[int]:
+        return frozenset(i for pair in world.touching if -1 in pair for i in pair) - {-1, order[0]}
+
+    # Only piles of which nothing fell are of use: the way down of what did is not worth its time.
+    calm = world.settle(ends=lambda: bool(fallen())) and world.deepest <= MOST_OVERLAP
     points = np.concatenate([transform(np.array(p), shapes[s].hull) for p, s in zip(world.poses, slots, strict=True)])
     box = box_vertices(points.min(axis=0), points.max(axis=0))
-    return _Pile(slots, world.poses, len(slots) - len(fallen) if calm else 1, box)
+    return _Pile(slots, world.poses, len(slots) - len(fallen()) if calm else 1, box)
 
 
 def _body(spec: ModelSpec, shape: Shape, slot: int, rng: Draws, options: Options) -> Any:
