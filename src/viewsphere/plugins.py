@@ -119,9 +119,6 @@ def _modules(package: str) -> tuple[str, ...]:
 
 
 def _module(package: str, what: str, name: str) -> Any:
-    loaded = sys.modules.get(f"{package}.{name}")
-    if loaded is not None and not hasattr(loaded, "__path__"):  # a town asks thousands of times, and a folder is slow to list
-        return loaded
     known = _modules(package)
     if name not in known:
         raise _unknown(what, name, known)
