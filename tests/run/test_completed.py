@@ -14,11 +14,12 @@ from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Choice
 from viewsphere.truth.visibility import rasterize
-from worlds import rendered, shared_place, stills, videos
+from worlds import MODELS, rendered, shared_place, stills, videos
 
 FEW = {"channels": ["rgb", "tracks"], "annotations": []}
-SHORT = {"scenes": {"count": 2, "objects": [2, 4], "layout": "scatter"}, "annotations": []}
-"""Four pictures instead of twelve."""
+LIGHT = [{**MODELS[1], "count": 2}, {**MODELS[2], "count": 2}]
+SHORT = {"models": LIGHT, "scenes": {"count": 2, "objects": [2, 4], "layout": "scatter"}, "annotations": []}
+"""Four pictures instead of twelve, of models that are drawn fast."""
 
 
 @pytest.fixture(scope="module")
