@@ -34,7 +34,7 @@ PACKAGES: dict[Kind, str] = {
 
 def names(kind: Kind) -> tuple[str, ...]:
     """Names of all plug-ins of this kind, sorted; none is imported."""
-    own = {name for name, _ in _found(PACKAGES[kind]) if not name.startswith("_")}
+    own = {name for name, _ in _listed(PACKAGES[kind]) if not name.startswith("_")}
     return tuple(sorted(own | {e.name for e in entry_points(group=f"viewsphere.{kind}")}))
 
 
@@ -57,31 +57,30 @@ def entry_points(group: str) -> metadata.EntryPoints:
 
     Those of all packages are read once, and again after one was installed or removed: reading them takes 10 ms.
     """
-    return _installed(_as_changed(sys.path)).select(group=group)
+    return _of_group(_changes(sys.path), group)
+
+
+Changes = tuple[tuple[str, int], ...]
+"""Folders, and when each was last changed."""
+
+
+@lru_cache(maxsize=2 * len(PACKAGES))
+def _of_group(paths: Changes, group: str) -> metadata.EntryPoints:
+    return _installed(paths).select(group=group)
 
 
 @lru_cache(maxsize=1)
-def _installed(_paths: tuple[tuple[str, int], ...]) -> Any:
+def _installed(_paths: Changes) -> Any:
     """Entry points of the packages in these folders, as they were last changed at these times."""
     return metadata.entry_points()
 
 
-def _found(package: str) -> tuple[tuple[str, bool], ...]:
-    """Names of all modules in a package, and whether each is a package; read once, and again after files came or went."""
-    return _listed(_as_changed(importlib.import_module(package).__path__))
-
-
-@lru_cache(maxsize=32)
-def _listed(paths: tuple[tuple[str, int], ...]) -> tuple[tuple[str, bool], ...]:
-    return tuple((module.name, module.ispkg) for module in pkgutil.iter_modules([path for path, _ in paths]))
-
-
-def _as_changed(paths: Iterable[str]) -> tuple[tuple[str, int], ...]:
-    """Folders, and when each was last changed, ns; 0 where there is none."""
+def _changes(paths: Iterable[str]) -> Changes:
     return tuple((path, _changed(path)) for path in paths)
 
 
 def _changed(path: str) -> int:
+    """When a folder was last changed, ns; 0 where there is none."""
     try:
         return Path(path).stat().st_mtime_ns
     except OSError:
@@ -115,7 +114,17 @@ def place(name: str) -> Any:
 
 
 def _modules(package: str) -> tuple[str, ...]:
-    return tuple(sorted(name for name, is_package in _found(package) if not is_package))
+    return tuple(sorted(name for name, is_package in _listed(package) if not is_package))
+
+
+def _listed(package: str) -> tuple[tuple[str, bool], ...]:
+    """Names of a package's modules, and whether each is a package itself; listed again after its folder was changed."""
+    return _modules_in(_changes(importlib.import_module(package).__path__))
+
+
+@lru_cache(maxsize=2 * len(PACKAGES))
+def _modules_in(paths: Changes) -> tuple[tuple[str, bool], ...]:
+    return tuple((m.name, m.ispkg) for m in pkgutil.iter_modules([path for path, _ in paths]))
 
 
 def _module(package: str, what: str, name: str) -> Any:

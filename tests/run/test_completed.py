@@ -14,19 +14,37 @@ from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Choice
 from viewsphere.truth.visibility import rasterize
-from worlds import rendered, shared_place, stills, videos
+from worlds import MODELS, rendered, shared_place, stills, videos
 
 FEW = {"channels": ["rgb", "tracks"], "annotations": []}
+LIGHT = [{**MODELS[1], "count": 2}, {**MODELS[2], "count": 2}]
+SHORT = {"models": LIGHT, "scenes": {"count": 2, "objects": [2, 4], "layout": "scatter"}, "annotations": []}
+"""Four pictures instead of twelve, of models that are drawn fast."""
+
+
+@pytest.fixture(scope="module")
+def few(tmp_path_factory):
+    """The world of stills of which pictures alone are kept; do not change it."""
+    out = tmp_path_factory.mktemp("stills") / "few"
+    generate(stills(channels=["rgb"], annotations=[]), out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def few_moving(tmp_path_factory):
+    """The world of videos in shots of two instants, of which pictures and tracks alone are kept; do not change it."""
+    out = tmp_path_factory.mktemp("videos") / "few"
+    generate(videos(**FEW, shot_frames=2), out)
+    return out
 
 
 @pytest.mark.parametrize("world", ["stills", "videos"])
-def test_what_is_computed_is_what_would_have_been_kept(world, tmp_path, tmp_path_factory):
+def test_what_is_computed_is_what_would_have_been_kept(world, request, tmp_path_factory):
     whole = Dataset(rendered(world, shared_place(tmp_path_factory)))
-    recipe = stills(**{**FEW, "channels": ["rgb"]}) if world == "stills" else videos(**FEW, shot_frames=2)
-    generate(recipe, tmp_path / "few")
+    kept = request.getfixturevalue("few" if world == "stills" else "few_moving")
     wanted = [name for name in whole.plan.channels if name not in ("rgb", "tracks")]
     asked = [name for name in whole.recipe["annotations"] if name not in ("captions",)]
-    completed = Completed(tmp_path / "few", None, None, (*wanted, *asked))
+    completed = Completed(kept, None, None, (*wanted, *asked))
     assert len(list(completed.shots())) > len(list(whole.shots())) or world == "stills"
     for ours, theirs in zip(completed, whole, strict=True):
         for name in wanted:
@@ -40,7 +58,7 @@ def test_what_is_computed_is_what_would_have_been_kept(world, tmp_path, tmp_path
 
 
 def test_what_cannot_be_computed_is_told(tmp_path):
-    generate(stills(channels=["depth"], annotations=[]), tmp_path / "out")
+    generate(stills(channels=["depth"], **SHORT), tmp_path / "out")
     with pytest.raises(UserError, match="format yolo: expected channel rgb, found none: an engine has to paint it"):
         export(tmp_path / "out", "yolo")
     assert not (tmp_path / "out" / "yolo").exists()
@@ -50,10 +68,9 @@ def test_what_cannot_be_computed_is_told(tmp_path):
         lacking(dataset, module, FormatEntry(name="yolo"))
 
 
-def test_exports_of_few_channels_are_those_of_many(tmp_path, tmp_path_factory):
+def test_exports_of_few_channels_are_those_of_many(few, tmp_path, tmp_path_factory):
     whole = Dataset(rendered("stills", shared_place(tmp_path_factory)))
-    generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
-    for root, place in ((whole.root, "whole"), (tmp_path / "few", "computed")):
+    for root, place in ((whole.root, "whole"), (few, "computed")):
         export(root, [{"yolo": {"task": "pose"}}, "pointcloud"], output=tmp_path / place)
     pairs = [(file, tmp_path / "computed" / file.relative_to(tmp_path / "whole"))
              for file in (tmp_path / "whole").rglob("*.txt")]  # fmt: skip
@@ -61,10 +78,9 @@ def test_exports_of_few_channels_are_those_of_many(tmp_path, tmp_path_factory):
     assert all(one.read_bytes() == other.read_bytes() for one, other in pairs)
 
 
-def test_a_choice_of_frames_is_computed_as_all_are(tmp_path):
-    generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
+def test_a_choice_of_frames_is_computed_as_all_are(few, tmp_path):
     for choice, place in ((Choice(), "all"), (Choice(frames=((0, 2),)), "some"), (Choice(models=("car*",)), "cars")):
-        export(tmp_path / "few", [{"yolo": {"task": "obb"}}], output=tmp_path / place, choice=choice)
+        export(few, [{"yolo": {"task": "obb"}}], output=tmp_path / place, choice=choice)
     labels = {place: {file.name: file.read_text() for file in (tmp_path / place).rglob("labels/**/*.txt")}
               for place in ("all", "some", "cars")}  # fmt: skip
     assert 0 < len(labels["some"]) < len(labels["all"]) == 12 and labels["cars"]
@@ -72,21 +88,20 @@ def test_a_choice_of_frames_is_computed_as_all_are(tmp_path):
 
 
 def test_parts_of_which_only_some_keep_a_label_are_completed(tmp_path):
-    generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
-    generate(stills(channels=["rgb", "depth"], annotations=["keypoints"], seed=4), tmp_path / "more")
+    generate(stills(channels=["rgb"], **SHORT), tmp_path / "few")
+    generate(stills(channels=["rgb", "depth"], **{**SHORT, "annotations": ["keypoints"]}, seed=4), tmp_path / "more")
     merge([tmp_path / "few", tmp_path / "more"], tmp_path / "both", mixed=True)
     merge([tmp_path / "more", tmp_path / "few"], tmp_path / "turned", mixed=True)
     for name in ("both", "turned"):
         export(tmp_path / name, [{"yolo": {"task": "pose"}}, "tum"], output=tmp_path / f"{name} out")
         shown = [file.read_text() for file in (tmp_path / f"{name} out" / "yolo" / "labels").rglob("*.txt")]
-        assert len(shown) == 24
+        assert len(shown) == 8
         assert all(" 2 " in text or " 1 " in text or text.rstrip().endswith((" 1", " 2")) for text in shown if text)
-        assert len(list((tmp_path / f"{name} out" / "tum").rglob("depth/*.png"))) == 24
+        assert len(list((tmp_path / f"{name} out" / "tum").rglob("depth/*.png"))) == 8
 
 
-def test_what_an_unfinished_neighbour_would_tell_is_asked_for(tmp_path):
-    generate(videos(**FEW, shot_frames=4), tmp_path / "few")
-    dataset = Dataset(tmp_path / "few")
+def test_what_an_unfinished_neighbour_would_tell_is_asked_for(few_moving, tmp_path):
+    dataset = Dataset(shutil.copytree(few_moving, tmp_path / "few"))
     second = [key for key, _ in dataset.shots()][1]
     shutil.rmtree(dataset.store.shot_folder(second))
     completed = Completed(tmp_path / "few", None, None, ("flow",))
@@ -95,9 +110,8 @@ def test_what_an_unfinished_neighbour_would_tell_is_asked_for(tmp_path):
     export(tmp_path / "few", "pointcloud", output=tmp_path / "out")  # depth needs no other instant
 
 
-def test_formats_that_lack_the_same_see_each_frame_once(tmp_path, monkeypatch):
-    generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
+def test_formats_that_lack_the_same_see_each_frame_once(few, tmp_path, monkeypatch):
     seen = []
     monkeypatch.setattr(sights, "rasterize", lambda *arguments, **more: seen.append(1) or rasterize(*arguments, **more))
-    export(tmp_path / "few", ["pointcloud", "tum", "coco_panoptic"], output=tmp_path / "out")
-    assert len(seen) == len(Dataset(tmp_path / "few"))
+    export(few, ["pointcloud", "tum", "coco_panoptic"], output=tmp_path / "out")
+    assert len(seen) == len(Dataset(few))

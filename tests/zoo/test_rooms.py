@@ -42,8 +42,8 @@ def at(piece) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["room", "flat", "table_top"])
 def test_a_seed_gives_one_layout_and_others_give_others(name: str) -> None:
-    assert place(name, 3) == place(name, 3)
-    layouts = [place(name, seed) for seed in SEEDS]
+    layouts = [place(name, seed) for seed in range(5)]
+    assert place(name, 3) == layouts[3]
     assert len(set(layouts)) == len(layouts)
     for one in layouts:
         assert len({p.name for p in one.pieces}) == len(one.pieces) > 4
