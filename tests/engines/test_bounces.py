@@ -121,7 +121,7 @@ def test_a_closed_box_that_glows_evenly(reflectance):
     stage = stage_of(painted_mesh((inside_out(box(low, high)), matt(reflectance, 1.0))), Scene(sun=None, sky=DARK))
     places, normals = walls(low, high)
     light = probed(stage, places.reshape(-1, 3), normals.reshape(-1, 3))
-    np.testing.assert_allclose(light, 1 / (1 - reflectance), rtol=0.03)
+    np.testing.assert_allclose(light, 1 / (1 - reflectance), rtol=0.018 if reflectance else 0.03)
 
 
 def test_a_closed_box_of_which_one_wall_glows(monkeypatch):
@@ -144,8 +144,8 @@ def test_a_closed_box_of_which_one_wall_glows(monkeypatch):
         means[r] = light.reshape(6, -1, 3).mean(axis=(1, 2))
     # A sum of radiance over all walls: of a power of pi L A, irradiance / pi.
     total = (areas * means[reflectance]).sum()
-    assert total == pytest.approx(areas[5] / (1 - reflectance), rel=0.03)
-    assert means[0.0][5] == pytest.approx(0, abs=0.02)
+    assert total == pytest.approx(areas[5] / (1 - reflectance), rel=0.02)
+    assert means[0.0][5] == pytest.approx(0, abs=0.002)
     u, v = ((np.indices((40, 40)) + 0.5) / 40).reshape(2, -1, 1)
     dx, dy = (u - u.T) * size[0], (v - v.T) * size[1]
     factor = (size[2] ** 2 / (math.pi * (dx**2 + dy**2 + size[2] ** 2) ** 2)).mean() * areas[5]
@@ -185,9 +185,9 @@ def test_a_bulb_that_few_rays_hit_lights_all_walls_evenly(monkeypatch):
     distance = np.linalg.norm(places, axis=1)
     expected = radiance * radius**2 * (-places * normals).sum(axis=1) / distance**3
     light = probed(stage, places, normals)[:, 0]
-    assert light.mean() == pytest.approx(expected.mean(), rel=0.12)
+    assert light.mean() == pytest.approx(expected.mean(), rel=0.06)
     # Spherical harmonics of degree 2 are off by up to a tenth of the brightest; a ray more or less would be half of it.
-    assert np.abs(light - expected).max() < 0.3 * expected.max()
+    assert np.abs(light - expected).max() < 0.21 * expected.max()
 
 
 def both(first: Mesh, second: Mesh) -> Mesh:
@@ -287,8 +287,8 @@ def test_a_dark_room_beside_a_lit_one_stays_dark(window):
         for low, high in (((0, 0, 0), (2.4, 3, 2.4)), ((2.5, 0, 0), (4, 3, 2.4)))
     )
     assert lit.mean() > 0.02
-    assert dark.mean() < 0.01 * lit.mean()
-    assert dark.max() < 0.2 * lit.mean()  # in a corner of the partition, where a probe sees past it
+    assert dark.mean() < 0.007 * lit.mean()
+    assert dark.max() < 0.15 * lit.mean()  # in a corner of the partition, where a probe sees past it
 
 
 def test_the_same_bytes_whatever_was_baked_before():
@@ -324,8 +324,8 @@ def test_auto_is_on_indoors_only():
 
 
 def test_a_wide_place_has_probes_around_its_origin_only(monkeypatch):
-    """Half a metre apart at most, or little more; at their border a wall that stands in the open has the same light as without
-    them: nothing is seen of it.
+    """As far apart as is allowed at most, or little more; at their border a wall that stands in the open has the same light as
+    without them: nothing is seen of it.
     """
     monkeypatch.setattr(baking, "MOST", 4_000)
     wide = mesh_of(
@@ -336,7 +336,7 @@ def test_a_wide_place_has_probes_around_its_origin_only(monkeypatch):
     stage = stage_of(small, scene, wide)
     baked = stage.baked(0)
     assert np.prod(baked.bounces.grid) <= 4_000
-    assert baked.unit / float(baked.bounces.frame[3]) < 1.0
+    assert baked.unit / float(baked.bounces.frame[3]) < 1.3 * baking.WIDEST
     view = camera(120, 40, 60, 0, 10, 16, (0, 0, 2.0))
     row = painted(stage, view)[18].astype(int)
     assert np.abs(np.diff(row, axis=0)).max() <= 6

@@ -35,7 +35,7 @@ CELL = 0.2
 ALONG, MOST = 24, 40_000
 """Probes along the longest side, at least, and of a volume, at most."""
 
-WIDEST, DEPTH, HEIGHT, FADE = 0.5, 1.0, 6.0, 6.0
+WIDEST, DEPTH, HEIGHT, FADE = 0.8, 1.0, 12.0, 6.0
 """Metres between probes at most: of a place that would have too many only the part around its origin has some, from so many
 metres below to so many above, whose light fades out over so many cells.
 """

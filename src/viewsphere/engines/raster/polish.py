@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_paint, kernels_split
-from viewsphere.engines.raster.kernels_material import L_ROUGH
+from viewsphere.engines.raster.kernels_material import L_ROUGH, L_ROUGH_TEXEL
 from viewsphere.engines.raster.mirroring import blurred, looked_at, lying, mirrored
 from viewsphere.engines.raster.painting import Baked, view_of
 from viewsphere.engines.raster.records import Float32
@@ -63,7 +63,9 @@ def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radia
 def _mirror(baked: Baked, camera: Camera, visibility: Visibility) -> tuple[NDArray[np.intp], float]:
     """Pixels (n,) of the level below the camera that most pixels show, and its height."""
     shown = visibility.triangle.reshape(-1)
-    polished = baked.surfaces.looks[:, L_ROUGH] < MATT
+    polished = (
+        baked.surfaces.looks[:, L_ROUGH] + baked.surfaces.looks[:, L_ROUGH_TEXEL] < MATT
+    )  # whatever a texture leaves of it
     is_level = (np.abs(baked.geometry.triangle_normals[:, 2]) > LEVEL) & (baked.kind[:-1] == kernels_paint.SOLID)
     is_level &= polished[baked.surfaces.material]
     at = np.flatnonzero((shown >= 0) & is_level[shown])
