@@ -4,7 +4,8 @@ Reference scene (bench_scene.py): a zoo car cut to about 75,000 triangles with 1
 occlusion-roughness-metallic, normals) on every material, the ground, an environment with a sun, 640x480; files: RGB PNG,
 instance PNG, float32 depth and normals, annotations. `--scaling` measures how cost grows instead and draws
 docs/images/scaling.svg. `--labels` measures each label (bench_labels.py), `--motion` sequences (bench_motion.py), `--bounces`
-light between surfaces (bench_bounces.py), `--training` how fast frames reach a training loop (bench_training.py, with PyTorch),
+light between surfaces (bench_bounces.py), `--town` a drive through a town (bench_town.py), `--physics` what falls until it lies
+still (bench_physics.py), `--training` how fast frames reach a training loop (bench_training.py, with PyTorch),
 `--exports` 25 formats at once (bench_exports.py), `--cycles` and `--endurance` the Cycles engine (bench_cycles.py).
 """
 
@@ -286,6 +287,22 @@ def in_folder(args: argparse.Namespace, folder: Path) -> None:
         training(folder)
 
 
+def in_memory(args: argparse.Namespace) -> None:
+    """Measure what needs no files."""
+    if args.town:
+        from bench_town import town
+
+        town(args.frames, embree)
+    elif args.physics:
+        from bench_physics import main as physics
+
+        physics()
+    else:
+        from bench_labels import report
+
+        report(max(1, args.frames // 12), embree)
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--frames", type=int, default=48)
@@ -293,6 +310,8 @@ def main() -> None:
     options.add_argument("--scaling", action="store_true", help="measure how cost grows, and draw it")
     options.add_argument("--motion", action="store_true", help="measure what flow, states, tracks and moving pictures cost")
     options.add_argument("--bounces", action="store_true", help="measure what light between surfaces costs")
+    options.add_argument("--town", action="store_true", help="measure a drive through a town by stages, and its memory")
+    options.add_argument("--physics", action="store_true", help="measure what falls until it lies still")
     options.add_argument("--labels", action="store_true", help="measure what each label costs, with 1 and 20 objects")
     options.add_argument("--exports", action="store_true", help="measure 25 formats in one pass, and what they encode")
     options.add_argument("--training", action="store_true", help="measure reading and rendering for a training loop")
@@ -308,10 +327,8 @@ def main() -> None:
 
         scaling(ROOT / "docs" / "images")
         return
-    if args.labels:
-        from bench_labels import report
-
-        report(max(1, args.frames // 12), embree)
+    if args.labels or args.town or args.physics:
+        in_memory(args)
         return
     if args.motion or args.bounces or args.exports or args.training:
         with tempfile.TemporaryDirectory() as name:

@@ -1,0 +1,39 @@
+"""Things outside of the picture are left out, and nothing else is: what is seen is what is seen when all are drawn."""
+
+import numpy as np
+import pytest
+
+from truth_scenes import cube, orbit_camera, sphere
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import Motion, Thing
+from viewsphere.truth.geometry import build_geometry
+from viewsphere.truth.visibility import OUTSIDE, homogeneous, rasterize
+
+LENS = Intrinsics(width=64, height=48, fx=50.0, fy=50.0, cx=32.0, cy=24.0)
+MESHES = [sphere(1, 0.8), cube(0.5)]
+
+
+def scattered(rng, count=60):
+    """A crowd around the camera: things ahead, beside, behind, and around its centre."""
+    things = []
+    for i in range(count):
+        pose = np.eye(4)
+        pose[:3, 3] = rng.normal(size=3) * (4, 4, 2)
+        spec = ModelSpec(key=f"m{i}", source=f"m{i}", category="thing", category_id=1)
+        things.append(Thing(id=i + 1, model=spec, motion=Motion(poses=(tuple(map(tuple, pose.tolist())),))))
+    return build_geometry(things, [MESHES[i % 2] for i in range(count)], True, 0.3)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_is_seen_is_what_is_seen_when_all_are_drawn(seed):
+    rng = np.random.default_rng(seed)
+    geometry = scattered(rng)
+    camera = orbit_camera(LENS, rng.uniform(0, 7), rng.uniform(-0.1, 0.7), rng.uniform(1, 7))
+    own = rasterize(geometry, camera)
+    whole = rasterize(geometry, camera, window=(0, 0, camera.width, camera.height))
+    assert own.triangle.tobytes() == whole.triangle.tobytes() and own.inverse_depth.tobytes() == whole.inverse_depth.tobytes()
+    corners, everywhere = homogeneous(geometry, camera), homogeneous(geometry, camera, 0, len(geometry.vertices))
+    left_out = (corners == OUTSIDE).all(axis=1)
+    assert 0 < left_out.sum() < len(corners)
+    assert np.array_equal(corners[~left_out], everywhere[~left_out])
