@@ -1,0 +1,48 @@
+"""The pictures of docs/like.md: of each recipe in recipes/like one frame, and what is known of it beside.
+
+    python scripts/like.py [NAME ...]
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from paper import ROOT, grid, save
+
+from viewsphere import Recipe, render
+from viewsphere.preview import draw_sample
+
+RECIPES = sorted((ROOT / "recipes" / "like").glob("*.yaml"))
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Which frame of a recipe is shown, as the names of the labels drawn: one picture each, after the plain one."""
+
+    frame: int
+    drawn: tuple[str, ...]
+
+
+SHOWN: dict[str, Shown] = {}
+
+
+def picture(file: Path) -> None:
+    shown = SHOWN[file.stem]
+    sample = next(islice(render(Recipe.load(file)), shown.frame, None))
+    tiles = [np.asarray(sample.rgb), *(draw_sample(sample, [name]) for name in shown.drawn)]
+    save(f"like/{file.stem}.jpg", grid(tiles, len(tiles), 1200), 80)
+
+
+def main() -> None:
+    wanted = sys.argv[1:] or [file.stem for file in RECIPES]
+    for file in RECIPES:
+        if file.stem in wanted:
+            picture(file)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""Each system of Table 1 has a recipe in recipes/like: rendered small, its data set passes, and docs/like.md shows it."""
+
+import re
+
+import pytest
+
+from small import ROOT
+from viewsphere import Recipe, generate
+from viewsphere.check import check
+from viewsphere.store import Dataset
+
+FOLDER = ROOT / "recipes" / "like"
+PAGE = (ROOT / "docs" / "like.md").read_text("utf-8")
+SYSTEMS = [
+    "sintel",
+    "virtual_kitti",
+    "synthia",
+    "suncg",
+    "minos",
+    "surreal",
+    "flyingthings3d",
+    "icl_nuim",
+    "driving_in_the_matrix",
+    "viper",
+    "airsim",
+    "carla",
+    "render_for_cnn",
+    "nyc3dcars",
+    "pascal3d",
+    "objectnet3d",
+    "liebelt",
+    "falling_things",
+    "sun_saenko",
+]
+
+SMALL = {"camera.size": [96, 72]}
+# What makes each recipe small beyond the size of its pictures: two or three frames, of few models.
+FEW: dict[str, dict] = {}
+
+
+def test_the_systems_of_table_1_are_the_recipes():
+    assert sorted(SYSTEMS) == sorted(file.stem for file in FOLDER.glob("*.yaml"))
+
+
+def test_the_page_shows_each_recipe_in_the_table_s_order():
+    assert re.findall(r"^`recipes/like/(\w+)\.yaml`", PAGE, re.MULTILINE) == SYSTEMS
+    assert re.findall(r"^!\[[^\]]+\]\(images/like/(\w+)\.jpg\)", PAGE, re.MULTILINE) == SYSTEMS
+    assert all((ROOT / "docs" / "images" / "like" / f"{name}.jpg").is_file() for name in SYSTEMS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FEW)
+def test_a_recipe_makes_a_data_set_that_passes_in_its_formats(name, tmp_path):
+    recipe = Recipe.load(FOLDER / f"{name}.yaml", {**SMALL, **FEW[name]})
+    generate(recipe, tmp_path, workers=0)
+    dataset = Dataset(tmp_path)
+    assert len(dataset) > 0 and sum(len(sample.objects) for sample in dataset) > 0
+    report = check(dataset, sample=2)
+    assert report.ok, report.findings
