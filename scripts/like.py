@@ -1,6 +1,6 @@
 """The pictures of docs/like.md: of each recipe in recipes/like one frame, and what is known of it beside.
 
-    python scripts/like.py [NAME ...]
+python scripts/like.py [NAME ...]
 """
 
 from __future__ import annotations
@@ -27,13 +27,25 @@ class Shown:
     drawn: tuple[str, ...]
 
 
-SHOWN: dict[str, Shown] = {}
+SHOWN: dict[str, Shown] = {
+    "sintel": Shown(0, ("flow",)),
+    "virtual_kitti": Shown(0, ("semantic",)),
+    "synthia": Shown(0, ("semantic",)),
+    "flyingthings3d": Shown(0, ("flow",)),
+    "driving_in_the_matrix": Shown(0, ("boxes",)),
+    "viper": Shown(0, ("semantic",)),
+    "airsim": Shown(0, ("depth",)),
+    "carla": Shown(0, ("boxes3d",)),
+    "nyc3dcars": Shown(1, ("boxes3d",)),
+    "sun_saenko": Shown(7, ("boxes",)),
+}
 
 
 def picture(file: Path) -> None:
     shown = SHOWN[file.stem]
     sample = next(islice(render(Recipe.load(file)), shown.frame, None))
-    tiles = [np.asarray(sample.rgb), *(draw_sample(sample, [name]) for name in shown.drawn)]
+    drawn = [draw_sample(sample, [name])[:, -sample.camera.width :] for name in shown.drawn]  # without the picture beside maps
+    tiles = [np.asarray(sample.rgb), *drawn]
     save(f"like/{file.stem}.jpg", grid(tiles, len(tiles), 1200), 80)
 
 
