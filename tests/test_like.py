@@ -55,7 +55,7 @@ FEW: dict[str, dict] = {
     "driving_in_the_matrix": {**DRIVE, "variations": TWO},
     "viper": {**DRIVE, "variations": TWO},
     "airsim": STREET,
-    "carla": {**DRIVE, "rig.sensors.top.lidar.azimuth_step": 4},
+    "carla": DRIVE,
     "nyc3dcars": {"scenes.count": 1, "viewpoints.count": 2, "scene.place": "zoo:neighbourhood"},
     "sun_saenko": {"models": [{"source": "zoo:mug"}, {"source": "zoo:chair"}], "viewpoints.count": 2},
 }
