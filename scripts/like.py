@@ -1,6 +1,6 @@
 """The pictures of docs/like.md: of each recipe in recipes/like one frame, and what is known of it beside.
 
-    python scripts/like.py [NAME ...]
+python scripts/like.py [NAME ...]
 """
 
 from __future__ import annotations
@@ -27,13 +27,25 @@ class Shown:
     drawn: tuple[str, ...]
 
 
-SHOWN: dict[str, Shown] = {}
+SHOWN: dict[str, Shown] = {
+    "suncg": Shown(4, ("depth", "instances")),
+    "minos": Shown(20, ("depth_sensor", "semantic", "normals")),
+    "surreal": Shown(12, ("body_parts", "flow_backward", "keypoints")),
+    "icl_nuim": Shown(2, ("depth",)),
+    "render_for_cnn": Shown(58, ("instances",)),
+    "pascal3d": Shown(4, ("boxes", "boxes3d")),
+    "objectnet3d": Shown(2, ("instances", "boxes3d")),
+    "liebelt": Shown(110, ("nocs",)),
+    "falling_things": Shown(0, ("instances", "boxes3d")),
+}
 
 
 def picture(file: Path) -> None:
     shown = SHOWN[file.stem]
     sample = next(islice(render(Recipe.load(file)), shown.frame, None))
-    tiles = [np.asarray(sample.rgb), *(draw_sample(sample, [name]) for name in shown.drawn)]
+    plain = np.asarray(sample.rgb)
+    drawn = (draw_sample(sample, [name]) for name in shown.drawn)  # maps have the picture on their left
+    tiles = [plain, *(one[:, -plain.shape[1] :] for one in drawn)]
     save(f"like/{file.stem}.jpg", grid(tiles, len(tiles), 1200), 80)
 
 

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from like_trees import READ
 from small import ROOT
 from viewsphere import Recipe, generate
 from viewsphere.check import check
@@ -35,7 +36,17 @@ SYSTEMS = [
 
 SMALL = {"camera.size": [96, 72]}
 # What makes each recipe small beyond the size of its pictures: two or three frames, of few models.
-FEW: dict[str, dict] = {}
+FEW: dict[str, dict] = {
+    "suncg": {"camera.size": [640, 480], "models[0].count": 2, "viewpoints.count": 1},
+    "minos": {"time.frames": 2},
+    "surreal": {"time.frames": 3, "scene.place": None},
+    "icl_nuim": {"camera.size": [640, 480], "time.frames": 3},
+    "render_for_cnn": {"viewpoints.count": 1},
+    "pascal3d": {"scenes.count": 2, "viewpoints.count": 1},
+    "objectnet3d": {"viewpoints.count": 1},
+    "liebelt": {"viewpoints.azimuth": [30, 200], "viewpoints.elevation": [20]},
+    "falling_things": {"scenes.count": 1, "viewpoints.count": 1},
+}
 
 
 def test_the_systems_of_table_1_are_the_recipes():
@@ -57,3 +68,4 @@ def test_a_recipe_makes_a_data_set_that_passes_in_its_formats(name, tmp_path):
     assert len(dataset) > 0 and sum(len(sample.objects) for sample in dataset) > 0
     report = check(dataset, sample=2)
     assert report.ok, report.findings
+    READ.get(name, len)(dataset)
