@@ -1,4 +1,4 @@
-"""What recipes in recipes/like write, opened by the readers of others where there are some: each is given the recipe's data set."""
+"""What recipes in recipes/like write, opened by others' readers where there are some: each is given the recipe's data set."""
 
 from __future__ import annotations
 

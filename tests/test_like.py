@@ -39,7 +39,7 @@ SMALL = {"camera.size": [96, 72]}
 FEW: dict[str, dict] = {
     "suncg": {"camera.size": [640, 480], "models[0].count": 2, "viewpoints.count": 1},
     "minos": {"time.frames": 2},
-    "surreal": {"time.frames": 3, "scene.place": None},
+    "surreal": {"camera.size": [320, 240], "time.frames": 3, "scene.place": None},
     "icl_nuim": {"camera.size": [640, 480], "time.frames": 3},
     "render_for_cnn": {"viewpoints.count": 1},
     "pascal3d": {"scenes.count": 2, "viewpoints.count": 1},
