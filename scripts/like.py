@@ -29,7 +29,7 @@ class Shown:
 
 SHOWN: dict[str, Shown] = {
     "suncg": Shown(4, ("depth", "instances")),
-    "minos": Shown(20, ("depth_sensor", "semantic", "normals")),
+    "minos": Shown(8, ("depth_sensor", "semantic", "normals")),
     "surreal": Shown(12, ("body_parts", "flow_backward", "keypoints")),
     "icl_nuim": Shown(2, ("depth",)),
     "render_for_cnn": Shown(58, ("instances",)),

@@ -39,12 +39,12 @@ SMALL = {"camera.size": [96, 72]}
 FEW: dict[str, dict] = {
     "suncg": {"camera.size": [640, 480], "models[0].count": 2, "viewpoints.count": 1},
     "minos": {"time.frames": 2},
-    "surreal": {"camera.size": [320, 240], "time.frames": 3, "scene.place": None},
-    "icl_nuim": {"camera.size": [640, 480], "time.frames": 3},
-    "render_for_cnn": {"viewpoints.count": 1},
+    "surreal": {"camera.size": [320, 240], "models[0].count": 1, "time.frames": 2, "scene.place": None},
+    "icl_nuim": {"camera.size": [640, 480], "time.frames": 2},
+    "render_for_cnn": {"viewpoints.count": 1, **{f"models[{i}].count": 1 for i in range(10)}},
     "pascal3d": {"scenes.count": 2, "viewpoints.count": 1},
     "objectnet3d": {"viewpoints.count": 1},
-    "liebelt": {"viewpoints.azimuth": [30, 200], "viewpoints.elevation": [20]},
+    "liebelt": {"models[0].count": 1, "models[1].count": 1, "viewpoints.azimuth": [30, 200], "viewpoints.elevation": [20]},
     "falling_things": {"scenes.count": 1, "viewpoints.count": 1},
 }
 
