@@ -31,12 +31,21 @@ SHOWN: dict[str, Shown] = {
     "sintel": Shown(0, ("flow",)),
     "virtual_kitti": Shown(0, ("semantic",)),
     "synthia": Shown(0, ("semantic",)),
+    "suncg": Shown(4, ("depth", "instances")),
+    "minos": Shown(8, ("depth_sensor", "semantic", "normals")),
+    "surreal": Shown(12, ("body_parts", "flow_backward", "keypoints")),
     "flyingthings3d": Shown(0, ("flow",)),
+    "icl_nuim": Shown(2, ("depth",)),
     "driving_in_the_matrix": Shown(0, ("boxes",)),
     "viper": Shown(0, ("semantic",)),
     "airsim": Shown(0, ("depth",)),
     "carla": Shown(0, ("boxes3d",)),
+    "render_for_cnn": Shown(58, ("instances",)),
     "nyc3dcars": Shown(1, ("boxes3d",)),
+    "pascal3d": Shown(4, ("boxes", "boxes3d")),
+    "objectnet3d": Shown(2, ("instances", "boxes3d")),
+    "liebelt": Shown(110, ("nocs",)),
+    "falling_things": Shown(0, ("instances", "boxes3d")),
     "sun_saenko": Shown(7, ("boxes",)),
 }
 
@@ -44,8 +53,9 @@ SHOWN: dict[str, Shown] = {
 def picture(file: Path) -> None:
     shown = SHOWN[file.stem]
     sample = next(islice(render(Recipe.load(file)), shown.frame, None))
-    drawn = [draw_sample(sample, [name])[:, -sample.camera.width :] for name in shown.drawn]  # without the picture beside maps
-    tiles = [np.asarray(sample.rgb), *drawn]
+    plain = np.asarray(sample.rgb)
+    drawn = (draw_sample(sample, [name]) for name in shown.drawn)  # maps have the picture on their left
+    tiles = [plain, *(one[:, -plain.shape[1] :] for one in drawn)]
     save(f"like/{file.stem}.jpg", grid(tiles, len(tiles), 1200), 80)
 
 

@@ -546,7 +546,10 @@ HOUSEHOLD = ("mug", "bottle", "bowl", "can", "plate", "book", "box", "laptop", "
 PICTURES: dict[str, Callable[[], None]] = {
     **{
         f.__name__: f
-        for f in (neighbourhood, car, bike, chair, boat, hairdryer, fig1, fig2, fig3, street, chairs, engines, materials, conditions)
+        for f in (
+            *(neighbourhood, car, bike, chair, boat, hairdryer, fig1, fig2, fig3),
+            *(street, chairs, engines, materials, conditions),
+        )
     },
     "zoo_car": partial(family, "car"),
     "zoo_bicycle": partial(family, "bicycle", 50),

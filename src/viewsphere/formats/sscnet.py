@@ -61,6 +61,7 @@ THINGS = FURNITURE | {
     "ceiling": 1,
     "floor": 2,
     "wall": 3,
+    "interior": 3,  # of the zoo's rooms: walls, floor and ceiling are one thing
     "window": 4,
     "chair": 6,
     "bed": 7,
