@@ -142,7 +142,7 @@ def made_of(**fields):
     """Of each shot the substances of its ground and of its first model."""
     scene = {
         "ground": {"material": ["wood", "tile"]},
-        "materials": [{"texture": "any"}],
+        "materials": [{"texture": fields.pop("texture", "any")}],
         "draw": fields.pop("draw", "per_model"),
     }
     views = {"azimuth": 30, "elevation": 20, "distance": 4}
@@ -151,6 +151,12 @@ def made_of(**fields):
     )
     shots = [Shot.model_validate_json(shot.model_dump_json()) for shot in found]
     return [(shot.scene.ground.material, shot.scene.ground.tile, shot.things[0].repaints[0].texture) for shot in shots]
+
+
+@pytest.mark.parametrize("texture", [["any", "wood"], {"choice": ["any", "plastic"]}, {"choice": "any"}])
+def test_any_among_others_stands_for_each(texture):
+    many = made_of(models=[{"source": "zoo:chair", "count": 60}], texture=texture)
+    assert len({made.name for _, _, made in many}) > 12
 
 
 def test_names_and_seeds_are_drawn_once_a_model():

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import (
     AfterValidator,
@@ -35,10 +36,20 @@ def _known(name: str) -> str:
 
 
 def _choice(value: Any) -> Any:
-    """A list of materials, or any, as a choice between them."""
-    if value == ANY:
-        return {"choice": plugins.names("materials")}
-    return {"choice": value} if isinstance(value, (list, tuple)) else value
+    """A list of materials, or any, as a choice between them; any among others stands for each."""
+    if isinstance(value, Mapping) and "choice" in value:
+        return {**value, "choice": _each(cast(Any, value["choice"]))}
+    return {"choice": _each(value)} if value == ANY or isinstance(value, (list, tuple)) else value
+
+
+def _each(names: Any) -> Any:
+    known = plugins.names("materials")
+    if names == ANY:
+        return known
+    if not isinstance(names, (list, tuple)):
+        return names
+    given = cast(Sequence[Any], names)
+    return [one for name in given for one in (known if name == ANY else (name,))]
 
 
 MaterialNames = Annotated[
