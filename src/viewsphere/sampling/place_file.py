@@ -17,7 +17,7 @@ from viewsphere.assets.inside import split_source
 from viewsphere.assets.marks import FLOOR, INDOORS, LANE, SURFACE, Mark, kind_of, naturally, own_name
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.primitive import FileFacts
-from viewsphere.errors import ModelError, RecipeError
+from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.hull import convex_hull, smallest_rectangle
 from viewsphere.geometry.rotation import transform
@@ -101,7 +101,7 @@ class FileOffers:
 
 def offers_of(spec: ModelSpec) -> FileOffers:
     """What the file of a place with this specification offers. The file is read once, and what it says is kept in the cache as
-    long as it stays the same. Raises RecipeError for a file that cannot be read, and for properties that mean nothing.
+    long as it stays the same. Raises ModelError for a file that cannot be read, RecipeError for properties that mean nothing.
     """
     state = split_source(Path(spec.source))[0].stat()
     return _offers_of(spec.model_dump_json(), (state.st_mtime_ns, state.st_size))
@@ -118,10 +118,7 @@ def _offers_of(text: str, state: tuple[int, int]) -> FileOffers:
 
     settings = spec.model_dump_json(include={"up", "forward", "unit", "confined"})
     path, inside = split_source(Path(spec.source))
-    try:
-        return _offers(path.name, kept(path, f"place {json.dumps(inside)} {settings}", ask))
-    except ModelError as error:
-        raise RecipeError(f"scene.place: {error}") from None
+    return _offers(path.name, kept(path, f"place {json.dumps(inside)} {settings}", ask))
 
 
 def told(mesh: Mesh, facts: FileFacts) -> list[dict[str, Any]]:
@@ -207,7 +204,7 @@ def _offers(file: str, found: list[dict[str, Any]]) -> FileOffers:
     known = (FLOOR, LANE, SURFACE, INDOORS)
     for one in found:
         if one["kind"] not in known or (one["problem"] and one["kind"] in (FLOOR, INDOORS)):
-            raise ModelError(f"{file}: {one['name']!r}: {one['problem']}")
+            raise RecipeError(f"scene.place: {file}: {one['name']!r}: {one['problem']}")
     ordered = sorted(found, key=lambda one: naturally(one["name"]))
     floors = sorted((one for one in ordered if one["kind"] == FLOOR), key=lambda one: one["size"][0] * one["size"][1])
     lanes, surfaces = ([one for one in ordered if one["kind"] == kind and not one["problem"]] for kind in (LANE, SURFACE))
