@@ -14,6 +14,7 @@ import json
 import os
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -93,6 +94,7 @@ def load(
     with _aside(folder) as place:
         (file,), named = read_apart(spec, () if frame is None else (frame,), place)
         mesh, facts = read_mesh(file, path)
+        facts = replace(facts, files=tuple(named))
         if first is not None:
             _store(folder, first, path, named, file)
     return mesh, facts
@@ -251,7 +253,8 @@ def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | No
     """The mesh in the cache and its facts, None when they are not there or damaged."""
     try:
         names = json.loads((folder / f"{first}.json").read_text(encoding="utf-8"))
-        return read_mesh(folder / f"{_second_digest(first, path, names)}.npz", path)
+        mesh, facts = read_mesh(folder / f"{_second_digest(first, path, names)}.npz", path)
+        return mesh, replace(facts, files=tuple(path.parent / name for name in names))
     except Exception:  # whatever is wrong with an entry, the answer is to build it again
         return None
 

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from viewsphere.assets.marks import Mark
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import TEXTURE_FIELDS, FileFacts
 from viewsphere.model.keypoints import Keypoints
@@ -38,6 +39,7 @@ def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
         "images": [image.name for image in mesh.images],
         "warnings": mesh.warnings,
         "facts": {name: getattr(facts, name) for name in FACTS},
+        "marks": [asdict(mark) for mark in facts.marks],
         "keypoints": None if facts.keypoints is None else facts.keypoints.model_dump(),
     }
     arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
@@ -59,7 +61,9 @@ def read_mesh(path: Path, source: Path) -> tuple[Mesh, FileFacts]:
         warnings=tuple(header["warnings"]),
     )
     points = None if header["keypoints"] is None else Keypoints.model_validate(header["keypoints"])
-    return mesh, FileFacts(source, **{name: _tupled(value) for name, value in header["facts"].items()}, keypoints=points)
+    marks = tuple(Mark(**{name: _tupled(value) for name, value in mark.items()}) for mark in header["marks"])
+    told = {name: _tupled(value) for name, value in header["facts"].items()}
+    return mesh, FileFacts(source, **told, keypoints=points, marks=marks)
 
 
 def _material(fields: dict[str, Any]) -> Material:

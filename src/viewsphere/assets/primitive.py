@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.marks import Mark
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.skin import joined
 from viewsphere.model.keypoints import Keypoints
@@ -36,7 +37,8 @@ class FileFacts:
     `unit` is metres in one unit of the file. The raw mesh's vertices plus `origin` are the file's
     coordinates: it is zero unless the model lies so far away that float32 would lose its shape. `size` are the
     extents along the file's own x, y and z, in its unit. `files` are all files read or looked for. `keypoints` are points that
-    the file names, in its coordinates. `object_from_file` takes the file's coordinates to the object's, once it is normalised.
+    the file names, in its coordinates; `marks` are objects that say what they are. `object_from_file` takes the file's
+    coordinates to the object's, once it is normalised.
     """
 
     path: Path
@@ -48,6 +50,7 @@ class FileFacts:
     size: tuple[float, float, float] = (0.0, 0.0, 0.0)
     files: tuple[Path, ...] = ()
     keypoints: Keypoints | None = None
+    marks: tuple[Mark, ...] = ()
     object_from_file: Matrix4 = IDENTITY
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from viewsphere.assets import endings
 from viewsphere.assets.alpha import SOLID, with_alpha_modes
 from viewsphere.assets.folder import SHARPEST, ModelFolder, reduced
+from viewsphere.assets.marks import Mark, Marker, Point, mark_of
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.assets.named_points import NamedPoint, named_points
 from viewsphere.assets.nodes import Painter, Picture, images_of
@@ -226,7 +227,7 @@ def _built(
     if not pieces:
         why = f" ({folder.warnings[0].partition(': ')[2]})" if folder.warnings else ""
         raise folder.error(f"no triangles found that a render would show{why}; export the model as a mesh of faces")
-    facts = replace(facts, keypoints=_points(folder, told["points"], turn))
+    facts = replace(facts, keypoints=_points(folder, told["points"], turn), marks=_marks(told["marks"], turn))
     return assemble(folder, pieces, _with_modes(pieces, materials, folder.images), facts)
 
 
@@ -237,6 +238,28 @@ def _points(folder: ModelFolder, told: Sequence[Mapping[str, Any]], turn: NDArra
         return np.array(one["place"], np.float64) if turn is None else transform(turn, one["place"])
 
     return named_points(folder, {i: NamedPoint(one["name"], place(one), one["above"]) for i, one in enumerate(told)})
+
+
+def _marks(told: Sequence[Mapping[str, Any]], turn: NDArray[np.float64] | None) -> tuple[Mark, ...]:
+    """The marks that the file's objects are, in the axes of its mesh."""
+
+    def place(point: Sequence[float]) -> Point:
+        x, y, z = (transform(np.eye(4) if turn is None else turn, np.array(point, np.float64))).tolist()
+        return x, y, z
+
+    markers = (
+        Marker(
+            one["name"],
+            one["said"],
+            one["part"],
+            tuple(map(place, one["points"])),
+            tuple((a, b) for a, b in one["edges"]),
+            tuple((name, place(point)) for name, point in one["children"]),
+            one["is_group"],
+        )
+        for one in told
+    )
+    return tuple(mark for mark in map(mark_of, markers) if mark is not None)
 
 
 def _piece(told: Mapping[str, Any], material: int) -> Primitive:

@@ -28,6 +28,7 @@ from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels, PlaceEntry, PlaneEntry
 from viewsphere.sampling.pictures import IMAGE_SUFFIXES, files_in, proportions
+from viewsphere.sampling.place_file import FileOffers, offers_of
 from viewsphere.sampling.placing import Footprint, footprint, standing
 from viewsphere.sampling.seeds import Names, generator, scene_generators, share
 from viewsphere.zoo.places import Lane, Surface
@@ -76,10 +77,9 @@ def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: N
 
     Raises RecipeError for an unknown place, for a file that is not there, and for motions of pieces that it does not have.
     """
-    world_from_place = _turned(recipe, entry, names)
     if entry.name:
-        return _moving(entry, _laid_pieces(recipe, entry, world_from_place, names, category_id))
-    return _moving(entry, (_place_file(recipe, entry, world_from_place, category_id),))
+        return _moving(entry, _laid_pieces(recipe, entry, _turned(recipe, entry, names), names, category_id))
+    return _moving(entry, (_place_file(recipe, entry, names, category_id),))
 
 
 def _laid_pieces(
@@ -121,25 +121,52 @@ def _with_motion(piece: SceneryPiece, motions: Mapping[str, Motions]) -> Scenery
 
 
 def place_lanes(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Lane, ...]:
-    """The lanes of a place where it stands, world axes; none where it has none."""
-    if entry is None or not entry.name:
+    """The lanes of a place where it stands, world axes; none where it has none. Raises RecipeError for a file's lane that
+    cannot be one.
+    """
+    if entry is None:
         return ()
-    world_from_place = np.array(_turned(recipe, entry, names))
-    return tuple(_carried(lane, world_from_place) for lane in draw_place(recipe.seed, entry.name, names).lanes)
+    world_from_place = np.array(_world_from_place(recipe, entry, names))
+    return tuple(_carried(lane, world_from_place) for lane in _offered(recipe, entry, names).lanes)
 
 
 def place_surfaces(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Surface, ...]:
-    """Where things may stand above the floor of a place, world axes; none where it has none."""
-    if entry is None or not entry.name:
+    """Where things may stand above the floor of a place, world axes; none where it has none. Raises RecipeError for a file's
+    surface that cannot be one.
+    """
+    if entry is None:
         return ()
-    world_from_place = _turned(recipe, entry, names)
-    laid = getattr(draw_place(recipe.seed, entry.name, names), "surfaces", ())
+    world_from_place = _world_from_place(recipe, entry, names)
+    laid = getattr(_offered(recipe, entry, names), "surfaces", ())
     return tuple(replace(one, world_from_surface=composed(world_from_place, one.world_from_surface)) for one in laid)
 
 
-def is_indoors(entry: PlaceEntry | None) -> bool:
-    """Whether targets are in a room: whether the place's module says INDOORS."""
-    return entry is not None and entry.name in plugins.places() and getattr(plugins.place(entry.name), "INDOORS", False)
+def is_indoors(recipe: Recipe, entry: PlaceEntry | None) -> bool:
+    """Whether targets are in a room: whether the place's module says INDOORS, or its file."""
+    if entry is None:
+        return False
+    if not entry.name:
+        return _file_offers(recipe, entry).indoors
+    return entry.name in plugins.places() and getattr(plugins.place(entry.name), "INDOORS", False)
+
+
+def _offered(recipe: Recipe, entry: PlaceEntry, names: Names) -> Any:
+    """What a place offers, in its own axes: a `zoo.places.Place`, or the `FileOffers` of a file."""
+    return draw_place(recipe.seed, entry.name, names) if entry.name else _file_offers(recipe, entry)
+
+
+def _file_offers(recipe: Recipe, entry: PlaceEntry) -> FileOffers:
+    return offers_of(_file_spec(recipe, entry))
+
+
+def _world_from_place(recipe: Recipe, entry: PlaceEntry, names: Names) -> Matrix4:
+    """World from the axes of a place: those of its layout, or of its file's mesh, of which `origin` is at the world's."""
+    world_from_place = _turned(recipe, entry, names)
+    if entry.name:
+        return world_from_place
+    x, y, z = entry.origin
+    moved = ((1.0, 0.0, 0.0, -x), (0.0, 1.0, 0.0, -y), (0.0, 0.0, 1.0, -z), (0.0, 0.0, 0.0, 1.0))
+    return composed(world_from_place, moved)
 
 
 def _carried(lane: Lane, world_from_place: NDArray[np.float64]) -> Lane:
@@ -158,12 +185,30 @@ def draw_place(seed: int, name: str, names: Names) -> Any:
 
 
 def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footprint | None:
-    """The floor that a place leaves to its targets, None if it does not say."""
-    rectangle = getattr(draw_place(recipe.seed, entry.name, names), "free", None) if entry and entry.name else None
-    if entry is None or rectangle is None:
+    """The floor that a place leaves to its targets, None if it does not say. Raises RecipeError for a file whose `origin` is
+    not on its floor.
+    """
+    if entry is None:
+        return None
+    if not entry.name:
+        return _floor_of_file(recipe, entry, names)
+    rectangle = getattr(draw_place(recipe.seed, entry.name, names), "free", None)
+    if rectangle is None:
         return None
     x0, y0, x1, y1 = rectangle
     return footprint(box_vertices((x0, y0, 0.0), (x1, y1, 0.0)), _turned(recipe, entry, names))
+
+
+def _floor_of_file(recipe: Recipe, entry: PlaceEntry, names: Names) -> Footprint | None:
+    floor = _file_offers(recipe, entry).floor
+    if floor is None:
+        return None
+    if not floor.has(entry.origin):
+        raise RecipeError(
+            f"scene.place.origin: expected a point on {floor.name!r}, the floor of {Path(entry.source).name}, such as "
+            f"{[round(v, 3) for v in floor.middle]}; found {list(entry.origin)}: set origin, or call the object another name"
+        )
+    return footprint(floor.box, composed(_world_from_place(recipe, entry, names), floor.place_from_floor))
 
 
 def _turned(recipe: Recipe, entry: PlaceEntry, names: Names) -> Matrix4:
@@ -178,7 +223,13 @@ def composed(a: ArrayLike, b: ArrayLike) -> Matrix4:
     return rows
 
 
-def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, category_id: Naming) -> SceneryPiece:
+def _place_file(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: Naming) -> SceneryPiece:
+    spec = _file_spec(recipe, entry).model_copy(update={"category_id": category_id(entry.category, entry.labels)})
+    return SceneryPiece(spec, _world_from_place(recipe, entry, names), entry.labels, Path(spec.source).stem)
+
+
+def _file_spec(recipe: Recipe, entry: PlaceEntry) -> ModelSpec:
+    """The model of a file; raises RecipeError for one that is not there."""
     path = recipe.folder / Path(entry.source).expanduser()
     try:
         file, inside = split_source(path)
@@ -186,19 +237,16 @@ def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, ca
         raise RecipeError(f"scene.place: {error}") from None
     if not file.is_file():
         raise RecipeError(f"scene.place: expected zoo:<place> or a model file; found none at {file}")
-    spec = ModelSpec(
+    return ModelSpec(
         key=scenery_key(path.stem, "/".join((file.name, *inside))),
         source=path.as_posix(),
         category=entry.category,
-        category_id=category_id(entry.category, entry.labels),
+        category_id=0,
         up=entry.up,
         forward=entry.forward,
         unit=None if entry.unit is None else unit_metres(entry.unit),
         centring="as_is",
     )
-    x, y, z = entry.origin
-    moved = ((1.0, 0.0, 0.0, -x), (0.0, 1.0, 0.0, -y), (0.0, 0.0, 1.0, -z), (0.0, 0.0, 0.0, 1.0))
-    return SceneryPiece(spec, composed(world_from_place, moved), entry.labels, path.stem)
 
 
 def scenery_key(name: str, rest: str) -> str:

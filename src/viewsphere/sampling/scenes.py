@@ -155,7 +155,7 @@ class Scenes:
 
     @cached_property
     def _is_indoors(self) -> bool:
-        return is_indoors(self.recipe.scene.place)
+        return is_indoors(self.recipe, self.recipe.scene.place)
 
     @cached_property
     def _scene(self) -> Callable[[Names, tuple[Names, ...]], Scene]:

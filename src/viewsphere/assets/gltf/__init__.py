@@ -12,8 +12,9 @@ from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.gltf.animation import Posed, posed, timeline
 from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.keypoints import read_keypoints
+from viewsphere.assets.gltf.marks import read_marks
 from viewsphere.assets.gltf.material import read_materials
-from viewsphere.assets.gltf.scene import read_pieces, world_matrices
+from viewsphere.assets.gltf.scene import part_names, read_pieces, world_matrices
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.primitive import FileFacts, assemble
 
@@ -47,6 +48,12 @@ def _built(document: Document, node: str | None, now: Posed) -> tuple[Mesh, File
     pieces = read_pieces(document, worlds, now)
     materials = read_materials(document, {piece.material for piece in pieces})
     facts = FileFacts(
-        folder.model, folder.model.suffix[1:].lower(), "+y", "+z", 1.0, keypoints=read_keypoints(document, worlds)
+        folder.model,
+        folder.model.suffix[1:].lower(),
+        "+y",
+        "+z",
+        1.0,
+        keypoints=read_keypoints(document, worlds),
+        marks=read_marks(document, worlds, part_names(document, worlds)),
     )
     return assemble(folder, pieces, materials, facts)

@@ -12,6 +12,7 @@ import numpy as np
 from viewsphere.assets.gltf.animation import Posed
 from viewsphere.assets.gltf.document import DRACO, Document, ForBlenderError
 from viewsphere.assets.gltf.field import Field
+from viewsphere.assets.gltf.marks import is_line
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
 from viewsphere.assets.skin import strongest
 from viewsphere.assets.smoothing import flat
@@ -29,16 +30,13 @@ def read_pieces(document: Document, worlds: Mapping[int, Float], now: Posed = Ma
     What is scaled to nothing is not drawn (glTF 2.0, section 3.5.3).
     """
     pieces: list[Primitive] = []
-    parts: dict[str, int] = {}
+    parts = part_names(document, worlds)
     meshes: dict[int, list[Primitive]] = {}  # read once without morphing or skinning, for instances
     total = 0
-    for index, world in worlds.items():
-        node = document.root.at("nodes", index)
-        if "mesh" not in node or not world[:3, :3].any():
-            continue
+    for index, part in parts.items():
+        node, world = document.root.at("nodes", index), worlds[index]
         mesh = node.integer("mesh")
         entry = document.root.at("meshes", mesh)
-        part = _unused(node.text("name") or entry.text("name") or f"node{index}", parts)
         moved_weights = now.get(index, {}).get("weights")
         weights = tuple(_weights(node) or _weights(entry) if moved_weights is None else moved_weights.tolist())
         if "skin" in node or any(weights):
@@ -52,6 +50,17 @@ def read_pieces(document: Document, worlds: Mapping[int, Float], now: Posed = Ma
         placed = (replace(moved(piece, matrix), part=part) for matrix in matrices for piece in local)
         pieces.extend(piece if piece.normals is not None else flat(piece) for piece in placed)
     return pieces
+
+
+def part_names(document: Document, worlds: Mapping[int, Float]) -> dict[int, str]:
+    """The name of each node's part of the mesh, by the node's number; none for nodes that draw nothing."""
+    names, taken = dict[int, str](), dict[str, int]()
+    for index, world in worlds.items():
+        node = document.root.at("nodes", index)
+        if "mesh" in node and world[:3, :3].any() and not is_line(document, node):
+            entry = document.root.at("meshes", node.integer("mesh"))
+            names[index] = _unused(node.text("name") or entry.text("name") or f"node{index}", taken)
+    return names
 
 
 def _unused(name: str, taken: dict[str, int]) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 
 from .evaluated import Gathering, listed
+from .marks import Marks
 from .opening import choose, open_file
 from .pictures import Pictures
 from .playing import clips, go_to, timeline
@@ -42,7 +43,8 @@ def read(told):
     pictures = Pictures(told["folder"], told["root"])
     gathering = Gathering(told["folder"], pictures, wanted, told["most"])
     points = Points(wanted)
-    evaluate(scene, gathering, points)
+    marks = Marks(wanted)
+    evaluate(scene, gathering, points, marks)
     return {
         "frame": frame,
         "unit": unit,
@@ -51,6 +53,7 @@ def read(told):
         "materials": gathering.materials,
         "images": pictures.told,
         "points": points.found,
+        "marks": marks.found,
         "opened": warnings,
         "warnings": gathering.warnings + _choices(told),
         "files": [str(Path(file).resolve()) for file in bpy.utils.blend_paths(absolute=True)],

@@ -108,9 +108,10 @@ def scene_laid(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> L
     """The models of a scene as its layout places them; the last ones are kept."""
     recipe, entry = stock.recipe, scenes_entry(stock.recipe)
     models = (*scene_cast(stock, subject), *_distractors(stock, subject))
-    free = None if stock.composition is None else stock.composition.free_floor(subject, pose)
     stand = surface(stock, subject, pose)
-    if stand is not None:
+    if stand is None:
+        free = None if stock.composition is None else stock.composition.free_floor(subject, pose)
+    else:
         free = footprint(
             box_vertices((-stand.size[0] / 2, -stand.size[1] / 2, 0), (stand.size[0] / 2, stand.size[1] / 2, 0)), IDENTITY
         )
