@@ -13,6 +13,7 @@ from viewsphere.engines.raster import kernels_block as rows
 from viewsphere.engines.raster import kernels_light
 from viewsphere.engines.raster.environment import Surrounding, bake_surrounding, lobe_albedo
 from viewsphere.engines.raster.kernels_environment import BELOW
+from viewsphere.engines.raster.records import NO_BOUNCES
 from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.scene import Sky
 
@@ -150,7 +151,7 @@ def test_white_furnace():
                 view = tilted(cosines)
                 b = block(view=view, ROUGH=rough, METAL=metal, COAT=coat, COAT_ROUGH=rng.uniform(0, 1, N))
                 stages.weigh(N, surrounding.albedo, b)
-                stages.ambient(N, surrounding, False, b)
+                stages.ambient(N, surrounding, NO_BOUNCES, b)
                 stages.compose(N, b)
                 for name in ("RED", "GREEN", "BLUE"):
                     assert out(b, name) == pytest.approx(1, abs=0.01), (rough, metal, coat)
@@ -159,7 +160,7 @@ def test_white_furnace():
 def test_level_ground_reflects_its_own_share():
     surrounding = white_furnace()
     b = block(BASE_R=0.3, BASE_G=0.2, BASE_B=0.1, OPEN=0.5, light=tilted(np.full(N, 0.6)))
-    stages.ambient_matte(N, surrounding, False, b)
+    stages.ambient_matte(N, surrounding, NO_BOUNCES, b)
     assert out(b, "DG") == pytest.approx(0.1, rel=0.01)
     stages.add_light_matte(N, b)
     assert out(b, "DR") == pytest.approx(0.15 + 0.3 * 0.6 / math.pi, rel=0.01)
@@ -224,7 +225,7 @@ def test_glass_lets_through_by_its_tint():
     surrounding = white_furnace()
     b = block(TRANSMISSION=1, ROUGH=0.0, RED=0.8, GREEN=0.5, BLUE=0.5)
     stages.weigh(N, surrounding.albedo, b)
-    stages.ambient(N, surrounding, False, b)
+    stages.ambient(N, surrounding, NO_BOUNCES, b)
     stages.compose(N, b)
     shown = 1 - out(b, "ALPHA")
     assert shown == pytest.approx(0.96 * 0.5, abs=0.01)
@@ -238,7 +239,7 @@ def test_unlit_shows_its_colour_alone():
     b = block(UNLIT=1, RED=0.3, ER=5, ALPHA=0.5)
     stages.weigh(N, surrounding.albedo, b)
     stages.add_light(N, b)
-    stages.ambient(N, surrounding, False, b)
+    stages.ambient(N, surrounding, NO_BOUNCES, b)
     stages.compose(N, b)
     assert out(b, "RED") == pytest.approx(0.15 / EXPOSURE, abs=1e-6)
     assert out(b, "ALPHA") == pytest.approx(0.5)
@@ -250,7 +251,7 @@ def test_occlusion_dims_and_never_brightens():
     for open_ in (1.0, 0.7, 0.3, 0.0):
         b = block(view=tilted(np.linspace(0.05, 1, N)), OPEN=open_, ROUGH=0.3, METAL=0.5)
         stages.weigh(N, surrounding.albedo, b)
-        stages.ambient(N, surrounding, False, b)
+        stages.ambient(N, surrounding, NO_BOUNCES, b)
         light = out(b, "DR") + out(b, "SR")
         assert (light <= last + 1e-6).all()
         last = light
@@ -273,7 +274,7 @@ def test_nothing_is_negative_or_not_a_number():
         b = block(vectors[0], vectors[1], vectors[2], **ends, WIDTH=rng.choice([0, 0.005, 1.0], N), IR=rng.choice([0, 1e4], N))
         stages.weigh(N, surrounding.albedo, b)
         stages.add_light(N, b)
-        stages.ambient(N, surrounding, False, b)
+        stages.ambient(N, surrounding, NO_BOUNCES, b)
         stages.compose(N, b)
         for name in ("RED", "GREEN", "BLUE", "ALPHA"):
             values = out(b, name)

@@ -196,6 +196,10 @@ def test_a_grain_alone_is_new_in_each_frame():
         ({"ground": {"material": "wood", "image": "a.png"}}, r"scene\.ground: expected material or image; found both"),
         ({"ground": {"material": "wood", "tile": 1}}, r"scene\.ground: expected no tile beside material.*leave it out"),
         ({"materials": [{"texture": "iron"}]}, r"scene\.materials\[0\]\.texture: expected one of asphalt.*found 'iron'"),
+        (
+            {"materials": [{"texture": {"choice": ["any", "wood"], "weights": [1, 2]}}]},
+            r"expected names of materials beside weights; found \['any', 'wood'\]",
+        ),
         ({"materials": [{"texture": "any", "images": "x"}]}, r"scene\.materials\[0\]: expected images or texture; found both"),
     ],
 )

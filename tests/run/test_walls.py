@@ -1,12 +1,18 @@
 """Cameras in rooms: none beyond the walls of the model's room, and no way through one."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from viewsphere import Recipe, render
 from viewsphere.errors import RecipeError
+from viewsphere.run.stages import _steps
 from viewsphere.run.walls import check_way
+from viewsphere.sampling.camera import inside_box
 from viewsphere.zoo import build, rooms_of
+
+SEED_OF_A_FLAT = 4
 
 
 def recipe(**changed):
@@ -50,7 +56,9 @@ class Still:
 def checked(thing, points):
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     low, high = (np.array(v, float) for v in thing.mesh.bounds)
-    check_way([(thing, low + corners * (high - low))], lambda t: t.mesh, np.array(points, float))
+    points = np.array(points, float)
+    steps = [(i, a, b) for i, (a, b) in enumerate(pairwise(points))]
+    check_way([(thing, low + corners * (high - low))], lambda t: t.mesh, steps)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -64,7 +72,7 @@ def test_a_way_through_a_wall_is_told_and_one_within_a_room_is_not(seed):
     up = np.array([0, 0, 1.0])
     out, above = middle + 0.1 * up, middle + (high - low)[2] * up
     with pytest.raises(
-        RecipeError, match=r"way clear of walls; found it going through interior interior_1 between .* pictures 1 and 2"
+        RecipeError, match=r"way clear of walls; found it going through interior interior_1 between .*, frames 1 and 2"
     ):
         checked(interior, [middle, out, above])
 
@@ -77,3 +85,34 @@ def test_leaves_are_no_walls():
     checked(hedge, through)
     with pytest.raises(RecipeError):
         checked(Still("house", hedge.mesh), through)
+
+
+def test_a_door_between_two_rooms_is_air():
+    rooms = rooms_of("zoo:interior", SEED_OF_A_FLAT)
+    walls = Still("interior", build("interior", np.random.default_rng(SEED_OF_A_FLAT)))
+    doors = [box for box in rooms if min(np.ptp(box, axis=0)[:2]) < 0.2]
+    assert len(doors) > 2
+    for door in doors:
+        middle, thin = door.mean(axis=0), int(np.argmin(np.ptp(door, axis=0)[:2]))
+        across = np.array([0.0, 0.0, 0.0])
+        across[thin] = 0.3
+        way = np.linspace(middle - across, middle + across, 25)
+        assert np.any([inside_box(room, way) for room in rooms], axis=0).all()
+        checked(walls, way)
+
+
+def test_frames_that_are_apart_are_no_step():
+    """Of tracks, the first frame and a later one are in a shot: nobody goes straight from one to the other."""
+    around = np.array([(-5.0, -5, 1), (5, 5, 1)])
+    assert list(_steps(ShotOf([0, 7], around))) == []
+    assert [frame for frame, _, _ in _steps(ShotOf([3, 4], around))] == [3]
+
+
+class ShotOf:
+    """A shot of instants with these numbers, whose camera is at these points."""
+
+    def __init__(self, numbers, points):
+        self.instants, self.points = [type("Instant", (), {"index": i}) for i in numbers], points
+
+    def camera(self, instant, sensor):
+        return type("Camera", (), {"center": self.points[instant]})

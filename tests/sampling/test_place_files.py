@@ -168,7 +168,7 @@ def test_a_file_that_says_nothing_has_endless_floor(tmp_path):
             "'lane_a': expected two points at least, of a line or of empties below it; found 1",
         ),
         ({"name": "lane_a", "children": {"p": (0, 0, 0)}}, "'lane_a': expected two points at least.*; found 1"),
-        ({"name": "lane_a"}, "'lane_a': expected two points at least.*; found 0"),
+        ({"name": "lane_a", "extras": {"viewsphere": "lane"}}, "'lane_a': expected two points at least.*; found 0"),
         (
             {"name": "lane_a", "line": RAMP, "edges": [(0, 1), (1, 2), (1, 3)]},
             "'lane_a': expected one line; found one that branches",

@@ -139,6 +139,22 @@ def test_weather_stays_outdoors_of_a_room_and_its_light_comes_in():
     assert scene_of({"place": "zoo:room", "sky": "night"}).lamps is not None
 
 
+def test_a_recipe_outdoors_keeps_the_digest_it_had_and_one_in_a_room_differs_from_no_exposure():
+    def digest(**scene):
+        return Recipe(models=CARS, viewpoints=VIEWS, scene=scene).digest
+
+    for place in ({}, {"place": "zoo:neighbourhood"}):
+        assert digest(**place) == digest(**place, view={"exposure": 0}) != digest(**place, view={"exposure": 1})
+    assert digest(place="zoo:room") != digest(place="zoo:room", view={"exposure": 0})
+
+
+@pytest.mark.parametrize(("exposure", "said"), [(40, "less than or equal to 16"), ("bright", "auto")])
+def test_a_wrong_exposure_is_told_once(exposure, said):
+    with pytest.raises(RecipeError, match=said) as found:
+        planned({"view": {"exposure": exposure}})
+    assert len(str(found.value).splitlines()) == 1
+
+
 def test_lamps_stand_where_cameras_of_their_angles_would():
     at = {"azimuth_deg": 90, "elevation_deg": 30, "distance": 2}
     (lamp,) = scene_of({"lights": {"at": at, "strength": 1}}).lights

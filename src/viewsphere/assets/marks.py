@@ -98,7 +98,9 @@ def _lane(marker: Marker, is_said: bool) -> Mark | None:
             return None  # a road that is called so, or a group of things
         found = "faces" if marker.part else "an object without either"
         return Mark(LANE, marker.name, problem=f"expected a line, or empties below it; found {found}")
-    closed, problem = bool(marker.said.get("closed", False)), ""
+    if not is_said and not marker.points and not marker.children:
+        return None  # a lamp or a camera that is called so
+    closed, problem = marker.said.get("closed", False) in (True, 1), ""
     points = tuple(place for _, place in sorted(marker.children, key=lambda child: naturally(child[0])))
     if marker.points:
         points, around, problem = chained(marker.points, marker.edges)

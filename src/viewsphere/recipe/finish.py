@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import Background, Effects, Picture, Smoother, ViewTransform
@@ -86,14 +86,18 @@ class SmootherEntry(entry_of(Smoother), PerFrame):
     """What is done to the border between the targets and their background."""
 
 
-Stops = Drawn[Annotated[float, Field(strict=True, ge=-16, le=16)]] | Literal["auto"]
+Stops = Annotated[
+    Annotated[Drawn[Annotated[float, Field(strict=True, ge=-16, le=16)]], Tag("drawn")]
+    | Annotated[Literal["auto"], Tag("word")],
+    Discriminator(lambda value: "word" if isinstance(value, str) else "drawn"),
+]
 
 
 class ViewEntry(entry_of(ViewTransform), PerFrame):
     """From light to a picture."""
 
     exposure: Stops = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
-        default="auto", description="stops: 1 is twice as bright; auto: 0, and in rooms of the zoo as much as shows them by day"
+        default="auto", description="stops: 1 is twice as bright; auto: 0, and in rooms as much as shows them by day"
     )
 
 

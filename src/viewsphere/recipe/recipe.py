@@ -371,6 +371,8 @@ class Recipe(Shown, Frozen):
         value = self.model_dump(mode="json", exclude=dict.fromkeys(without, True) | credit)
         for path, default in LATER_FIELDS.items():
             _leave_out(value, path, default)
+        if value["scene"]["view"]["exposure"] == "auto" and not self.scene.may_be_indoors:
+            value["scene"]["view"]["exposure"] = 0.0  # what it was before it could be auto
         text = json.dumps(value, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 

@@ -18,6 +18,7 @@ from pydantic import (
     model_validator,
 )
 
+from viewsphere import plugins
 from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
@@ -274,6 +275,13 @@ class SceneEntry(Frozen):
     def backgrounds(self) -> tuple[BackgroundEntry, ...]:
         """All values that the background may take."""
         return tuple(alternatives(self.background))
+
+    @property
+    def may_be_indoors(self) -> bool:
+        """Whether the place may be a room: one of the zoo's that says so, or a file, which is not read here."""
+        if self.place is None or self.place.name not in ("", *plugins.places()):
+            return False
+        return not self.place.name or getattr(plugins.place(self.place.name), "INDOORS", False)
 
     @property
     def automatic_ground(self) -> Literal["on", "off", "catcher"]:

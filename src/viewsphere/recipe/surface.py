@@ -38,7 +38,10 @@ def _known(name: str) -> str:
 def _choice(value: Any) -> Any:
     """A list of materials, or any, as a choice between them; any among others stands for each."""
     if isinstance(value, Mapping) and "choice" in value:
-        return {**value, "choice": _each(cast(Any, value["choice"]))}
+        given = cast(Mapping[str, Any], value)
+        if "weights" in given and ANY in (names := given["choice"]):
+            raise ValueError(f"expected names of materials beside weights; found {names!r}")
+        return {**given, "choice": _each(given["choice"])}
     return {"choice": _each(value)} if value == ANY or isinstance(value, (list, tuple)) else value
 
 

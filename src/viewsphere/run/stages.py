@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -30,7 +31,7 @@ from viewsphere.model.sample import Float, Sample, Taken
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.traits import Traits
-from viewsphere.run.walls import check_rooms, check_way
+from viewsphere.run.walls import Step, check_rooms, check_way
 from viewsphere.sampling.camera import inside_box
 from viewsphere.store import ModelInfo, Store
 from viewsphere.surroundings.ground import ground_stamps
@@ -227,9 +228,8 @@ class Stages:
             there = [thing for thing in shot.things_at(together[0]) if thing.is_there]
             self._check_cameras(there, np.array(cameras), still)
         if shot.sequence:
-            way = np.array([shot.camera(instant, 0).center for instant in instants])
             fixed = [(thing, still[id(thing)].box) for thing in shot.things if id(thing) in still]
-            check_way(fixed, lambda thing: self.model(thing.model, thing.step), way)
+            check_way(fixed, lambda thing: self.model(thing.model, thing.step), _steps(shot))
 
     def _stand(self, thing: Thing) -> _Stand:
         pose = thing.world_from_object
@@ -282,6 +282,12 @@ class Stages:
 def _name(spec: ModelSpec, step: TimeStep | None) -> str:
     """Equal for equal models."""
     return spec.model_dump_json() + (step.model_dump_json() if step else "")
+
+
+def _steps(shot: Shot) -> list[Step]:
+    """From each frame to the next one, where the shot has both."""
+    pairs = enumerate(pairwise(shot.instants))
+    return [(a.index, shot.camera(i, 0).center, shot.camera(i + 1, 0).center) for i, (a, b) in pairs if b.index == a.index + 1]
 
 
 def _stamps(shot: Shot) -> tuple[Stamp, ...]:

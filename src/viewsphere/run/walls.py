@@ -16,6 +16,9 @@ from viewsphere.sampling.camera import inside_box
 
 Float = NDArray[np.float64]
 
+Step = tuple[int, Float, Float]
+"""The number of a frame, and where a camera is then and in the next one, (3,) each, world metres."""
+
 WALLS = {STUFF_IDS[name] for name in ("building", "wall", "floor", "ceiling")}
 """Classes of scenery that nobody goes through: leaves and hedges are none."""
 
@@ -31,29 +34,32 @@ def check_rooms(rooms: Sequence[Float], model: Float, cameras: Float) -> None:
         )
 
 
-def check_way(things: Iterable[tuple[Thing, Float]], mesh_of: Callable[[Thing], Mesh], way: Float) -> None:
-    """Raise RecipeError where the straight line between two points of a way (N, 3), one after the other, goes through a wall.
+def check_way(things: Iterable[tuple[Thing, Float]], mesh_of: Callable[[Thing], Mesh], steps: Sequence[Step]) -> None:
+    """Raise RecipeError where one of a camera's steps goes straight through a wall.
 
     `things`: those that stand still, each with its box (8, 3) in the world; `mesh_of`: a thing's mesh in its own axes.
     """
-    starts, ends = way[:-1], way[1:]
+    if not steps:
+        return
+    points = np.array([point for _, *both in steps for point in both])
+    low, high = points.min(axis=0), points.max(axis=0)
     for thing, box in things:
-        if not thing.scenery or (way.min(axis=0) > box.max(axis=0)).any() or (way.max(axis=0) < box.min(axis=0)).any():
-            continue
-        mesh = mesh_of(thing)
-        walls = _walls(thing.model.category, mesh)
-        if not len(walls):
-            continue
-        corners = transform(thing.world_from_object, mesh.vertices.astype(np.float64))[walls]
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        for i, (a, b) in enumerate(zip(starts, ends, strict=True)):
-            near = (np.minimum(a, b) <= high).all(axis=1) & (np.maximum(a, b) >= low).all(axis=1)
-            if near.any() and _is_crossed(corners[near], a, b):
-                raise RecipeError(
-                    f"viewpoints: expected the camera's way clear of walls; found it going through {thing.model.category} "
-                    f"{thing.key} between {_shown(a)} and {_shown(b)}, pictures {i} and {i + 1} of the shot: lead the "
-                    "trajectory around"
-                )
+        if thing.scenery and (low <= box.max(axis=0)).all() and (high >= box.min(axis=0)).all():
+            _check_wall(thing, mesh_of(thing), steps)
+
+
+def _check_wall(thing: Thing, mesh: Mesh, steps: Sequence[Step]) -> None:
+    walls = _walls(thing.model.category, mesh)
+    corners = transform(thing.world_from_object, mesh.vertices.astype(np.float64))[walls]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    for frame, a, b in steps:
+        near = (np.minimum(a, b) <= high).all(axis=1) & (np.maximum(a, b) >= low).all(axis=1)
+        if near.any() and _is_crossed(corners[near], a, b):
+            what = f"{thing.model.category or 'piece'} {thing.key}"
+            raise RecipeError(
+                f"viewpoints: expected the camera's way clear of walls; found it going through {what} "
+                f"between {_shown(a)} and {_shown(b)}, frames {frame} and {frame + 1}: lead the trajectory around"
+            )
 
 
 def _walls(category: str, mesh: Mesh) -> NDArray[np.int32]:

@@ -95,8 +95,18 @@ def draw(rng: np.random.Generator) -> Interior:
 
 
 def rooms(p: Interior) -> tuple[Float, ...]:
-    """The air of its rooms, each a box (8, 3), metres."""
-    return tuple(box_vertices((*room.low, 0.0), (*room.high, p.height)) for room in p.rooms)
+    """The air of its rooms and of the doors between them, each a box (8, 3), metres."""
+    inside = [box_vertices((*room.low, 0.0), (*room.high, p.height)) for room in p.rooms]
+    return (*inside, *(_threshold(room, o) for room in p.rooms for o in room.openings if o.opens == "door"))
+
+
+def _threshold(room: Room, o: Opening) -> Float:
+    """The air of a door in the wall between two rooms, (8, 3)."""
+    x, y = room.middle(o.side)
+    (right, up) = {"rear": (1, 0), "right": (0, -1), "front": (-1, 0), "left": (0, 1)}[o.side]
+    ends = [(x + s * right - INNER * k * up, y + s * up + INNER * k * right) for s in o.span for k in (-0.1, 1.1)]
+    low, high = np.min(ends, axis=0), np.max(ends, axis=0)
+    return box_vertices((*low, o.foot), (*high, o.foot + o.height))
 
 
 def _joinery(p: Interior) -> Joinery:
