@@ -18,12 +18,13 @@ import platform
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from bench_opengl import NoOpenGL, opengl
+from bench_parts import timed
 from bench_scene import reference_recipe, write_reference
 
 from viewsphere import generate, plan, plugins
@@ -121,29 +122,6 @@ def open3d(geometry: Geometry) -> Rival:
     return "Open3D, one ray a pixel", cast
 
 
-@contextmanager
-def timed(times: dict[str, float]) -> Iterator[None]:
-    """Add up the CPU milliseconds of the parts of colour while the context lasts."""
-    kept = [(module, name, getattr(module, name)) for module, name, _ in PARTS_OF_COLOUR]
-
-    def watched(inner: Callable[..., Any], label: str) -> Callable[..., Any]:
-        def run(*args: Any) -> Any:
-            begun = time.process_time()
-            result = inner(*args)
-            times[label] = times.get(label, 0.0) + 1e3 * (time.process_time() - begun)
-            return result
-
-        return run
-
-    for (module, name, inner), (_, _, label) in zip(kept, PARTS_OF_COLOUR, strict=True):
-        setattr(module, name, watched(inner, label))
-    try:
-        yield
-    finally:
-        for module, name, inner in kept:
-            setattr(module, name, inner)
-
-
 def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     """Times of the reference frame, stage by stage, and the number of its triangles."""
     clock = Clock()
@@ -219,7 +197,7 @@ def one_shot(clock: Clock, shot: Shot, instants: Sequence[int], stage: Stage, me
         for instant in instants:
             begun = time.process_time()
             parts: dict[str, float] = {}
-            with timed(parts):
+            with timed(PARTS_OF_COLOUR, parts):
                 sample = one_frame(clock, shot, instant, stage, mesh)
             for name, value in parts.items():
                 clock.times.setdefault(name, []).append(value)

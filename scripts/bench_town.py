@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import resource
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
+from bench_parts import timed
 
 from viewsphere import Recipe, plan
 from viewsphere.engines.raster import staging
@@ -54,36 +55,13 @@ def town_recipe(frames: int) -> Recipe:
     return Recipe(**{**told, "time": {"frames": frames, "fps": 10}, "shot_frames": frames, "formats": []})
 
 
-@contextmanager
-def watched(times: dict[str, float]) -> Iterator[None]:
-    """Add up the CPU milliseconds of the parts while the context lasts."""
-    kept = [(module, name, getattr(module, name)) for module, name, _ in PARTS]
-
-    def timed(inner: Callable[..., Any], label: str) -> Callable[..., Any]:
-        def run(*args: Any, **more: Any) -> Any:
-            begun = time.process_time()
-            result = inner(*args, **more)
-            times[label] = times.get(label, 0.0) + 1e3 * (time.process_time() - begun)
-            return result
-
-        return run
-
-    for (module, name, inner), (_, _, label) in zip(kept, PARTS, strict=True):
-        setattr(module, name, timed(inner, label))
-    try:
-        yield
-    finally:
-        for module, name, inner in kept:
-            setattr(module, name, inner)
-
-
 def drive(shot: Shot, known: stages.Stages) -> tuple[dict[str, float], float]:
     """Medians by part, and CPU seconds until the first counted frame."""
     every: dict[str, list[float]] = {}
     begun = last = time.process_time()
     parts: dict[str, float] = {}
     started = 0.0
-    with watched(parts):
+    with timed(PARTS, parts):
         for number, _ in enumerate(known.render(shot)):
             now = time.process_time()
             if number >= WARM:

@@ -18,7 +18,6 @@ from pydantic import (
     model_validator,
 )
 
-from viewsphere import plugins
 from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
@@ -279,9 +278,7 @@ class SceneEntry(Frozen):
     @property
     def may_be_indoors(self) -> bool:
         """Whether the place may be a room: one of the zoo's that says so, or a file, which is not read here."""
-        if self.place is None or self.place.name not in ("", *plugins.places()):
-            return False
-        return not self.place.name or getattr(plugins.place(self.place.name), "INDOORS", False)
+        return self.place is not None and (not self.place.name or self.place.is_room)
 
     @property
     def automatic_ground(self) -> Literal["on", "off", "catcher"]:

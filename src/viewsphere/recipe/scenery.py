@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from viewsphere import plugins
 from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
@@ -48,6 +49,11 @@ class PlaceEntry(Brief):
     def name(self) -> str:
         """Name of the zoo's place; empty for a file."""
         return self.source.removeprefix(ZOO) if self.source.startswith(ZOO) else ""
+
+    @property
+    def is_room(self) -> bool:
+        """Whether it is a place of the zoo whose module says INDOORS."""
+        return self.name in plugins.places() and getattr(plugins.place(self.name), "INDOORS", False)
 
     @model_validator(mode="after")
     def _check(self) -> PlaceEntry:

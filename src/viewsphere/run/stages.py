@@ -88,6 +88,7 @@ class _Stand:
 
 
 NONE_KNOWN: Mapping[int, _Stand] = MappingProxyType({})
+"""Where nothing is known to stand."""
 
 
 @dataclass(eq=False)
@@ -196,11 +197,11 @@ class Stages:
         frame's model: under a tree, among hills or in the room where the model stands a camera may well be. So cameras are not
         looked at where no target is there.
         """
-        own = next((thing for thing in things if not thing.scenery), None)
+        own = next((i for i, thing in enumerate(things) if not thing.scenery), None)
         if own is None:
             return
         stands = [known.get(id(thing)) or self._stand(thing) for thing in things]
-        boxes, model = np.array([stand.box for stand in stands]), (known.get(id(own)) or self._stand(own)).box.mean(axis=0)
+        boxes, model = np.array([stand.box for stand in stands]), stands[own].box.mean(axis=0)
         check_rooms([room for stand in stands for room in stand.rooms], model, cameras)
         low, high = cameras.min(axis=0), cameras.max(axis=0)
         for k in np.flatnonzero(((boxes.min(axis=1) <= high) & (boxes.max(axis=1) >= low)).all(axis=1)).tolist():

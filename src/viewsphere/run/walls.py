@@ -50,6 +50,8 @@ def check_way(things: Iterable[tuple[Thing, Float]], mesh_of: Callable[[Thing], 
 
 def _check_wall(thing: Thing, mesh: Mesh, steps: Sequence[Step]) -> None:
     walls = _walls(thing.model.category, mesh)
+    if not len(walls):
+        return
     corners = transform(thing.world_from_object, mesh.vertices.astype(np.float64))[walls]
     low, high = corners.min(axis=1), corners.max(axis=1)
     for frame, a, b in steps:
@@ -65,7 +67,7 @@ def _check_wall(thing: Thing, mesh: Mesh, steps: Sequence[Step]) -> None:
 def _walls(category: str, mesh: Mesh) -> NDArray[np.int32]:
     """The triangles (T, 3) of scenery that nobody goes through."""
     solid = np.array([stuff_of(category, part) in WALLS for part in mesh.parts], np.bool_)
-    return mesh.triangles[solid[mesh.triangle_part]] if solid.any() else mesh.triangles[:0]
+    return mesh.triangles[solid[mesh.triangle_part]]
 
 
 def _is_crossed(corners: Float, a: Float, b: Float) -> bool:

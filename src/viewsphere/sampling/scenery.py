@@ -143,11 +143,7 @@ def place_surfaces(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tu
 
 def is_indoors(recipe: Recipe, entry: PlaceEntry | None) -> bool:
     """Whether targets are in a room: whether the place's module says INDOORS, or its file."""
-    if entry is None:
-        return False
-    if not entry.name:
-        return _file_offers(recipe, entry).indoors
-    return entry.name in plugins.places() and getattr(plugins.place(entry.name), "INDOORS", False)
+    return entry is not None and (entry.is_room if entry.name else _file_offers(recipe, entry).indoors)
 
 
 def _offered(recipe: Recipe, entry: PlaceEntry, names: Names) -> Any:

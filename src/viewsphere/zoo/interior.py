@@ -11,7 +11,7 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.zoo.indoors import coverings, openings, walls
 from viewsphere.zoo.indoors.draws import flat, single
 from viewsphere.zoo.indoors.openings import TRIM, Joinery
-from viewsphere.zoo.indoors.plan import INNER, OUTER, SIDES, Opening, Room, Side
+from viewsphere.zoo.indoors.plan import INNER, OUTER, RIGHT, SIDES, Opening, Room, Side
 from viewsphere.zoo.shapes.assembly import Piece
 from viewsphere.zoo.shapes.paint import Color, coated, lamp, linear, metal
 from viewsphere.zoo.shapes.solids import Float, lathe, moved
@@ -103,8 +103,9 @@ def rooms(p: Interior) -> tuple[Float, ...]:
 def _threshold(room: Room, o: Opening) -> Float:
     """The air of a door in the wall between two rooms, (8, 3)."""
     x, y = room.middle(o.side)
-    (right, up) = {"rear": (1, 0), "right": (0, -1), "front": (-1, 0), "left": (0, 1)}[o.side]
-    ends = [(x + s * right - INNER * k * up, y + s * up + INNER * k * right) for s in o.span for k in (-0.1, 1.1)]
+    right, up = RIGHT[o.side]
+    beyond = 0.1  # of the wall's thickness: rooms and doors overlap, so that no camera is between them
+    ends = [(x + s * right - INNER * k * up, y + s * up + INNER * k * right) for s in o.span for k in (-beyond, 1 + beyond)]
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     return box_vertices((*low, o.foot), (*high, o.foot + o.height))
 

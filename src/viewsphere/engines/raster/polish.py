@@ -30,7 +30,7 @@ SHARP, MATT = 0.3, 0.5
 """Roughness up to which the mirror image counts in full, and from which on not at all: what probes see is as blurred."""
 
 SPREAD = 0.6
-"""Reach of the blur of what is far away, in a picture's heights, over the roughness to the fourth power's root."""
+"""Reach of the blur of what is far away, in halves of the picture's height, over the square of the roughness."""
 
 
 def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radiance: Float32) -> None:

@@ -12,6 +12,9 @@ Side = Literal["rear", "right", "front", "left"]
 SIDES: tuple[Side, ...] = get_args(Side)
 """Walls in the order of the turns -0, -90, -180, -270 degrees that bring the rear one (+Y) there; right is +X."""
 
+RIGHT: dict[Side, tuple[int, int]] = {"rear": (1, 0), "right": (0, -1), "front": (-1, 0), "left": (0, 1)}
+"""Where a wall's right is as it is seen from the room, x and y."""
+
 INNER, OUTER = 0.12, 0.32
 """Thickness of walls between two rooms, and of those to the outside."""
 
@@ -71,7 +74,7 @@ class Room:
     def along(self, side: Side, room: Room, x: float) -> float:
         """What lies x to the right of the middle of another room's wall, along this room's wall on that side."""
         (a, b), (c, d) = room.middle(side), self.middle(side)
-        right, up = {"rear": (1, 0), "right": (0, -1), "front": (-1, 0), "left": (0, 1)}[side]
+        right, up = RIGHT[side]
         return x + (a - c) * right + (b - d) * up
 
     def of(self, side: Side) -> tuple[Opening, ...]:
