@@ -37,6 +37,7 @@ EVERYTHING = Material(
     transmission=0.35,
     transmission_texture=Texture(0),
     ior=1.33,
+    thickness=0.003,
     specular=0.45,
     specular_texture=Texture(0),
     specular_color=(0.9, 0.8, 0.7),

@@ -202,6 +202,7 @@ def full_material():
                 "clearcoatNormalTexture": texture,
             },
             "KHR_materials_transmission": {"transmissionFactor": 0.35, "transmissionTexture": texture},
+            "KHR_materials_volume": {"thicknessFactor": 0.003, "attenuationDistance": 2.0},
             "KHR_materials_ior": {"ior": 1.33},
             "KHR_materials_specular": {
                 "specularFactor": 0.45,
@@ -232,7 +233,7 @@ def test_every_material_field_is_read(gltf):
     assert (m.base_color, m.metallic, m.roughness) == ((0.1, 0.2, 0.3, 0.4), 0.6, 0.7)
     assert (m.normal_scale, m.occlusion_strength, m.emissive) == (0.5, 0.25, (2, 1, 0))
     assert (m.alpha_mode, m.alpha_cutoff, m.double_sided, m.unlit) == ("MASK", 0.3, False, True)
-    assert (m.clearcoat, m.clearcoat_roughness, m.transmission, m.ior) == (0.9, 0.8, 0.35, 1.33)
+    assert (m.clearcoat, m.clearcoat_roughness, m.transmission, m.ior, m.thickness) == (0.9, 0.8, 0.35, 1.33, 0.003)
     assert (m.specular, m.specular_color) == (0.45, (0.9, 0.8, 0.7))
     assert (mesh.images[0].name, mesh.images[0].pixels.shape) == ("red", (2, 4, 4))
     np.testing.assert_array_equal(mesh.uv1, mesh.uv0 * 2)

@@ -356,6 +356,7 @@ class _Writer:
             "KHR_materials_clearcoat": coat,
             "KHR_materials_transmission": glass,
             "KHR_materials_specular": specular,
+            "KHR_materials_volume": {"thicknessFactor": m.thickness} if m.thickness > 0 else {},
             "KHR_materials_ior": {"ior": m.ior} if m.ior != plain.ior else {},
             "KHR_materials_emissive_strength": {"emissiveStrength": strength} if strength > 1.0 else {},
         }

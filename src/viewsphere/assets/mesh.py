@@ -79,6 +79,7 @@ class Material:
     transmission: float = 0.0
     transmission_texture: Texture | None = None
     ior: float = 1.5
+    thickness: float = 0.0  # of what transmits; 0: a thin sheet, which refracts nothing, else its surface bounds a solid
     specular: float = 1.0
     specular_texture: Texture | None = None
     specular_color: tuple[float, float, float] = (1.0, 1.0, 1.0)

@@ -24,6 +24,10 @@ FINE = 65_535
 """Steps of linear light in the table of sRGB values."""
 
 
+WALL = 0.003
+"""Metres: the glass of Blender's shaders refracts, however thick it is."""
+
+
 @dataclass(frozen=True)
 class Picture:
     """A picture that nodes use: its index in the folder's images, None where it cannot be used; sRGB or plain numbers."""
@@ -73,6 +77,7 @@ class _Work:
             **self._scalar("clearcoat", told["coat"]),
             **(self._scalar("clearcoat_roughness", told["coat_roughness"]) if told["coat"] != 0 else {}),
             **self._scalar("transmission", told["transmission"]),
+            thickness=WALL if told["transmission"] != 0 else 0.0,
             **self._scalar("specular", told["specular"]),
             specular_color=self._mean_color(told["specular_color"]),
             ior=min(max(self._mean(told["ior"]), 1.0), 4.0),

@@ -35,6 +35,7 @@ READ_EXTENSIONS = {
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 }
@@ -46,7 +47,6 @@ HARMLESS_EXTENSIONS = {
     "KHR_materials_iridescence",
     "KHR_materials_sheen",
     "KHR_materials_variants",
-    "KHR_materials_volume",
     "KHR_xmp",
     "KHR_xmp_json_ld",
 }

@@ -81,6 +81,9 @@ class _Reader:
         if glass is not None:
             found["transmission"] = glass.number("transmissionFactor", 0.0)
             found["transmission_texture"] = self.texture(glass, "transmissionTexture")
+        volume = entry.extension("KHR_materials_volume")
+        if volume is not None:
+            found["thickness"] = volume.number("thicknessFactor", 0.0)
         refraction = entry.extension("KHR_materials_ior")
         if refraction is not None:
             found["ior"] = refraction.number("ior", 1.5)

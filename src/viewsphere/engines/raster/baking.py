@@ -16,6 +16,7 @@ from viewsphere.engines._lamps import lamplight
 from viewsphere.engines.raster import kernels_paint
 from viewsphere.engines.raster.bounces import bake_bounces
 from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
+from viewsphere.engines.raster.glass import glass_of
 from viewsphere.engines.raster.halls import Halls
 from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
 from viewsphere.engines.raster.lights import Casters, Extent, bake_lights
@@ -146,6 +147,7 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
         see_through=packed.see_through,
         bounces=bounces,
         blended=packed.blended,
+        glass=glass_of(surfaces),
     )
 
 

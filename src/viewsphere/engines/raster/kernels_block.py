@@ -42,4 +42,7 @@ OX, OY, OZ, ONX, ONY, ONZ = range(84 * BLOCK, 90 * BLOCK, BLOCK)
 # vectors that begin in the row before.
 GLOW_R, GLOW_G, GLOW_B, INSIDE, PROBES = range(90 * BLOCK, 95 * BLOCK, BLOCK)
 KEPT = PROBES + 28 * BLOCK
-ROWS = 94 + 28 + 9 + 1
+# The light that solid glass bends towards the viewer (`kernels_bend`): its direction, then its radiance; what further surfaces
+# leave of it; how far it takes the place of the light from straight behind.
+BENT_X, BENT_Y, BENT_Z, STAIN_R, STAIN_G, STAIN_B, BENT = range((94 + 28 + 10) * BLOCK, (94 + 28 + 17) * BLOCK, BLOCK)
+ROWS = 94 + 28 + 17

@@ -23,6 +23,7 @@ BYTES = ir.VectorType(ir.IntType(8), LANES)
 ALIKE = 0.94  # cosine of the greatest angle, 20 degrees, between the planes of two pixels that pass for one surface
 LEVEL = 1.01  # greatest ratio of such a surface's depths in neighbouring pixels
 VISIBLE = f4(0.05)  # relative difference of radiance: about five steps of 8 bits
+SHARP = f4(0.2)  # the same within glass: such steps are borders of what it bends, finer than textures behind it
 DARK = f4(0.02)  # radiance below which differences are compared with this radiance
 TILE = 8  # pixels of a tile's side
 CLOSED = np.int32(2**31 - 1)
@@ -88,17 +89,32 @@ def compare_behind(slots, behind, behind_depth, triangle, depth, owner, normals,
         for q, is_there in sides:
             if not is_there or _passes(behind[p], behind[q], behind_depth[p], behind_depth[q], owner, normals):
                 continue
-            if _is_step(radiance, p, q) and _passes(shown[p], shown[q], level[p], level[q], owner, normals):
+            if _is_step(radiance, p, q, VISIBLE) and _passes(shown[p], shown[q], level[p], level[q], owner, normals):
                 marks[p], marks[q] = 1, 1
 
 
+@njit
+def compare_bent(bent, radiance, marks):
+    """Mark in marks (H * W,) pairs of neighbours of different colours that both show solid glass: bent (H, W) is not 0."""
+    height, width, one = U(bent.shape[0]), U(bent.shape[1]), U(1)
+    for y in range(height):
+        for x in range(width):
+            if bent[y, x] == 0:
+                continue
+            p = y * width + x
+            if x + one < width and bent[y, x + one] != 0 and _is_step(radiance, p, p + one, SHARP):
+                marks[p], marks[p + one] = 1, 1
+            if y + one < height and bent[y + one, x] != 0 and _is_step(radiance, p, p + width, SHARP):
+                marks[p], marks[p + width] = 1, 1
+
+
 @inner
-def _is_step(radiance, p, q):
-    """Whether two pixels' colours or alphas differ visibly."""
+def _is_step(radiance, p, q, least):
+    """Whether two pixels' colours or alphas differ by more than this share of the greater."""
     differs = False
     for c in range(U(4)):
         one, other = radiance[p, c], radiance[q, c]
-        differs |= abs(one - other) > VISIBLE * max(one, other, DARK)
+        differs |= abs(one - other) > least * max(one, other, DARK)
     return differs
 
 

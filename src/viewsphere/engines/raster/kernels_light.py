@@ -17,9 +17,10 @@ import numpy as np
 
 from viewsphere.engines.raster.kernels_blend import blend
 from viewsphere.engines.raster.kernels_block import (
-    ALPHA, BASE_R, BLOCK, BLUE, BOUNCE, COAT, COAT_ROUGH, CX, CY, CZ, DR, EDGE_R, ER, F0R,
+    ALPHA, BASE_R, BENT, BENT_X, BENT_Y, BENT_Z, BLOCK, BLUE, BOUNCE, COAT, COAT_ROUGH, CX, CY, CZ, DR, EDGE_R, ER, F0R,
     FACE_R, GLOW_R, GREEN, GX, GY, GZ, IB, IG, INSIDE, IR, LOBE, LX, LY, LZ, METAL, NX, NY, NZ, OPEN, OPENX, OPENY, RED,
-    RIM, ROUGH, SHARE, SR, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION, UNLIT, VX, VY, VZ, WIDTH,
+    RIM, ROUGH, SHARE, SR, STAIN_B, STAIN_G, STAIN_R, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION,
+    UNLIT, VX, VY, VZ, WIDTH,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_environment import ABOVE, BELOW, LAMPS, SCALE, TURN
 from viewsphere.engines.raster.kernels_views import add_near_light, near_light
@@ -300,6 +301,19 @@ def _look_through(b):
 
 
 @lanewise
+def _look_along_bend(b):
+    """T0 to T2 and T6 for the light that solid glass bends towards the viewer."""
+    b.put((T0, T1, T2), b.get(BENT_X, BENT_Y, BENT_Z))
+    b[T6] = b[ROUGH]
+
+
+@lanewise
+def _keep_bent(b):
+    stains = b.get(STAIN_R, STAIN_G, STAIN_B)
+    b.put((BENT_X, BENT_Y, BENT_Z), tuple(s * light * b[OPEN] for s, light in zip(stains, b.get(T3, T4, T5), strict=True)))
+
+
+@lanewise
 def _scatter(b):
     for k in range(0, 3 * BLOCK, BLOCK):
         b[DR + k] = b[DR + k] + b[BASE_R + k] * b[T3 + k] * b[OPEN]
@@ -327,40 +341,62 @@ def _shine_coat(b):
         b[SR + k] = b[SR + k] + shine * b[T3 + k]
 
 
+MATT, MIRROR, COATING, BENDING, BEHIND = range(5)
+
+
+@inner(fastmath=FAST)
+def _look(count, layer, b):
+    """T0 to T2 and T6 for the light that a layer receives."""
+    if layer == MATT:
+        _face(count, b)
+    elif layer == BENDING:
+        _look_along_bend(count, b)
+    elif layer == BEHIND:
+        _look_through(count, b)
+    else:
+        is_coat = layer == COATING
+        _mirror(count, U(CX if is_coat else NX), U(COAT_ROUGH if is_coat else ROUGH), b)
+
+
+@inner(fastmath=FAST)
+def _take(count, layer, is_bounced, b):
+    """Add what a layer sends to the viewer of the light T3 to T5."""
+    if layer == MATT and is_bounced:
+        _scatter_bounced(count, b)
+    elif layer == MATT:
+        _scatter(count, b)
+    elif layer == MIRROR:
+        _shine(count, b)
+    elif layer == COATING:
+        _shine_coat(count, b)
+    elif layer == BENDING:
+        _keep_bent(count, b)
+
+
 @inner(fastmath=FAST)
 def ambient(count, surrounding, bounces, b):
     """Add the light of the surroundings to DR to SB; the block must be weighed before. Reads OPEN and BOUNCE, and where light
     bounces what `kernels_bounce.bounced` fills.
 
-    Leaves in T3 to T5 the light behind a transmissive surface, and overwrites the rows of a light.
+    Leaves in T3 to T5 the light behind a transmissive surface, in BENT_X to BENT_Z that in the direction which they had, and
+    overwrites the rows of a light.
     """
     has_coat, has_glass, is_bounced = _any(count, COAT, b), _any(count, THROUGH, b), bounces.grid[0] > 0
+    is_bent = _any(count, BENT, b)
     columns = U(bounces.grid[2])
     across = U(bounces.grid[1]) * columns
-    # The order is matt, mirror, coat, behind; one loop around one call, so that the call is compiled once.
-    for layer in range(4):
-        if (layer == 2 and not has_coat) or (layer == 3 and not has_glass):
+    # One loop around one call, so that the call is compiled once.
+    for layer in range(BEHIND + 1):
+        if (layer == COATING and not has_coat) or (layer == BENDING and not is_bent) or (layer == BEHIND and not has_glass):
             continue
-        if layer == 0:
-            _face(count, b)
-        elif layer == 3:
-            _look_through(count, b)
-        else:
-            _mirror(count, U(CX if layer == 2 else NX), U(COAT_ROUGH if layer == 2 else ROUGH), b)
+        _look(count, layer, b)
         is_near = is_bounced and layer > 0
         if is_near:
             near_light(count, bounces.views, columns, across, b)
         light_around(count, surrounding, b)
         if is_near:
             add_near_light(count, b)
-        if layer == 0 and is_bounced:
-            _scatter_bounced(count, b)
-        elif layer == 0:
-            _scatter(count, b)
-        elif layer == 1:
-            _shine(count, b)
-        elif layer == 2:
-            _shine_coat(count, b)
+        _take(count, layer, is_bounced, b)
 
 
 @lanewise
@@ -371,18 +407,20 @@ def _compose(b):
     smooth = through * (1 - b[ROUGH] * b[ROUGH])
     tint = clamp(least(least(tints[0], tints[1]), tints[2]))
     clear = where(lights, most(smooth * tint, 0), 0)
-    shown = least(alpha * 8, 1)
+    shown, bent = least(alpha * 8, 1), b[BENT]
     for c, base in enumerate(tints):
         k = c * BLOCK
         behind = where(lights, b[T3 + k] * b[OPEN], 0)
-        b[T0 + k] = where(lights, smooth * alpha * (1 - unlit) * most(base - tint, 0), 0)
+        excess = where(lights, smooth * alpha * (1 - unlit) * most(base - tint, 0), 0)
+        b[T0 + k] = excess * (1 - bent)
         b[T3 + k] = behind
         body = b[DR + k] + most(through * base - clear, 0) * behind
         value = body * alpha + (b[SR + k] + b[ER + k]) * shown
         value = value + unlit * (base * alpha * UNEXPOSED - value)
+        value = value + bent * (excess * (b[BENT_X + k] - behind) + clear * alpha * (1 - unlit) * b[BENT_X + k])
         b[RED + k] = least(most(value, 0), BRIGHTEST)
     b[T7] = clear
-    b[ALPHA] = alpha * (1 - clear * (1 - unlit))
+    b[ALPHA] = alpha * (1 - clear * (1 - bent) * (1 - unlit))
 
 
 @inner
@@ -391,8 +429,9 @@ def compose(count, b):
 
     Thin glass transmits the background by the least of its three tints; the excess of the other two tints, T0 to T2, takes its
     light from the surroundings in the line of sight, T3 to T5, until `lay` puts the known background in their place. The
-    rougher the glass, the more of its light comes from the surroundings. A mirrored image does not become transparent with the
-    surface (glass made by alpha), unless the surface is all but clear. Call `compose` right after `ambient`.
+    rougher the glass, the more of its light comes from the surroundings, and as far as BENT says all of it: from where solid
+    glass bends it. A mirrored image does not become transparent with the surface (glass made by alpha), unless the surface is
+    all but clear. Call `compose` right after `ambient`.
     """
     _compose(count, b)
 

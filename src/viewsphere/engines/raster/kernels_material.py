@@ -85,9 +85,9 @@ U = nb.uintp
 (
     L_RED, L_GREEN, L_BLUE, L_ALPHA, L_ROUGH, L_ROUGH_TEXEL, L_METAL, L_METAL_TEXEL, L_ER, L_EG, L_EB, L_F0R, L_F0G, L_F0B,
     L_SPECULAR, L_COAT, L_COAT_ROUGH, L_TRANSMISSION, L_NORMAL, L_OCCLUSION, L_UNLIT, L_GROUND, L_CATCHER, L_BLENDED,
-    L_PER_LENGTH, L_SCENERY, L_CASTS_FROM,
-) = range(27)  # fmt: skip
-LOOKS = 27
+    L_PER_LENGTH, L_SCENERY, L_CASTS_FROM, L_BENDS,
+) = range(28)  # fmt: skip
+LOOKS = 28
 # Kinds of planes, four channels each, that a bundle of textures may have.
 BASE, BUMP, ROUGHNESS, GLOW, SPECULAR_COLOR, COAT_BUMP = range(6)
 # base colour and alpha | normal, occlusion | roughness, metallic, coat, transmission | emission, specular | specular colour,

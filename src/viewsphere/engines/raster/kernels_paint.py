@@ -6,6 +6,7 @@ import numba as nb
 import numpy as np
 
 from viewsphere.engines.raster.kernels_arrive import arrive
+from viewsphere.engines.raster.kernels_bend import bend
 from viewsphere.engines.raster.kernels_block import (
     ALPHA,
     AO,
@@ -172,17 +173,17 @@ def _lay_all(start, count, is_ground, slots, radiance, b):
 
 @njit(fastmath=FAST, _nrt=True)
 def shade(
-    view, surfaces, textures, floor, surrounding, lights, occlusion, bounces, is_ground, slots, triangle, depth, radiance
+    view, surfaces, textures, floor, surrounding, lights, occlusion, bounces, is_ground, slots, triangle, depth, glass, radiance
 ):
     """Shade the samples in `slots` (N,) int32 over `radiance` (S, 4) float32, premultiplied, in place.
 
     triangle (S,) int32 and depth (S,) float32 (inverse) are what each sample shows; all slots show the ground, or none does.
-    floor: see `painting.Baked`.
+    floor: see `painting.Baked`; glass: what bends the light behind the samples.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     is_matte = is_ground and floor[4] == f4(1)
-    is_bounced = bounces.grid[0] > 0
+    is_bounced, is_bent = bounces.grid[0] > 0, glass.corners.shape[0] > 0
     for start in range(0, slots.shape[0], BLOCK):
         count = min(slots.shape[0] - start, BLOCK)
         locate(view, start, count, slots, depth, b, own)
@@ -190,6 +191,8 @@ def shade(
             gather_ground(view, floor, count, b, which)
         else:
             gather(surfaces, count, triangle, b, own, which)
+        if is_bent:
+            bend(count, glass, surfaces.looks, b, which)
         if is_matte:
             start_matte(count, floor, b)
         else:

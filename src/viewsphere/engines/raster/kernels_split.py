@@ -9,6 +9,7 @@ import numba as nb
 import numpy as np
 
 from viewsphere.engines.raster.kernels_arrive import arrive
+from viewsphere.engines.raster.kernels_bend import bend
 from viewsphere.engines.raster.kernels_block import (
     ALPHA,
     BASE_R,
@@ -107,11 +108,14 @@ def _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, 
 
 
 @njit(fastmath=FAST, _nrt=True)
-def split(view, surfaces, textures, floor, surrounding, lights, occlusion, bounces, is_ground, slots, triangle, depth, out):
+def split(
+    view, surfaces, textures, floor, surrounding, lights, occlusion, bounces, is_ground, slots, triangle, depth, glass, out
+):
     """Lay the parts of the samples in `slots` (N,) int32 over `out` (S, 6 or 9) float32; arguments as in `shade`."""
     b, p = np.zeros(ROWS * BLOCK, np.float32), np.zeros((COLUMNS + 1) * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     is_matte, is_lit = is_ground and floor[4] == f4(1), out.shape[1] == COLUMNS
+    is_bent = glass.corners.shape[0] > 0
     for start in range(0, slots.shape[0], BLOCK):
         count = min(slots.shape[0] - start, BLOCK)
         locate(view, start, count, slots, depth, b, own)
@@ -119,6 +123,8 @@ def split(view, surfaces, textures, floor, surrounding, lights, occlusion, bounc
             gather_ground(view, floor, count, b, which)
         else:
             gather(surfaces, count, triangle, b, own, which)
+        if is_bent:
+            bend(count, glass, surfaces.looks, b, which)
         if is_matte:
             start_matte(count, floor, b)
         else:

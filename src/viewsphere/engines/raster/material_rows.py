@@ -39,6 +39,7 @@ def material_row(
     row[column.L_SPECULAR] = m.specular
     row[column.L_COAT], row[column.L_COAT_ROUGH] = m.clearcoat, m.clearcoat_roughness
     row[column.L_TRANSMISSION] = m.transmission
+    row[column.L_BENDS] = max(m.ior, 1.0) if m.thickness > 0 and m.transmission > 0 else 0.0
     row[column.L_NORMAL], row[column.L_OCCLUSION] = m.normal_scale, m.occlusion_strength
     row[column.L_UNLIT], row[column.L_GROUND], row[column.L_CATCHER] = float(m.unlit), float(ground), float(catcher)
     row[column.L_BLENDED] = float(m.alpha_mode == "BLEND")

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.raster import kernels_paint, kernels_split
+from viewsphere.engines.raster import kernels_chosen, kernels_paint, kernels_split
 from viewsphere.engines.raster.environment import Surrounding, sky_behind
+from viewsphere.engines.raster.glass import NO_GLASS, Glass
+from viewsphere.engines.raster.kernels_material import L_BENDS
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.occlusion import Occlusion
 from viewsphere.engines.raster.records import Bounces, Float32, Int32, PictureRays, Surfaces, Textures
@@ -52,6 +54,7 @@ class Baked:
     owner: Int32
     see_through: NDArray[np.bool_]
     blended: Geometry
+    glass: Glass
 
     @property
     def catches(self) -> bool:
@@ -85,6 +88,9 @@ def paint(
     if not antialias:
         return
     behind = differs_behind(visibility, stack, baked.owner, baked.geometry.triangle_normals, radiance)
+    if len(baked.glass.corners) and stack:
+        bent = _nearest_glass(baked, stack, len(triangle)) < len(stack)
+        kernels_chosen.compare_bent(bent.reshape(visibility.triangle.shape), radiance, behind)
     samples = edge_samples(baked.geometry, camera, visibility, baked.owner, behind)
     if samples is not None:
         _smooth(baked, camera, visibility, samples, behind, has_sky, radiance, split, fog)
@@ -189,6 +195,7 @@ def shade_all(
     pixels = None if samples is None else samples.pixels
     stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
     reached = depth.copy()  # 1/depth up to which light has come
+    first = _nearest_glass(baked, stack, len(triangle))
     for i, layer in enumerate(stack):
         if air is not None and i > 0:
             on = layer.slot
@@ -196,12 +203,24 @@ def shade_all(
         reached[layer.slot] = layer.inverse_depth
         behind, behind_depth = triangle.copy(), depth.copy()
         behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
-        is_ground = baked.kind[layer.triangle] == kernels_paint.FLOOR
+        is_ground, is_bent = baked.kind[layer.triangle] == kernels_paint.FLOOR, first[layer.slot] == i
         for which in (False, True):
-            _shade_some(baked, view, layer.slot[is_ground == which], which, behind, behind_depth, radiance, split)
+            slots = layer.slot[(is_ground == which) & ~is_bent]
+            _shade_some(baked, view, slots, which, behind, behind_depth, radiance, split)
+        _shade_some(baked, view, layer.slot[is_bent], False, behind, behind_depth, radiance, split, baked.glass)
     if air is not None:
         air.veil(radiance, air.depth(reached))
     return stack
+
+
+def _nearest_glass(baked: Baked, stack: list[Layer], count: int) -> NDArray[np.uint8]:
+    """Of each sample (S,): in which layer it sees solid glass first, their number where in none."""
+    first = np.full(count, len(stack), np.uint8)
+    if len(baked.glass.corners):
+        bends = baked.surfaces.looks[:, L_BENDS] > 0
+        for i, layer in enumerate(stack):
+            first[layer.slot[bends[baked.surfaces.material[layer.triangle]]]] = i
+    return first
 
 
 def _lay_sky(view: PictureRays, surrounding: Surrounding, radiance: Float32, air: Air | None) -> None:
@@ -229,6 +248,7 @@ def _shade_some(
     depth: Float32,
     radiance: Float32,
     split: Float32,
+    glass: Glass = NO_GLASS,
 ) -> None:
     if len(slots) == 0:
         return
@@ -236,7 +256,7 @@ def _shade_some(
     if is_ground and baked.catches:
         kernels_paint.catch(view, baked.floor, *light, *seen, radiance)
         return
-    given = view, baked.surfaces, baked.textures, baked.floor, *light, baked.bounces, is_ground, *seen
+    given = view, baked.surfaces, baked.textures, baked.floor, *light, baked.bounces, is_ground, *seen, glass
     kernels_paint.shade(*given, radiance)
     if len(split):
         kernels_split.split(*given, split)
