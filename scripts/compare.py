@@ -1,4 +1,4 @@
-"""Compares the raster engine with Blender's Cycles: five scenes with equal lights, rendered by both, shown side by side with
+"""Compares the raster engine with Blender's Cycles: six scenes with equal lights, rendered by both, shown side by side with
 FLIP and SSIM.
 
 Cycles runs in the Python that viewsphere finds (VIEWSPHERE_BLENDER_PYTHON, or the extra `blender`). Both pictures go
@@ -44,6 +44,9 @@ from viewsphere.surroundings.ground import ground_material
 from viewsphere.surroundings.slab_picture import laid_with_slabs
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
+from viewsphere.zoo.household.vessels import vessel
+from viewsphere.zoo.shapes.assembly import Piece, assemble
+from viewsphere.zoo.shapes.solids import join, lathe
 
 WIDTH, HEIGHT = 480, 360
 MEASURES = {"flip_evaluator": "flip-evaluator", "skimage": "scikit-image"}
@@ -87,6 +90,32 @@ def pane() -> Mesh:
     )
 
 
+def turned_glass(*profiles: np.ndarray[Any, Any]) -> Mesh:
+    """A body of clear glass, made of profiles (N, 2) of radius and height, in metres."""
+    glass = Material("glass", (0.97, 0.985, 0.975, 1.0), roughness=0.0, transmission=1.0, thickness=0.003)
+    return assemble([Piece("glass", glass, join(*(lathe(profile, 72) for profile in profiles)))], crease_deg=35)
+
+
+def tumbler() -> Mesh:
+    """A drinking glass, 11 cm high, with a wall of 2.5 mm and a floor of 1 cm."""
+    z = np.linspace(0, 1, 12)
+    made = vessel(np.stack([0.037 * (0.8 + 0.2 * z), 0.11 * z], axis=1), 0.0025, 0.01, 0.002)
+    return turned_glass(made.foot, made.wall, made.lip, made.inside)
+
+
+def glass_bowl() -> Mesh:
+    """A bowl, 14 cm wide."""
+    turn = np.linspace(0, np.pi / 2, 14)
+    made = vessel(np.stack([0.03 + 0.04 * np.sin(turn), 0.06 * (1 - np.cos(turn))], axis=1), 0.003, 0.006, 0.002)
+    return turned_glass(made.foot, made.wall, made.lip, made.inside)
+
+
+def glass_ball() -> Mesh:
+    """A solid ball, 8 cm wide."""
+    turn = np.linspace(-np.pi / 2, np.pi / 2, 40)
+    return turned_glass(0.04 * np.stack([np.cos(turn), 1 + np.sin(turn)], axis=1).clip(0))
+
+
 def cases(folder: Path) -> Iterator[Case]:
     sky = Environment(file=str(folder / "sky.exr"))
     even = Sky(zenith=(0.5, 0.55, 0.6), horizon=(0.5, 0.55, 0.6))
@@ -111,6 +140,13 @@ def cases(folder: Path) -> Iterator[Case]:
     yield Case("hair drier", ((drier, (0, 0, 0)),), lit, -30, 25, 0.75)
     box = textured(replace(build("wheelie_bin", np.random.default_rng(1)), colors=None), 512)
     pair = ((box, (0, 0.4, 0)), (pane(), (0.35, -0.5, 0.45)))
+    still_life = ((tumbler(), (-0.12, -0.05, 0)), (glass_ball(), (-0.03, -0.1, 0)), (glass_bowl(), (0.09, -0.07, 0)))
+    around = (
+        (build("mug", np.random.default_rng(3)), (-0.19, 0.14, 0)),
+        (build("book", np.random.default_rng(5)), (0.03, 0.2, 0)),
+    )
+    lit = Scene(sun=Sun(angle_deg=3.0, strength=1.5), sky=sky, ground=Ground(color=(0.5, 0.42, 0.33)))
+    yield Case("clear glass", still_life + around, lit, 5, 18, 0.85)
     yield Case("glass and textures", pair, Scene(sun=None, sky=sky, ground=ground), 20, 18, 4.0)
 
 

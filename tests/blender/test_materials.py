@@ -59,6 +59,7 @@ FURNACE = {
     "metal": Material(base_color=WHITE, roughness=0.3, metallic=1.0),
     "coated": Material(base_color=WHITE, roughness=0.6, clearcoat=1.0, clearcoat_roughness=0.2),
     "glass": Material(base_color=WHITE, roughness=0.0, transmission=1.0),
+    "solid glass": Material(base_color=WHITE, roughness=0.0, transmission=1.0, thickness=0.01),
 }
 for name, material in FURNACE.items():
     SCENES[f"furnace {name}"] = Scene((ball(material),), camera((16, 16), 16.0, distance=4))
@@ -87,6 +88,7 @@ CASTERS = {
     "opaque": matte(base_color=(0, 0, 0, 1)),
     "unlit": unlit(),
     "glass": GLASS,
+    "solid glass": replace(GLASS, thickness=0.01),
     "half": matte(base_color=(0, 0, 0, 0.5), alpha_mode="BLEND"),
 }
 FLOOR = rectangle((-2, -2, -1), (4, 0, 0), (0, 4, 0), matte(base_color=(0.1, 0.1, 0.1, 1)))  # lights little itself
@@ -107,7 +109,8 @@ def test_shadows_are_as_light_as_what_casts_them(seen):
     np.testing.assert_allclose(middle(seen["shadow nothing"]), lit, rtol=1e-3)
     np.testing.assert_allclose(middle(seen["shadow opaque"]), 0, atol=1e-4)
     np.testing.assert_allclose(middle(seen["shadow half"]), lit / 2, rtol=0.02)
-    np.testing.assert_allclose(middle(seen["shadow glass"]), lit * (1 - fresnel(0.8, 1.5)) * np.array(COLOR[:3]), rtol=0.02)
+    for glass in ("shadow glass", "shadow solid glass"):
+        np.testing.assert_allclose(middle(seen[glass]), lit * (1 - fresnel(0.8, 1.5)) * np.array(COLOR[:3]), rtol=0.02)
 
 
 def test_unlit_surfaces_cast_shadows_and_light_nothing(seen):
@@ -135,6 +138,21 @@ for name, material in {
     SCENES[f"cut out {name}"] = Scene((amber,), CLOSE, transparent=True, samples=256)
 SCENES["through a veil"] = Scene((VEIL, card(GREY, y=0.5)), CLOSE, sky=0.0, samples=256)
 SCENES["veil"] = Scene((VEIL,), CLOSE, sky=0.0, transparent=True, samples=64)
+
+
+RIGHT = rectangle((0, 4, -6), (6, 0, 0), (0, 0, 12), GREY)
+for name, thickness in (("thin ball", 0.0), ("solid ball", 0.01)):
+    one = ball(replace(GLASS, base_color=WHITE, thickness=thickness))
+    SCENES[name] = Scene((one, RIGHT), camera((16, 16), 20.0, distance=4), sky=0.0, samples=64)
+
+
+def test_a_solid_ball_shows_its_background_the_other_way_round(seen):
+    """Behind its right half there is a card."""
+    thin, solid = (seen[name][6:10, 5:11, :3].mean(axis=(0, 2)) for name in ("thin ball", "solid ball"))
+    assert thin[:2].max() < 0.05
+    assert thin[-2:].min() > 0.5
+    assert solid[:2].min() > 0.5
+    assert solid[-2:].max() < 0.05
 
 
 @pytest.mark.parametrize("name", ["through glass", "through its back"])

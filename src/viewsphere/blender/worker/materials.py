@@ -7,10 +7,12 @@ reflectance at normal incidence and 1, a clear coat of ior 1.5. Beside it:
 - Occlusion textures are left out: light that does not reach a crevice does not reach it here.
 - Reflections and emission of a BLEND material stay when its alpha falls (glass is often made by alpha), except where the
   material is almost clear. A material that transmits is never cut out: labels count it as solid, too.
-- Transmitting surfaces are thin and refract nothing: the light from straight behind passes, tinted by the base colour, and
-  the square of the roughness is the share of it that is scattered. Shadow rays pass in the same way, so clear glass casts
-  light shadows. A picture's alpha has no colours: where a background is laid behind a finished picture, the background
-  shows by the smallest of the three tints, and the surplus of the other two is filled with light of the surroundings.
+- Transmitting surfaces without a thickness are thin and refract nothing: the light from straight behind passes, tinted by the
+  base colour, and the square of the roughness is the share of it that is scattered. A picture's alpha has no colours: where a
+  background is laid behind a finished picture, the background shows by the smallest of the three tints, and the surplus of the
+  other two is filled with light of the surroundings.
+- Those with a thickness refract, however thick what they bound is; in a picture's alpha they are opaque.
+- Shadow rays pass both straight on, as through thin glass, so clear glass casts light shadows.
 - Unlit colours are seen as they are, from the camera and in mirrors; they light nothing and cast shadows.
 - All surfaces have two sides.
 """
@@ -239,7 +241,10 @@ def _lit(graph, told, look, is_traced):
         shine = _principled(graph, told, look, graph.shades(look.color, look.metallic))
     body = None if look.transmission == 1 else _principled(graph, told, look, look.color)
     if has_glass:
-        body = graph.mix(look.transmission, body, graph.add(shine, _through(graph, told, look, is_traced)))
+        thin = graph.add(shine, _through(graph, told, look, is_traced))
+        body = graph.mix(
+            look.transmission, body, _solid(graph, told, look, thin) if is_traced and told["thickness"] > 0 else thin
+        )
     surface = _veiled(graph, look.alpha, body)
     return graph.add(surface, graph.mix(_more_shine(graph, look.alpha), None, shine)) if is_blended else surface
 
@@ -254,8 +259,8 @@ def _more_shine(graph, alpha):
     return graph.product(graph.math("SUBTRACT", shown, alpha), camera)
 
 
-def _principled(graph, told, look, color):
-    """The opaque surface; with a black base colour a dielectric only mirrors and emits."""
+def _principled(graph, told, look, color, transmission=0.0):
+    """The opaque surface, or that of a solid that transmits; with a black base colour a dielectric only mirrors and emits."""
     reflectance = _reflectance(told)
     inputs = {
         "Base Color": color,
@@ -264,6 +269,7 @@ def _principled(graph, told, look, color):
         "IOR": _ior(reflectance),
         "Specular IOR Level": graph.product(0.5, look.specular),
         "Specular Tint": look.tint,
+        "Transmission Weight": transmission,
     }
     if look.normal is not None:
         inputs["Normal"] = look.normal
@@ -274,6 +280,17 @@ def _principled(graph, told, look, color):
     if look.emission != (0, 0, 0):
         inputs |= {"Emission Color": look.emission, "Emission Strength": 1.0}
     return graph.node("ShaderNodeBsdfPrincipled", inputs, distribution="MULTI_GGX").outputs[0]
+
+
+def _solid(graph, told, look, thin):
+    """The surface of solid glass, which refracts what eyes and mirrors see. To shadow rays it is thin, and so to the rays that
+    look for light from scattering surfaces: they would find once more the light that shadow rays have let through.
+    """
+    # The node tints what passes by the root of its colour.
+    squared = graph.vector("MULTIPLY", look.color, look.color)
+    bulk = _principled(graph, told, look, squared, transmission=1.0)
+    path = graph.node("ShaderNodeLightPath").outputs
+    return graph.mix(graph.math("MAXIMUM", path["Is Shadow Ray"], path["Is Diffuse Ray"]), bulk, thin)
 
 
 def _through(graph, told, look, is_traced):
