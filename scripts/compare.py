@@ -40,7 +40,7 @@ from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, S
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.sampling.camera import looking
-from viewsphere.surroundings.ground import ground_material
+from viewsphere.surroundings.ground import SLABS, ground_material
 from viewsphere.surroundings.slab_picture import laid_with_slabs
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
@@ -171,12 +171,16 @@ def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
 
 
 def floor(ground: Ground, folder: Path) -> dict[str, Any]:
-    """The slabs as a picture that repeats, which Cycles needs: the file, the linear colour that multiplies it, and metres."""
+    """The slabs as a picture that repeats, which Cycles needs: the file, the linear colour that multiplies it, metres, and by
+    how many repeats it is moved from the world's origin.
+    """
     material, (picture,) = laid_with_slabs(ground_material(ground)[0])
     assert material.base_color_texture is not None
     file = folder / "slabs.png"
     Image.fromarray(picture.pixels).save(file)
-    return {"image": str(file), "color": material.base_color[:3], "repeat": ground.tile / material.base_color_texture.scale[0]}
+    scale = material.base_color_texture.scale[0]
+    middle = 0.5 / SLABS * scale  # as `ground_frame` has it
+    return {"image": str(file), "color": material.base_color[:3], "repeat": ground.tile / scale, "shift": middle}
 
 
 def describe(case: Case, folder: Path) -> None:

@@ -48,7 +48,7 @@ def add_model(scene, file, matrix):
             node.matrix_world = Matrix(matrix) @ node.matrix_world
 
 
-def add_ground(scene, z, image, color, repeat, size=2000.0):
+def add_ground(scene, z, image, color, repeat, shift, size=2000.0):
     mesh = bpy.data.meshes.new("ground")
     mesh.from_pydata([(-size, -size, z), (size, -size, z), (size, size, z), (-size, size, z)], [], [(0, 1, 2, 3)])
     material = bpy.data.materials.new("ground")
@@ -59,8 +59,9 @@ def add_ground(scene, z, image, color, repeat, size=2000.0):
     place, picture = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeTexImage")
     picture.image = bpy.data.images.load(image, check_existing=True)
     in_repeats, tinted = tree.nodes.new("ShaderNodeVectorMath"), tree.nodes.new("ShaderNodeVectorMath")
-    in_repeats.operation = tinted.operation = "MULTIPLY"
+    in_repeats.operation, tinted.operation = "MULTIPLY_ADD", "MULTIPLY"
     in_repeats.inputs[1].default_value, tinted.inputs[1].default_value = (1 / repeat,) * 3, color
+    in_repeats.inputs[2].default_value = shift, -shift, 0
     tree.links.new(place.outputs["Position"], in_repeats.inputs[0])
     tree.links.new(in_repeats.outputs[0], picture.inputs["Vector"])
     tree.links.new(picture.outputs["Color"], tinted.inputs[0])
