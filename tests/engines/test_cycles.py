@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import threading
@@ -14,7 +15,8 @@ from cycles_scenes import DRAFT, HAIR_DRIER, asked, moved_camera, recipe_of, shi
 
 from viewsphere import render
 from viewsphere.assets.srgb import linear
-from viewsphere.engines._blender.staging import border_of, keeper_of
+from viewsphere.engines._blender.border import border_of
+from viewsphere.engines._blender.staging import keeper_of
 from viewsphere.errors import UserError
 from viewsphere.truth.visibility import rasterize
 
@@ -164,9 +166,14 @@ def test_what_this_blender_lacks_is_one_line(engine, said):
     assert "\n" not in str(caught.value)
 
 
-def test_a_border_changes_no_pixel():
+@pytest.mark.parametrize("how", ["beside the middle", "beside the picture and behind the camera"])
+def test_a_border_changes_no_pixel(how):
     stage = stage_of(recipe_of(DRAFT | {"denoise": "off"}))
     camera = moved_camera(stage.shot, (0.12, 0.0, 0.03))
+    if how != "beside the middle":
+        camera = dataclasses.replace(camera, t=camera.t + np.array([0.1, 0.0, -0.8]))
+        depth = stage.geometry.vertices @ camera.R[2] + camera.t[2]
+        assert depth.min() < 0 < depth.max()
     border = border_of(stage.geometry, camera)
     x0, y0, x1, y1 = border
     assert 0 < (x1 - x0) * (y1 - y0) < 0.6 * camera.width * camera.height

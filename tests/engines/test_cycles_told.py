@@ -8,17 +8,21 @@ import sys
 import numpy as np
 import pytest
 from cycles_scenes import recipe_of, stages
+from light_stage import flat
 
 from viewsphere import plan
 from viewsphere.engines import cycles
+from viewsphere.engines._blender.border import AROUND, border_of
 from viewsphere.engines._blender.lens import resampled, views_of
 from viewsphere.engines._blender.options import PRESETS, Options, parse_options
 from viewsphere.engines._blender.requests import scene_request
-from viewsphere.engines._blender.staging import border_of
 from viewsphere.errors import MissingExtraError, RecipeError, UserError, ViewsphereError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import build_geometry
+from viewsphere.truth.visibility import rasterize
 
 WIDE = {"width": 80, "height": 60, "cx": 37.0, "cy": 33.0}
 BARREL = Distortion(model="brown_conrady", coefficients=(-0.2, 0.03, 0.001, -0.002))
@@ -163,5 +167,41 @@ def test_a_border_holds_all_that_is_seen():
     assert x0 <= max(x.min(), 0) and y0 <= max(y.min(), 0)
     assert x1 >= min(x.max(), pose.width) and y1 >= min(y.max(), pose.height)
     assert x1 - x0 < np.ptp(x) + 8 and y1 - y0 < np.ptp(y) + 8
-    inside = Camera(pose.intrinsics, pose.R, np.zeros(3))
-    assert border_of(geometry, inside) is None
+    around = Camera(pose.intrinsics, pose.R, np.zeros(3))
+    assert border_of(geometry, around) == (0, 0, pose.width, pose.height)
+
+
+@pytest.mark.parametrize("kind", ["one", "huge", "two things", "behind", "none"])
+def test_a_border_is_the_box_of_what_is_seen(kind):
+    """Triangles anywhere, around and behind the camera; what is seen is drawn eight times as fine."""
+    rng = np.random.default_rng(5)
+    thing = Thing(id=1, model=ModelSpec(key="a", source="a", category="thing", category_id=1))
+    fine, close = 8, []
+    for _ in range(40):
+        soup = rng.normal(size=(2, 3, 3)) * (1e3 if kind == "huge" else 2.0)
+        soup[:, :, 1] *= -1 if kind == "behind" else 1
+        if kind == "behind":
+            soup[:, :, 1] = -np.abs(soup[:, :, 1]) - 0.1
+        meshes = [flat(triangles[None]) for triangles in (soup if kind == "two things" else soup[: 0 if kind == "none" else 1])]
+        things = [thing.model_copy(update={"id": i + 1}) for i in range(len(meshes))]
+        geometry = build_geometry(things, meshes, False, 0.5)
+        eye = Camera(
+            Intrinsics(width=24, height=18, fx=20, fy=20, cx=11.3, cy=9.2),
+            np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+            np.zeros(3),
+        )
+        lens = eye.intrinsics
+        large = lens.model_copy(
+            update={name: getattr(lens, name) * fine for name in ("width", "height", "fx", "fy", "cx", "cy")}
+        )
+        seen = rasterize(geometry, Camera(large, eye.R, eye.t)).triangle >= 0
+        x0, y0, x1, y1 = border_of(geometry, eye)
+        if not seen.any():
+            assert (x1 - x0) <= 2 * AROUND + 1 or (y1 - y0) <= 2 * AROUND + 1
+            continue
+        rows, columns = (np.flatnonzero(seen.any(axis=axis)) / fine for axis in (1, 0))
+        for low, high, begin, end in ((x0, x1, columns[0], columns[-1]), (y0, y1, rows[0], rows[-1])):
+            assert low <= begin and high >= end
+            close.append(low >= begin - 2 * AROUND - 1.5 and high <= end + 2 * AROUND + 1.5)
+    assert len(close) > 10 or kind in ("behind", "none")
+    assert sum(close) >= 0.95 * len(close)  # but for tips that are too thin to be drawn

@@ -19,7 +19,8 @@ from cycles_scenes import moved_camera, recipe_of, shift_between, stage_of
 from viewsphere import render
 from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import probe
-from viewsphere.engines._blender.staging import Keeper, border_of, clip_of, keeper_of
+from viewsphere.engines._blender.border import border_of
+from viewsphere.engines._blender.staging import Keeper, clip_of, keeper_of
 from viewsphere.errors import UserError
 from viewsphere.truth.visibility import rasterize
 

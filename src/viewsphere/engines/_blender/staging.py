@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
@@ -18,6 +17,7 @@ from viewsphere.blender.interpreter import GRAPHICS, find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.engines._arranged import Arrangements
 from viewsphere.engines._blender.backdrop import Backdrop
+from viewsphere.engines._blender.border import border_of
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.lens import resampled, views_of
 from viewsphere.engines._blender.options import AnyOptions, options_of
@@ -37,7 +37,7 @@ from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, pi
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility, homogeneous
+from viewsphere.truth.visibility import Visibility
 
 STAGE_SECONDS = 600.0
 """Seconds after which a Blender that has not built its scene counts as hanging."""
@@ -54,9 +54,6 @@ NEAREST, FARTHEST = 1e-3, 1e7
 
 SPARE = 4.0
 """Factor by which the clipping range of cameras that draw exceeds the depths seen at the centres of pixels, at both ends."""
-
-AROUND = 2
-"""Pixels by which Blender's pixel filter spreads a surface."""
 
 COMPONENTS = {"picture": 4, "light": 12, "objects": 3, "materials": 2}
 """What a render gives, and how many numbers of each pixel: radiance and alpha; albedo, diffuse light, all other light and
@@ -411,20 +408,6 @@ def camera_request(camera: Camera, clip: Clip = (NEAREST, FARTHEST)) -> dict[str
         "near": clip[0],
         "far": clip[1],
     }
-
-
-def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int] | None:
-    """Pixels x0, y0, x1, y1 outside of which a pinhole without skew sees nothing of the scene; None where part of the scene
-    is beside or behind the camera.
-    """
-    used = geometry.triangles.reshape(-1)
-    q = homogeneous(geometry, camera)[used]
-    if not len(q) or not (q[:, 2] > 0).all():
-        return None
-    x, y = q[:, 0] / q[:, 2], q[:, 1] / q[:, 2]
-    left, top = max(math.floor(x.min()) - AROUND, 0), max(math.floor(y.min()) - AROUND, 0)
-    right = min(math.ceil(x.max()) + AROUND, camera.width)
-    return left, top, right, min(math.ceil(y.max()) + AROUND, camera.height)
 
 
 def build_stage(shot: Shot, load: Load) -> CyclesStage:

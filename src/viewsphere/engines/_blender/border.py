@@ -1,0 +1,57 @@
+"""The part of a picture in which anything can be seen."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.model.camera import Camera
+from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.visibility import homogeneous
+
+Float = NDArray[np.float64]
+
+AROUND = 2
+"""Pixels by which Blender's pixel filter spreads a surface."""
+
+
+def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int]:
+    """Pixels x0, y0, x1, y1 outside of which a pinhole without skew sees nothing of the scene; all 0 where it sees nothing."""
+    width, height = camera.width, camera.height
+    # Twice of each side: room for what the filter spreads into the picture. Where all hold, z is positive.
+    sides = np.array([(1, 0, AROUND), (-1, 0, width + AROUND), (0, 1, AROUND), (0, -1, height + AROUND)], float)
+    vertices = homogeneous(geometry, camera, 0, len(geometry.vertices))  # also of things that lie beside the picture
+    places = vertices[:, :3]
+    is_within = (places @ sides.T >= 0)[geometry.triangles]
+    is_whole = is_within.all(axis=(1, 2))
+    is_cut = ~is_whole & np.logical_and.reduce(is_within.any(axis=1), axis=1)
+    whole, cut = places[geometry.triangles[is_whole]], _clipped(places[geometry.triangles[is_cut]], sides)
+    seen = np.concatenate([whole.reshape(-1, 3), cut.reshape(-1, 3)])
+    seen = seen[seen[:, 2] > 0]
+    if not len(seen):
+        return 0, 0, 0, 0
+    place = seen[:, :2] / seen[:, 2:]
+    left, top = (max(math.floor(low) - AROUND, 0) for low in place.min(axis=0))
+    right, bottom = (math.ceil(high) + AROUND for high in place.max(axis=0))
+    return left, top, min(right, width), min(bottom, height)
+
+
+def _clipped(polygons: Float, sides: Float) -> Float:
+    """What lies within all sides of convex polygons (N, K, 3), which have corners more than once where others have more (M, L,
+    3) (Sutherland and Hodgman 1974).
+    """
+    for side in sides:
+        after = np.roll(polygons, -1, axis=1)
+        here, there = polygons @ side, after @ side
+        crosses = (here >= 0) != (there >= 0)
+        share = np.where(crosses, here / np.where(crosses, here - there, 1), 0)
+        cut = polygons + (after - polygons) * share[..., None]
+        corners = np.stack([polygons, cut], axis=2).reshape(len(polygons), 2 * polygons.shape[1], 3)
+        is_kept = np.stack([here >= 0, crosses], axis=2).reshape(corners.shape[:2])
+        corners, is_kept = corners[is_kept.any(axis=1)], is_kept[is_kept.any(axis=1)]
+        order = np.argsort(~is_kept, axis=1, kind="stable")[:, : max(int(is_kept.sum(axis=1).max(initial=0)), 1)]
+        first = np.where(np.take_along_axis(is_kept, order, axis=1), order, order[:, :1])
+        polygons = np.take_along_axis(corners, first[..., None], axis=1)
+    return polygons
