@@ -22,13 +22,15 @@ def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int]:
     width, height = camera.width, camera.height
     # Twice of each side: room for what the filter spreads into the picture. Where all hold, z is positive.
     sides = np.array([(1, 0, AROUND), (-1, 0, width + AROUND), (0, 1, AROUND), (0, -1, height + AROUND)], float)
-    vertices = homogeneous(geometry, camera, 0, len(geometry.vertices))  # also of things that lie beside the picture
-    places = vertices[:, :3]
-    is_within = (places @ sides.T >= 0)[geometry.triangles]
-    is_whole = is_within.all(axis=(1, 2))
-    is_cut = ~is_whole & np.logical_and.reduce(is_within.any(axis=1), axis=1)
-    whole, cut = places[geometry.triangles[is_whole]], _clipped(places[geometry.triangles[is_cut]], sides)
-    seen = np.concatenate([whole.reshape(-1, 3), cut.reshape(-1, 3)])
+    places = homogeneous(geometry, camera, 0, len(geometry.vertices))[:, :3]  # also of things that lie beside the picture
+    x, y, z = places.T
+    beyond = np.zeros(len(places), np.uint8)  # the sides beyond which a vertex lies, a bit each
+    for bit, (across, down, room) in enumerate(sides):
+        beyond |= (across * x + down * y + room * z < 0).astype(np.uint8) << bit
+    a, b, c = beyond[geometry.triangles.T]
+    is_cut, is_used = ((a | b | c) != 0) & ((a & b & c) == 0), np.zeros(len(places), bool)
+    is_used[geometry.triangles[(a | b | c) == 0]] = True
+    seen = np.concatenate([places[is_used], _clipped(places[geometry.triangles[is_cut]], sides)])
     seen = seen[seen[:, 2] > 0]
     if not len(seen):
         return 0, 0, 0, 0
@@ -39,8 +41,9 @@ def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int]:
 
 
 def _clipped(polygons: Float, sides: Float) -> Float:
-    """What lies within all sides of convex polygons (N, K, 3), which have corners more than once where others have more (M, L,
-    3) (Sutherland and Hodgman 1974).
+    """The corners (M, 3), some of them more than once, of what lies within all sides of convex polygons (N, K, 3).
+
+    Sutherland and Hodgman, Reentrant Polygon Clipping, 1974.
     """
     for side in sides:
         after = np.roll(polygons, -1, axis=1)
@@ -54,4 +57,4 @@ def _clipped(polygons: Float, sides: Float) -> Float:
         order = np.argsort(~is_kept, axis=1, kind="stable")[:, : max(int(is_kept.sum(axis=1).max(initial=0)), 1)]
         first = np.where(np.take_along_axis(is_kept, order, axis=1), order, order[:, :1])
         polygons = np.take_along_axis(corners, first[..., None], axis=1)
-    return polygons
+    return polygons.reshape(-1, 3)
