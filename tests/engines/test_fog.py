@@ -10,11 +10,12 @@ from light_stage import flat, quad
 from test_physics import camera, stage_of
 
 from viewsphere.assets.mesh import Material
+from viewsphere.engines._blender.veiling import veil
 from viewsphere.engines.raster.painting import paint
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.imaging.air import Air
 from viewsphere.imaging.view import EXPOSURE
-from viewsphere.model.scene import Scene, Sky, Sun
+from viewsphere.model.scene import Ground, Scene, Sky, Sun
 from viewsphere.model.weather import CONTRAST, Fog
 from viewsphere.surroundings.weather import METERED, clouded, floor_light, in_fog
 from viewsphere.truth.visibility import rasterize
@@ -26,11 +27,11 @@ VIEW = camera(16, 16, 9, 0, 90, 7)  # from 7 m above the origin straight down
 UNLIT = Material(base_color=(*COLOR, 1.0), unlit=True)
 
 
-def light(meshes, fog, view=VIEW, has_sky=True, antialias=True):
+def light(meshes, fog, view=VIEW, has_sky=True, antialias=True, ground=None, is_outdoors=False):
     """What a camera sees (H * W, 4), and its visibility."""
-    stage = stage_of(meshes, Scene(sun=None))
+    stage = stage_of(meshes, Scene(sun=None, ground=ground))
     seen, radiance = rasterize(stage.at(0), view), np.empty((view.width * view.height, 4), np.float32)
-    paint(stage.baked(0), view, seen, antialias, has_sky, radiance, fog=fog)
+    paint(stage.baked(0), view, seen, antialias, has_sky, radiance, fog=fog, is_outdoors=is_outdoors)
     return radiance, seen
 
 
@@ -87,6 +88,46 @@ def test_what_is_behind_glass_is_veiled_by_all_the_air_before_it():
     air = np.array(AIR)
     expected = 0.5 * (own * t1 + air * (1 - t1)) + 0.5 * (COLOR / EXPOSURE * t7 + air * (1 - t7))
     np.testing.assert_allclose(found[middle, :3], expected, rtol=0.01)
+
+
+def test_from_a_room_only_what_is_outdoors_is_seen_in_fog():
+    """A wall is as it is; ground is veiled by the air from the camera on, behind a pane by that from the pane on."""
+    film = Material(base_color=(0.1, 0.2, 0.6, 0.5), alpha_mode="BLEND", unlit=True)
+    stone = flat(quad((0, 0, 0), (0.01, 0, 0), (0, 0.01, 0)), UNLIT)
+    wall, pane = flat(quad((-9, -9, 5), (9, 0, 0), (0, 18, 0)), UNLIT), flat(quad((0.5, 0, 6), (9, 0, 0), (0, 9, 0)), film)
+    more = {"ground": Ground(pattern="plain"), "antialias": False}
+    clear, seen = light([stone, wall], None, **more)
+    plain, _ = light([stone, wall], THICK, is_outdoors=True, **more)
+    away = ranges(VIEW, seen)
+    is_ground = seen.triangle.ravel() >= 4
+    assert 100 < is_ground.sum() < 200
+    through = np.exp(-CONTRAST / 20 * away)[:, None]
+    expected = clear[:, :3] * through + AIR * (1 - through)
+    np.testing.assert_allclose(plain[is_ground, :3], expected[is_ground], rtol=1e-4)
+    np.testing.assert_array_equal(plain[~is_ground], clear[~is_ground])
+    clear, _ = light([stone, wall, pane], None, **more)
+    paned, found = light([stone, wall, pane], THICK, is_outdoors=True, **more)
+    is_pane = (found.triangle.ravel() >= 4) & (found.triangle.ravel() < 6)
+    assert is_pane.sum() > 30
+    bare = 2 * clear[is_pane, :3] - np.array([0.1, 0.2, 0.6]) / EXPOSURE  # of the ground behind
+    through = np.exp(-CONTRAST / 20 * (away - ranges(VIEW, found)))[is_pane, None]
+    lost = 0.5 * (1 - through) * (AIR - bare)
+    np.testing.assert_allclose(paned[is_pane, :3], clear[is_pane, :3] + lost, rtol=2e-3)
+
+
+def test_blender_s_pictures_of_a_room_are_veiled_where_they_show_the_ground():
+    stone, wall = (
+        flat(quad(corner, (size, 0, 0), (0, 18, 0)), UNLIT) for corner, size in (((0, -9, 0), 0.01), ((-9, -9, 5), 9))
+    )
+    geometry = stage_of([stone, wall], Scene(sun=None, ground=Ground())).at(0)
+    seen, picture = rasterize(geometry, VIEW), np.ones((16, 16, 4), np.float32)
+    veil(picture, THICK, VIEW, geometry, is_outdoors=True)
+    through = np.exp(-CONTRAST / 20 * ranges(VIEW, seen)).reshape(16, 16)[..., None]
+    ground = seen.triangle >= geometry.triangle_start[-1]
+    inner = ground & np.roll(ground, 1, axis=1) & np.roll(ground, -1, axis=1)
+    assert inner.sum() > 80
+    np.testing.assert_allclose(picture[inner, :3], (through + np.array(AIR) * (1 - through))[inner], rtol=5e-3)
+    assert (picture[~ground & ~np.roll(ground, -1, axis=1)] == 1).all()
 
 
 def test_without_a_background_the_air_covers_what_is_there():

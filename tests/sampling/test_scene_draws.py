@@ -136,6 +136,10 @@ def test_weather_stays_outdoors_of_a_room_and_its_light_comes_in():
     assert outside.rain and outside.fog and outside.wet
     assert (inside.rain, inside.fog, inside.wet, inside.snow) == (None,) * 4
     assert (inside.sun, inside.sky) == (outside.sun, outside.sky) != (scene_of({}).sun, scene_of({}).sky)
+    assert inside.fog_outdoors == outside.fog and outside.fog_outdoors is None
+    low = {"fog": {"visibility": 60, "height": 5}}
+    inside, outside = (scene_of({"place": place, **low}) for place in ("zoo:room", "zoo:neighbourhood"))
+    assert inside.lights == outside.lights != ()
     assert scene_of({"place": "zoo:room", "sky": "night"}).lamps is not None
 
 

@@ -28,21 +28,22 @@ OPAQUE = 80.0
 @dataclass(frozen=True, eq=False)
 class Air:
     """The air along rays from one eye. stretch (N,): metres of range for a metre of their depth (see `truth.Visibility`); rise
-    (N,): sine of their elevation.
+    (N,): sine of their elevation. is_outdoors: it is beyond the windows of a room, and only ground and sky are seen through it.
     """
 
     fog: Fog
     eye: float
     stretch: Float32
     rise: Float32
+    is_outdoors: bool = False
 
     @classmethod
-    def of(cls, fog: Fog, camera: Camera, rays: NDArray[np.floating] | None = None) -> Air:
+    def of(cls, fog: Fog, camera: Camera, rays: NDArray[np.floating] | None = None, is_outdoors: bool = False) -> Air:
         """The air before a camera, along rays (N, 3) of its axes, by default those of its pixels' centres."""
         ray = np.nan_to_num(pixel_rays(camera.intrinsics).reshape(-1, 3) if rays is None else rays)
         length = np.sqrt((ray * ray).sum(axis=1))
         rise = (ray @ camera.R[:, 2]) / np.maximum(length, 1e-12)
-        return cls(fog, float(camera.center[2]), length.astype(np.float32), rise.astype(np.float32))
+        return cls(fog, float(camera.center[2]), length.astype(np.float32), rise.astype(np.float32), is_outdoors)
 
     def depth(self, inverse: Float32, which: NDArray[np.integer] | slice = slice(None)) -> Float32:
         """Optical depth (n,) of rays, by their numbers, from the eye to what has this 1/depth there; 0 is the sky."""

@@ -281,7 +281,8 @@ class Scene(Frozen):
     ground.
 
     `floor`: how high the ground is; a number alone is the most. Without one the ground lies below all that is placed, at any
-    instant of the shot; where what moves is cut into several shots, it has one height only by a floor.
+    instant of the shot; where what moves is cut into several shots, it has one height only by a floor. `fog_outdoors`, in place
+    of `fog`: beyond the windows of a room; only sky and ground, which are outdoors, are seen through it.
     """
 
     sun: Sun | None = Sun()
@@ -296,14 +297,15 @@ class Scene(Frozen):
     snow: Snow | None = None
     wet: Wet | None = None
     lamps: Lamps | None = None
+    fog_outdoors: Fog | None = None
 
     @property
     def weather(self) -> bool:
         """Whether there is any."""
-        return any(getattr(self, name) is not None for name in WEATHER if name != "lamps")
+        return any(getattr(self, name) is not None for name in (*WEATHER, "fog_outdoors") if name != "lamps")
 
     @model_serializer(mode="wrap")
     def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Without weather where there is none, so that records of such scenes are what they were before."""
         found: dict[str, Any] = handler(self)
-        return {name: value for name, value in found.items() if value is not None or name not in WEATHER}
+        return {name: value for name, value in found.items() if value is not None or name not in (*WEATHER, "fog_outdoors")}

@@ -50,8 +50,9 @@ def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -
 
 
 def through_windows(scene: Scene, outdoors: Scene) -> Scene:
-    """The scene of a room: of the weather outdoors only light comes in."""
-    return scene.model_copy(update={"sun": outdoors.sun, "sky": outdoors.sky, "lamps": outdoors.lamps})
+    """The scene of a room: of the weather outdoors light comes in, and fog is seen through the windows."""
+    kept = {name: getattr(outdoors, name) for name in ("sun", "sky", "lights", "lamps")}
+    return scene.model_copy(update={**kept, "fog_outdoors": outdoors.fog})
 
 
 def _lamps(entry: SceneEntry, rng_of: RngOf) -> dict[str, Lamps]:

@@ -221,11 +221,11 @@ class CyclesStage:
         finish = self.shot.finish(instant).with_background(name == "rgba")
         background = display_background(finish.background, camera.width, camera.height)
         is_open = not shows_sky(finish.background)
-        fog = self.shot.scene.fog
+        fog = self.shot.scene.fog or self.shot.scene.fog_outdoors
         is_open = is_open or fog is not None  # whose sky is laid behind things that it has veiled
         rendered = arranged.painted(camera, is_open, visibility, Sweeping(self.shot, instant, sensor), wanted)
         if fog is not None:
-            veil(rendered["picture"], fog, camera, arranged.geometry)
+            veil(rendered["picture"], fog, camera, arranged.geometry, is_outdoors=self.shot.scene.fog is None)
             if shows_sky(finish.background):
                 lay_sky(rendered["picture"], fog, camera, arranged.sky)
         seconds = self.shot.instants[instant].seconds

@@ -20,12 +20,15 @@ from viewsphere.truth.visibility import rasterize
 Float32 = NDArray[np.float32]
 
 
-def veil(picture: Float32, fog: Fog, camera: Camera, geometry: Geometry) -> None:
-    """Veil what a picture (H, W, 4), premultiplied, without its sky shows, in place."""
+def veil(picture: Float32, fog: Fog, camera: Camera, geometry: Geometry, is_outdoors: bool = False) -> None:
+    """Veil what a picture (H, W, 4), premultiplied, without its sky shows, in place; of fog that `is_outdoors` its ground."""
     seen = rasterize(geometry, camera, subdivision=2)
     rays = pixel_rays(camera.intrinsics, 2).reshape(-1, 3)
     depth = Air.of(fog, camera, rays).depth(seen.inverse_depth.reshape(-1))
-    is_there = (seen.triangle >= 0).reshape(-1)
+    triangle = seen.triangle.reshape(-1)
+    if is_outdoors:
+        depth = np.where(triangle >= geometry.triangle_start[-1], depth, np.float32(0))
+    is_there = triangle >= 0
     through, there = (_of_pixels(values, camera) for values in (np.exp(-depth) * is_there, is_there.astype(np.float32)))
     mean = np.where(there > 0, through / np.maximum(there, np.float32(0.25)), 0)
     Air.of(fog, camera).veil(picture.reshape(-1, 4), -np.log(np.maximum(mean, np.float32(1e-30))))

@@ -71,17 +71,20 @@ def paint(
     radiance: Float32,
     split: Float32 = NO_SPLIT,
     fog: Fog | None = None,
+    is_outdoors: bool = False,
     more: Callable[[Float32], None] | None = None,
 ) -> None:
-    """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the covered share of the pixel, as seen through
-    `fog`. `more` adds to the light of the pixels' centres what surfaces mirror.
+    """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the covered share of the pixel.
+
+    All is seen through `fog`; if that `is_outdoors` of a room, only sky and ground are. `more` adds to the light of the pixels'
+    centres what surfaces mirror.
 
     Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, else 0. `split`, if it is not empty,
     is filled with the parts of this light, (H * W, 6 or 9) float32 as `kernels_split` has them; it must be 0 before.
     """
     view = view_of(baked, camera)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    air = None if fog is None else Air.of(fog, camera)
+    air = None if fog is None else Air.of(fog, camera, is_outdoors=is_outdoors)
     stack = shade_all(baked, camera, view, visibility, triangle, depth, radiance, split, air=air, more=more)
     if has_sky:
         _lay_sky(view, baked.surrounding, radiance, air)
@@ -93,7 +96,7 @@ def paint(
         kernels_chosen.compare_bent(bent.reshape(visibility.triangle.shape), radiance, behind)
     samples = edge_samples(baked.geometry, camera, visibility, baked.owner, behind)
     if samples is not None:
-        _smooth(baked, camera, visibility, samples, behind, has_sky, radiance, split, fog)
+        _smooth(baked, camera, visibility, samples, behind, has_sky, radiance, split, fog, is_outdoors)
 
 
 def materials(baked: Baked, camera: Camera, visibility: Visibility) -> Float32:
@@ -119,6 +122,7 @@ def _smooth(
     radiance: Float32,
     split: Float32,
     fog: Fog | None,
+    is_outdoors: bool,
 ) -> None:
     """Set edge pixels to the mean of their samples. Samples are shaded only if they look like no centre of a pixel around, or
     lie in pixels marked in `behind`.
@@ -137,7 +141,7 @@ def _smooth(
     )
     view = view_of(baked, camera, own)
     colors, parts = np.empty((len(at), 4), np.float32), np.zeros((len(at) if len(split) else 0, split.shape[1]), np.float32)
-    air = None if fog is None else Air.of(fog, camera, _rays(camera, own))
+    air = None if fog is None else Air.of(fog, camera, _rays(camera, own), is_outdoors)
     shade_all(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
     if has_sky:
         colors[~is_own, 3] = 1  # the sky need not be looked up for these
@@ -195,11 +199,11 @@ def shade_all(
     pixels = None if samples is None else samples.pixels
     stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
     reached = depth.copy()  # 1/depth up to which light has come
-    first = _nearest_glass(baked, stack, len(triangle))
+    first, behind = _nearest_glass(baked, stack, len(triangle)), triangle
     for i, layer in enumerate(stack):
         if air is not None and i > 0:
-            on = layer.slot
-            air.veil(radiance, air.depth(reached[on], on) - air.depth(layer.inverse_depth, on), on)
+            on, near = _veiled(baked, air, layer.slot, behind[layer.slot], layer.inverse_depth)
+            air.veil(radiance, air.depth(reached[on], on) - air.depth(near, on), on)
         reached[layer.slot] = layer.inverse_depth
         behind, behind_depth = triangle.copy(), depth.copy()
         behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
@@ -209,8 +213,17 @@ def shade_all(
             _shade_some(baked, view, slots, which, behind, behind_depth, radiance, split)
         _shade_some(baked, view, layer.slot[is_bent], False, behind, behind_depth, radiance, split, baked.glass)
     if air is not None:
-        air.veil(radiance, air.depth(reached))
+        on, far = _veiled(baked, air, np.arange(len(triangle), dtype=np.int32), triangle, reached)
+        air.veil(radiance, air.depth(far, on), on)
     return stack
+
+
+def _veiled(baked: Baked, air: Air, slots: Int32, behind: Int32, inverse_depth: Float32) -> tuple[Int32, Float32]:
+    """Those of samples, and of their `inverse_depth` (n,), that show what is behind, triangles (n,), through the air."""
+    if not air.is_outdoors:
+        return slots, inverse_depth
+    is_ground = baked.kind[behind] == kernels_paint.FLOOR
+    return slots[is_ground], inverse_depth[is_ground]
 
 
 def _nearest_glass(baked: Baked, stack: list[Layer], count: int) -> NDArray[np.uint8]:

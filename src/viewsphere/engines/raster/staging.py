@@ -155,10 +155,11 @@ class RasterStage:
 
     def _paint_one(self, baked: Baked, camera: Camera, seen: Visibility, has_sky: bool, radiance: Float32) -> None:
         scene = self.shot.scene
+        fog, is_outdoors = scene.fog or scene.fog_outdoors, scene.fog is None
         more = partial(mirror_in_polish, baked, camera, seen)
         if scene.wet is not None:
             more = partial(mirror_in_water, baked, camera, seen, scene.wet)
-        paint(baked, camera, seen, self.options.antialias == 4, has_sky, radiance, fog=scene.fog, more=more)
+        paint(baked, camera, seen, self.options.antialias == 4, has_sky, radiance, fog=fog, is_outdoors=is_outdoors, more=more)
 
     def _canvas(self, pixels: int) -> Float32:
         """Room for the light of a picture, the same one every time: fresh memory costs as much as the sky."""
