@@ -221,7 +221,7 @@ def painted():
     made = {name: material(name) for name in NAMES}
     for k, (name, one) in enumerate(made.items()):
         put(name, grid(name, one), at(2 * k))
-        if name not in ("plastic", "old", "procedural", "painted"):
+        if name not in ("plastic", "glass", "old", "procedural", "painted"):
             image = node(one, "ShaderNodeTexImage", image={"roughness": data, "normals": bumps, "holes": holed}.get(name, rgb))
             if name not in ("roughness", "normals"):
                 link(one, image.outputs["Color"], "Base Color")
@@ -229,6 +229,7 @@ def painted():
     for key, value in {"Coat Weight": 0.5, "IOR": 1.4, "Emission Color": (1, 0.5, 0, 1), "Emission Strength": 4.0}.items():
         made["plastic"].node_tree.nodes["Principled BSDF"].inputs[key].default_value = value
     made["plastic"].node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.5
+    made["glass"].node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
     link(made["procedural"], node(made["procedural"], "ShaderNodeTexNoise").outputs["Color"], "Base Color")
     old = made["old"]
     mixed, diffuse, glossy = (node(old, f"ShaderNode{kind}") for kind in ("MixShader", "BsdfDiffuse", "BsdfAnisotropic"))
@@ -248,7 +249,7 @@ def painted():
 
 NAMES = (
     "picture", "tinted", "moved", "second", "roughness", "normals", "holes", "packed", "lost", "away",
-    "plastic", "old", "procedural", "painted",
+    "plastic", "glass", "old", "procedural", "painted",
 )  # fmt: skip
 
 

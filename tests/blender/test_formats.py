@@ -195,6 +195,12 @@ def test_values_of_the_principled_shader(painted):
     np.testing.assert_allclose([found.clearcoat, found.ior, found.specular], (0.5, 1.4, 1.0), rtol=1e-6)
 
 
+def test_glass_is_solid(painted):
+    glass, plastic = (material_of(painted, name) for name in ("glass", "plastic"))
+    assert (glass.transmission, plastic.transmission) == (1, 0)
+    assert glass.thickness > 0 == plastic.thickness
+
+
 def test_pictures_stay_as_they_are(painted):
     texture = material_of(painted, "picture").base_color_texture
     assert image_of(painted, texture)[..., :3].tolist() == [[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [128, 128, 128]]]
