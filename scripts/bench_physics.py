@@ -54,9 +54,7 @@ def main() -> None:
         before, overlap = np.array(self.poses), 1000 * self.deepest
         kept = self._data.qpos.copy(), self._data.qvel.copy(), self._steps
         begun = time.process_time()
-        self.is_damped = False
         self.step(500)
-        self.is_damped = True
         way = 1000 * np.linalg.norm(np.array(self.poses)[:, :3, 3] - before[:, :3, 3], axis=1).max()
         self._data.qpos[:], self._data.qvel[:], self._steps = kept
         ends.append((overlap, float(way)))

@@ -22,6 +22,7 @@ from viewsphere.recipe.layout import Layout, options_of, placer_of
 from viewsphere.recipe.scenery import CompanyEntry
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.sampling.filling import shape_of
+from viewsphere.sampling.physics import EDITION
 from viewsphere.sampling.placing import Draws, Piece, Placer, Room, Shape, Way
 from viewsphere.sampling.scenery import composed
 from viewsphere.sampling.stable_poses import stable_turn
@@ -49,7 +50,7 @@ def unremembered(names: tuple[str, ...], make: Callable[[], Any]) -> Any:
 def remembered_as(entry: ScenesEntry | CompanyEntry, cast: Sequence[ModelSpec], names: Sequence[str]) -> tuple[str, ...]:
     """What simulated poses are remembered by: who is placed, how, and what all draws are for."""
     asked = entry.model_dump_json(include={"layout", "gap", "orientation", "surface"})
-    return (asked, *names, "of", *(spec.key for spec in cast))
+    return (EDITION, asked, *names, "of", *(spec.key for spec in cast))
 
 
 @dataclass(frozen=True)

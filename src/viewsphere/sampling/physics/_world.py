@@ -21,17 +21,22 @@ STEP_S = 0.002
 SOFT_S = 4 * STEP_S
 """Seconds in which a contact gives way: shorter ones need shorter steps, longer ones let bodies sink into one another."""
 
+GRAVITY = 9.81
+
 LOOK = 25
 """Steps between two looks at whether bodies move."""
 
-CALM_LOOKS = 8
-CALM_SPEED, CALM_TURN = 0.005, 0.02
+CALM_LOOKS = 12
+CALM_SPEED, CALM_TURN = 0.03, 0.3
 CALM_WAY, CALM_ANGLE = 0.0003, 0.002
 """A body is at rest when so many looks found it slower than this, metres and radians a second, and it went no farther from the
-first to the last: piles creep at a speed that no look finds."""
+first to the last. The speeds are those of a thing that trembles on the spot, from one corner that touches to the next.
+"""
 
-DAMPED_S, DAMPING = 2.0, 10.0
-"""Seconds after which bodies lose a share of their speed, and how much of it a second: piles creep otherwise."""
+DAMPED_S, DAMPING = 2.0, 4.0
+"""Seconds after which bodies that settle lose a share of their speed, and how much of it a second: boats rock on otherwise. No
+look that finds them at rest is helped so.
+"""
 
 LONGEST_S = 15.0
 """Simulated seconds after which bodies that still move are given up."""
@@ -39,8 +44,15 @@ LONGEST_S = 15.0
 HULL_CORNERS = 256
 """Of a part at most: fewer would cut off millimetres, which then stand in others."""
 
-ROLLING = (0.005, 0.002)
-"""Friction against spinning and rolling, metres."""
+SPINNING, ROLLING = 0.005, 0.002
+"""Friction against spinning on the spot, and against any turning, metres: the latter is a torque on a body, of its weight at
+this distance. As a part of each contact it takes two more rows of the solver's for each, and half as much time again.
+"""
+
+STIFF, GRIP = 0.95, 100.0
+"""Share of a contact's acceleration that its force takes away, and how much stiffer it is against sliding: things creep where
+either is less. MuJoCo's iterations against slipping, which make up for a grip of 1, take more than half of a step.
+"""
 
 
 class World:
@@ -61,9 +73,11 @@ class World:
         self._scale = TYPICAL / typical
         self._bodies, self._fences = len(bodies), [i for i, board in enumerate(boards, 1) if board.is_fence]
         self._model = self._compiled(bodies, boards, floor, fixed)
-        self._data = self._mujoco.MjData(self._model)
-        self._steps = 0
-        self.is_damped = True
+        self.begin(poses)
+
+    def begin(self, poses: Sequence[Matrix4]) -> None:
+        """Let the bodies go from these poses, as in a new world; fences that were taken away stay away."""
+        self._data, self._steps = self._mujoco.MjData(self._model), 0
         for number, pose in enumerate(poses):
             self.put(number, pose)
 
@@ -73,7 +87,7 @@ class World:
         mujoco = self._mujoco
         spec = mujoco.MjSpec()
         spec.option.timestep, spec.option.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-        spec.option.cone, spec.option.noslip_iterations = mujoco.mjtCone.mjCONE_ELLIPTIC, 4
+        spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, GRIP
         still = spec.worldbody
         still.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], pos=[0, 0, floor * self._scale], **_contact(Touch()))
         for board in boards:
@@ -88,7 +102,11 @@ class World:
             matrix = np.array(pose)
             at = {"pos": matrix[:3, 3] * self._scale, "quat": quaternion_from_matrix(matrix[:3, :3])}
             self._add(spec, still.add_body(name=f"fixed {number}", **at), f"fixed part {number}", body)
-        return spec.compile()
+        model = spec.compile()
+        turning = model.dof_frictionloss.reshape(-1, 6)[:, 3:]
+        turning[:] = ROLLING * GRAVITY * model.body_mass[1 : 1 + self._bodies, None]
+        model.dof_solref[:], model.dof_solimp[:, :2] = (SOFT_S, 1.0), 0.99
+        return model
 
     def _add(self, spec: Any, made: Any, name: str, body: Body) -> None:
         mujoco = self._mujoco
@@ -125,11 +143,13 @@ class World:
 
     def step(self, steps: int = 1) -> None:
         """Let so much time go by."""
+        self._mujoco.mj_step(self._model, self._data, steps)
+        self._steps += steps
+
+    def _damped(self, steps: int) -> None:
         for _ in range(steps):
-            self._mujoco.mj_step(self._model, self._data)
-            self._steps += 1
-            if self.is_damped and self._steps * STEP_S > DAMPED_S:
-                self._data.qvel *= 1 - DAMPING * STEP_S
+            self.step()
+            self._data.qvel *= 1 - DAMPING * STEP_S
 
     def settle(
         self,
@@ -143,7 +163,10 @@ class World:
         """
         calm: list[Float] = []
         for step in range(each, int(longest_s / STEP_S) + 1, each):
-            self.step(each)
+            if calm or self._steps * STEP_S < DAMPED_S:
+                self.step(each)
+            else:
+                self._damped(each)
             if look is not None:
                 look()
             if ends is not None and ends():
@@ -201,12 +224,11 @@ def _is_still(before: Float, now: Float) -> bool:
 def _contact(touch: Touch) -> dict[str, Any]:
     """A contact's settings: a spring of equal stiffness whatever its damping."""
     ratio = touch.damping_ratio
-    solid = [0.9, 0.95, 0.001, 0.5, 2]
     return {
         "solref": [SOFT_S / ratio, ratio],
-        "solimp": solid,
-        "friction": [touch.friction, *ROLLING],
-        "condim": 6,
+        "solimp": [STIFF, STIFF, 0.001, 0.5, 2],
+        "friction": [touch.friction, SPINNING, 0.0],
+        "condim": 4,
         "margin": 0.0,
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -18,14 +19,19 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length, Portion, Positive, Strength
 from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import Drawn, drawn
-from viewsphere.sampling.physics import Board, Body, Touch, World, body_of
+from viewsphere.sampling.physics import LONGEST_S, Board, Body, Touch, World, body_of
 from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, Way, draws_of
 from viewsphere.sampling.placing._parts import convex_parts
 
 Float = NDArray[np.float64]
 
-TRIES = 3
+TRIES = 6
 """Draws of a fall, of which the first that ends well is taken."""
+
+HASTY_S = 5.0
+"""Simulated seconds that all tries but the last have to come to rest: most need half of them, and another draw is sooner
+at rest than one in which something trembles on and on.
+"""
 
 ROUNDS = 2
 """How often things that fell beside are let go again, for each of the cast."""
@@ -104,13 +110,13 @@ class Drop:
     def _best(self, moment: str) -> dict[str, Any]:
         problems: list[tuple[float, str]] = []
         for number in range(TRIES):
-            made, problem = self._once(str(number), moment)
+            made, problem = self._once(str(number), moment, LONGEST_S if number == TRIES - 1 else HASTY_S)
             if problem is None:
                 return made
             problems.append(problem)
         raise RecipeError(f"{self.room.field}.layout: {min(problems)[1]} (the best of {TRIES} draws)")
 
-    def _once(self, number: str, moment: str) -> tuple[dict[str, Any], tuple[float, str] | None]:
+    def _once(self, number: str, moment: str, longest_s: float) -> tuple[dict[str, Any], tuple[float, str] | None]:
         """What comes of one draw, and, where it is not good, how bad that is, and in words."""
         places = [self._spheres(i) for i in range(len(self.cast))]
         starts = self._starts(number, range(len(self.cast)), places, [])
@@ -120,13 +126,14 @@ class Drop:
         if moment == "mid":
             return self._flying(world, number), None
         film = _Film(world) if self.room.moves else None
-        calm = world.settle(each=RECORDED, look=film.shoot) if film else world.settle()
+        settle = partial(world.settle, longest_s, RECORDED, film.shoot) if film else partial(world.settle, longest_s)
+        calm = settle()
         if fences and calm and (world.take_fences_away() or self._beside(world, self.ground.height)):
-            calm = world.settle(each=RECORDED, look=film.shoot) if film else self._kept(world, number, places)
+            calm = settle() if film else self._kept(world, number, places, longest_s)
         made: dict[str, Any] = {"poses": world.poses}
         return made | ({"ways": film.ways} if film else {}), self._problem(world, calm, bool(film))
 
-    def _kept(self, world: World, number: str, places: Sequence[tuple[Float, float]]) -> bool:
+    def _kept(self, world: World, number: str, places: Sequence[tuple[Float, float]], longest_s: float) -> bool:
         """Let time go by until all are at rest where they have to stay; whether they are at rest. What leaves is let go
         again at once, before it rolls away, and what lies too high when it is at rest.
         """
@@ -142,10 +149,10 @@ class Drop:
         def watch() -> None:
             let_go(self._beside(world, math.inf) if again < most else ())
 
-        calm = world.settle(look=watch)
+        calm = world.settle(longest_s, look=watch)
         while calm and again < most and (high := self._beside(world, self.ground.height)):
             let_go(high)
-            calm = world.settle(look=watch)
+            calm = world.settle(longest_s, look=watch)
         return calm
 
     def _problem(self, world: World, calm: bool, moves: bool) -> tuple[float, str] | None:

@@ -90,9 +90,12 @@ def _highest(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: range, r
 def _pile(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: tuple[int, ...], rng: Draws, options: Options) -> _Pile:
     """The first try of a pile that stands, else the one of which most does."""
     best: _Pile | None = None
+    bodies = [_body(cast[slot], shapes[slot], slot, rng, options) for slot in slots]
+    typical = float(np.median([shapes[slot].length for slot in slots]))
+    world = World(bodies, [IDENTITY] * len(slots), (), typical)
     for number in range(TRIES):
         own = rng("pile try", str(number), *(cast[slot].key for slot in slots), str(slots[0]))
-        made = _tried(cast, shapes, slots, own, rng, options)
+        made = _tried(world, shapes, slots, own)
         if best is None or made.standing > best.standing:
             best = made
         if best.standing == len(slots):
@@ -101,14 +104,7 @@ def _pile(cast: Sequence[ModelSpec], shapes: Sequence[Shape], slots: tuple[int, 
     return best
 
 
-def _tried(
-    cast: Sequence[ModelSpec],
-    shapes: Sequence[Shape],
-    slots: tuple[int, ...],
-    own: np.random.Generator,
-    rng: Draws,
-    options: Options,
-) -> _Pile:
+def _tried(world: World, shapes: Sequence[Shape], slots: tuple[int, ...], own: np.random.Generator) -> _Pile:
     """A pile, wide things below narrow ones but for some luck, let go."""
     areas = [math.prod(np.ptp(shapes[slot].box, axis=0)[:2]) for slot in slots]
     order = sorted(range(len(slots)), key=lambda i: -areas[i] * own.uniform(0.7, 1.4))
@@ -122,9 +118,7 @@ def _tried(
         pose[2, 3] = top + AIR - float(corners[:, 2].min())
         top += AIR + float(np.ptp(corners[:, 2]))
         starts[i] = poses_of({"poses": [pose.tolist()]})[0]
-    bodies = [_body(cast[slot], shapes[slot], slot, rng, options) for slot in slots]
-    typical = float(np.median([shapes[slot].length for slot in slots]))
-    world = World(bodies, [starts[i] for i in range(len(slots))], (), typical)
+    world.begin([starts[i] for i in range(len(slots))])
 
     def fallen() -> frozenset[int]:
         return frozenset(i for pair in world.touching if -1 in pair for i in pair) - {-1, order[0]}
