@@ -208,8 +208,15 @@ class Sight:
         g, count = self.geometry, self.geometry.object_count
         parts, points = pairwise(g.triangle_start[: count + 1]), pairwise(g.vertex_start[: count + 1])
         return tuple(
-            projected_bounds(self.camera, g.vertices, g.triangles, part, corners, g.is_used)
-            for part, corners in zip(parts, points, strict=True)
+            projected_bounds(
+                self.camera,
+                g.places(i),
+                g.triangles[first:stop] - np.int32(base),
+                (0, stop - first),
+                (0, end - base),
+                g.is_used[base:end],
+            )
+            for i, ((first, stop), (base, end)) in enumerate(zip(parts, points, strict=True))
         )
 
     def is_unobstructed(self, i: int) -> bool:

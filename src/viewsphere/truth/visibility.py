@@ -92,11 +92,13 @@ def rasterize(
     all vertices, where it is known. `keeps_exact`: keep 1/s before it was rounded, too, which labels that compare pictures
     need; still pictures are spared its memory.
     """
-    everything = (0, _last_drawn(geometry, camera), 0, len(geometry.vertices))
+    everything = (0, _last_drawn(geometry, camera), 0, len(geometry.coordinates))
     part = _range(geometry, object_id) if object_id else everything
     is_whole = part == everything and window is None
     if is_whole:
         q = homogeneous(geometry, camera) if corners is None else corners
+    elif part == everything and corners is not None:
+        q = corners
     else:
         q = homogeneous(geometry, camera, *part[2:])
     nearest, seen = _draw(geometry, camera, subdivision, part, window, q)
@@ -106,7 +108,7 @@ def rasterize(
 
 def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:
     """A new buffer: `visibility`, which shows everything else, with the ground of this geometry drawn into it."""
-    ground = geometry.triangle_start[-1], _last_drawn(geometry, camera), geometry.vertex_start[-1], len(geometry.vertices)
+    ground = geometry.triangle_start[-1], _last_drawn(geometry, camera), geometry.vertex_start[-1], len(geometry.coordinates)
     shown = visibility.inverse_depth.astype(np.float64), visibility.triangle.copy()
     nearest, seen = _draw(geometry, camera, 1, ground, None, homogeneous(geometry, camera, *ground[2:]), shown)
     return Visibility(seen, nearest.astype(np.float32))
@@ -141,22 +143,39 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens. The inverse is infinite unless positive. Of all
     vertices, those of things that lie outside of a pinhole's picture are at `OUTSIDE`, wherever they are.
     """
-    from viewsphere.truth import kernels_draw as kernels
-
-    end = len(geometry.vertices) if stop is None else stop
-    q = np.empty((end - base, 4))
     k = camera.K if camera.distortion is None else np.eye(3)
     moved = np.column_stack((camera.R, camera.t))
     m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
     if base or stop is not None or camera.distortion is not None:
-        kernels.transform(geometry.vertices, base, end, m, q)
-        return q
+        return projected(geometry, m, base, stop)
+    end = len(geometry.coordinates)
+    q = np.empty((end, 4))
     for first, last, is_outside in _runs(geometry.vertex_start, end, outside(geometry, camera, m)):
         if is_outside:
             q[first:last] = OUTSIDE
         else:
-            kernels.transform(geometry.vertices, first, last, m, q[first:last])
+            _project(geometry, m, first, last, q[first:last])
     return q
+
+
+def projected(geometry: Geometry, m: NDArray[np.float64], base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
+    """(n, 4): m (x, y, z, 1) of the vertices [base, stop), and the inverse of its third coordinate, as `homogeneous`."""
+    end = len(geometry.coordinates) if stop is None else stop
+    q = np.empty((end - base, 4))
+    _project(geometry, m, base, end, q)
+    return q
+
+
+def _project(geometry: Geometry, m: NDArray[np.float64], base: int, stop: int, q: NDArray[np.float64]) -> None:
+    """Write `projected`."""
+    from viewsphere.truth import kernels_draw, kernels_place
+
+    starts = np.array(geometry.vertex_start, np.int64)
+    kernels_place.project(geometry.coordinates, starts, geometry.poses, m, base, stop, q)
+    first = max(geometry.vertex_start[-1], base)
+    if first < stop:
+        low, high = first - geometry.vertex_start[-1], stop - geometry.vertex_start[-1]
+        kernels_draw.transform(geometry.ground, low, high, m, q[first - base :])
 
 
 def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -286,7 +305,7 @@ def _draw(
         return nearest, seen
     cell, canvas = np.empty((stop - base, 4), np.int32), (x0, y0, x1 - x0, y1 - y0)
     vertices, triangles = [(0, stop - base, False)], [(first, last, False)]
-    if 0 < len(q) == len(geometry.vertices):  # of a thing that is outside the first vertex is, too
+    if 0 < len(q) == len(geometry.coordinates):  # of a thing that is outside the first vertex is, too
         start = np.array(geometry.vertex_start[:-1], np.intp)
         hidden = (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1)
         vertices = list(_runs(geometry.vertex_start, stop, hidden))

@@ -102,7 +102,7 @@ def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragm
     """Draw the triangles in `order` through a pinhole.
 
     `points` is (grid, pixels, offsets, (lowest, highest offset)), `solid` (nearest, seen, farthest, tiles), `fragments`
-    (inverses, listed, counts, vertices).
+    (inverses, listed, counts, q).
     """
     grid, _, _, _ = points
     farthest, tiles = solid[2], solid[3][1]
@@ -340,13 +340,13 @@ def _insert(t, inverse, p, triangles, fragments):
     is the other's back.
     """
     k, m = p
-    inverses, listed, counts, vertices = fragments
+    inverses, listed, counts, q = fragments
     near, here = inverses[k, m], listed[k, m]
     capacity, count = len(near), np.int64(counts[p])
     at = count
     while at > 0 and inverse * (1.0 + TIE) >= near[at - 1]:
         at -= 1
-        if inverse <= near[at] * (1.0 + TIE) and _share_edge(vertices, triangles, t, here[at]):
+        if inverse <= near[at] * (1.0 + TIE) and _share_edge(q, triangles, t, here[at]):
             return
     if at == capacity:
         return
@@ -357,13 +357,13 @@ def _insert(t, inverse, p, triangles, fragments):
 
 
 @inner
-def _share_edge(vertices, triangles, s, t):
+def _share_edge(q, triangles, s, t):
     """Whether two corners of triangle s are where corners of t are."""
     same = 0
     for i in range(3):
         for j in range(3):
             a, b = triangles[s, i], triangles[t, j]
-            if vertices[a, 0] == vertices[b, 0] and vertices[a, 1] == vertices[b, 1] and vertices[a, 2] == vertices[b, 2]:
+            if q[a, 0] == q[b, 0] and q[a, 1] == q[b, 1] and q[a, 2] == q[b, 2]:
                 same += 1
     return same >= 2
 

@@ -36,7 +36,8 @@ class Mirrored(NamedTuple):
 
 def lying(geometry: Geometry, height: float) -> NDArray[np.bool_]:
     """Which triangles (T,) lie below a height altogether."""
-    return np.max(geometry.vertices[:, 2][geometry.triangles], axis=1) < height
+    below = np.concatenate([*(geometry.places(i)[:, 2] for i in range(len(geometry.poses))), geometry.ground[:, 2]]) < height
+    return np.all(below[geometry.triangles], axis=1)
 
 
 def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> tuple[Float, Float]:

@@ -252,7 +252,7 @@ class _Points:
     def draw(self, geometry: Geometry, q: NDArray[np.float64], see_through: Bool, order: NDArray[np.int64]) -> None:
         """Draw these triangles."""
         count, lens = self.nearest.shape[1], self.camera.distortion
-        fragments = self.inverses, self.listed, self.counts, geometry.vertices
+        fragments = self.inverses, self.listed, self.counts, q
         surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays, see_through
         if lens is not None:
             side = 1 if count == 1 else 2

@@ -78,7 +78,7 @@ def pack_materials(
 
 def pack_surfaces(geometry: Geometry, meshes: Sequence[Mesh], materials: Materials, lengths: Lengths) -> Surfaces:
     """Arrays for all triangles of a geometry and of the meshes it was built from, made of `pack_materials` of these."""
-    vertices = np.zeros((len(geometry.vertices), 16), np.float32)
+    vertices = np.zeros((len(geometry.coordinates), 16), np.float32)
     vertices[:, 7:11] = 1.0
     material = np.empty(len(geometry.triangles), np.int32)
     for i, mesh in enumerate(meshes):
@@ -89,20 +89,29 @@ def pack_surfaces(geometry: Geometry, meshes: Sequence[Mesh], materials: Materia
         own = slice(geometry.triangle_start[i], geometry.triangle_start[i + 1])
         material[own] = mesh.triangle_material + materials.first[i]
     material[geometry.triangle_start[-1] :] = len(materials.looks) - 1
-    _place(vertices, geometry, slice(None), lengths)
+    for i in range(len(meshes)):
+        _place(vertices, geometry, i, lengths)
+    _place_ground(vertices, geometry, lengths)
     triangles = geometry.triangles.astype(np.uint32)
     return Surfaces(vertices, triangles, material, geometry.triangle_normals, materials.looks, materials.bundles)
 
 
 def move_surfaces(surfaces: Surfaces, geometry: Geometry, things: Sequence[int], lengths: Lengths) -> Surfaces:
     """The same where these things, and the ground, are elsewhere: their vertices are written in place."""
-    starts = geometry.vertex_start
     for i in things:
-        _place(surfaces.vertices, geometry, slice(starts[i], starts[i + 1]), lengths)
-    _place(surfaces.vertices, geometry, slice(starts[-1], None), lengths)
+        _place(surfaces.vertices, geometry, i, lengths)
+    _place_ground(surfaces.vertices, geometry, lengths)
     return surfaces._replace(normals=geometry.triangle_normals)
 
 
-def _place(rows: Float32, geometry: Geometry, own: slice, lengths: Lengths) -> None:
-    """Without numbers for a normal a face is flat."""
-    place_rows(geometry.vertices[own], geometry.normals[own], np.array(lengths.origin), lengths.unit, rows[own])
+def _place(rows: Float32, geometry: Geometry, i: int, lengths: Lengths) -> None:
+    """Those of thing i. Without numbers for a normal a face is flat."""
+    own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+    frame = np.array(lengths.origin), lengths.unit
+    place_rows(geometry.poses[i], geometry.coordinates[own], geometry.own_normals[own], *frame, rows[own])
+
+
+def _place_ground(rows: Float32, geometry: Geometry, lengths: Lengths) -> None:
+    start = geometry.vertex_start[-1]
+    rows[start:, :3] = geometry.own_normals[start:]
+    rows[start:, 11:14] = (geometry.ground - lengths.origin) / lengths.unit
