@@ -26,6 +26,9 @@ EDGE_ON = 1e-9
 OUTSIDE = (-1e9, 0.0, 1.0, 1.0)
 """`homogeneous` of a vertex that is far from the picture."""
 
+Runs = NDArray[np.int64]
+"""Ranges [first, stop), (n, 2)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Instances:
@@ -141,21 +144,36 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     """Vertices [base, stop) before the perspective division, and the inverse of their third coordinate, (n, 4).
 
     K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens. The inverse is infinite unless positive. Of all
-    vertices, those of things that lie outside of a pinhole's picture are at `OUTSIDE`, wherever they are.
+    vertices, those of things that lie outside of a pinhole's picture are left out: the first of them is `OUTSIDE`, the others
+    are arbitrary. `in_picture` gives those that are not.
     """
     k = camera.K if camera.distortion is None else np.eye(3)
     moved = np.column_stack((camera.R, camera.t))
     m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
     if base or stop is not None or camera.distortion is not None:
         return projected(geometry, m, base, stop)
-    end = len(geometry.coordinates)
+    end, left_out = len(geometry.coordinates), outside(geometry, camera, m)
     q = np.empty((end, 4))
-    for first, last, is_outside in _runs(geometry.vertex_start, end, outside(geometry, camera, m)):
-        if is_outside:
-            q[first:last] = OUTSIDE
-        else:
-            _project(geometry, m, first, last, q[first:last])
+    q[
+        [
+            start
+            for start, is_outside in zip(geometry.vertex_start, left_out.tolist(), strict=False)
+            if is_outside and start < end
+        ]
+    ] = OUTSIDE
+    for first, last in _runs(geometry.vertex_start, end, left_out):
+        _project(geometry, m, first, last, q[first:last])
     return q
+
+
+def in_picture(geometry: Geometry, q: NDArray[np.float64], end: int | None = None) -> tuple[Runs, Runs]:
+    """The vertices and the triangles, up to `end` of these, that are not left out of `homogeneous` vertices q of all things."""
+    start = np.array(geometry.vertex_start[:-1], np.intp)
+    left_out = (q[np.minimum(start, max(len(q) - 1, 0))] == OUTSIDE).all(axis=1) if len(q) else start < 0
+    last = len(geometry.triangles) if end is None else end
+    spans = _runs(geometry.vertex_start, len(q), left_out), _runs(geometry.triangle_start, last, left_out)
+    vertices, triangles = (np.array(list(runs), np.int64).reshape(-1, 2) for runs in spans)
+    return vertices, triangles
 
 
 def projected(geometry: Geometry, m: NDArray[np.float64], base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
@@ -190,16 +208,16 @@ def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.fl
         return np.logical_or.reduce([side.all(axis=1) for side in sides])
 
 
-def _runs(starts: tuple[int, ...], end: int, flags: NDArray[np.bool_]) -> Iterator[tuple[int, int, bool]]:
-    """Runs [first, stop) of what things own from these starts on, up to the end, which things of one flag own; False beyond."""
-    first, flag = 0, False
-    for start, own in zip(starts, (*flags.tolist(), False), strict=True):
-        if own != flag:
+def _runs(starts: tuple[int, ...], end: int, left_out: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Runs [first, stop), up to the end, of what things own from these starts on, without things that are left out."""
+    first = 0
+    for start, stop, is_left_out in zip(starts, starts[1:], left_out.tolist(), strict=False):
+        if is_left_out:
             if start > first:
-                yield first, start, flag
-            first, flag = start, own
+                yield first, start
+            first = stop
     if end > first:
-        yield first, end, flag
+        yield first, end
 
 
 def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int32]:
@@ -208,8 +226,14 @@ def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int,
     """
     from viewsphere.truth import kernels_points as kernels
 
-    box = np.empty((len(corners), 4), np.int32)
-    kernels.boxes(corners, geometry.vertex_start[-1], *size, box)
+    box, nowhere = np.empty((len(corners), 4), np.int32), np.empty((1, 4), np.int32)
+    kernels.boxes(np.array([OUTSIDE]), 1, *size, nowhere)
+    done = 0
+    for first, stop in in_picture(geometry, corners)[0].tolist():
+        box[done:first] = nowhere
+        kernels.boxes(corners[first:stop], geometry.vertex_start[-1] - first, *size, box[first:stop])
+        done = stop
+    box[done:] = nowhere
     return box
 
 
@@ -304,17 +328,12 @@ def _draw(
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
         return nearest, seen
     cell, canvas = np.empty((stop - base, 4), np.int32), (x0, y0, x1 - x0, y1 - y0)
-    vertices, triangles = [(0, stop - base, False)], [(first, last, False)]
+    vertices, triangles = np.array([[0, stop - base]]), np.array([[first, last]])
     if 0 < len(q) == len(geometry.coordinates):  # of a thing that is outside the first vertex is, too
-        start = np.array(geometry.vertex_start[:-1], np.intp)
-        hidden = (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1)
-        vertices = list(_runs(geometry.vertex_start, stop, hidden))
-        triangles = list(_runs(geometry.triangle_start, last, hidden))
-    for begin, end, is_outside in vertices:
-        if not is_outside:
-            kernels.cells(q[begin:end], samples, *canvas, cell[begin:end])
+        vertices, triangles = in_picture(geometry, q, last)
+    for begin, end in vertices.tolist():
+        kernels.cells(q[begin:end], samples, *canvas, cell[begin:end])
     cell[max(geometry.vertex_start[-1] - base, 0) :] = kernels.BEHIND
-    for begin, end, is_outside in triangles:
-        if not is_outside:
-            kernels.draw(q, cell, geometry.triangles, (begin, end, base), (samples, x0, y0), *cut, nearest, seen)
+    for begin, end in triangles.tolist():
+        kernels.draw(q, cell, geometry.triangles, (begin, end, base), (samples, x0, y0), *cut, nearest, seen)
     return nearest, seen

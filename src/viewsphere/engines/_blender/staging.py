@@ -37,7 +37,7 @@ from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, pi
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility, homogeneous
+from viewsphere.truth.visibility import OUTSIDE, Visibility, homogeneous, in_picture
 
 STAGE_SECONDS = 600.0
 """Seconds after which a Blender that has not built its scene counts as hanging."""
@@ -417,8 +417,11 @@ def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int] |
     """Pixels x0, y0, x1, y1 outside of which a pinhole without skew sees nothing of the scene; None where part of the scene
     is beside or behind the camera.
     """
-    used = geometry.triangles.reshape(-1)
-    q = homogeneous(geometry, camera)[used]
+    corners = homogeneous(geometry, camera)
+    _, triangles = in_picture(geometry, corners)
+    used = [geometry.triangles[first:stop].reshape(-1) for first, stop in triangles.tolist()]
+    is_whole = sum(map(len, used)) == geometry.triangles.size
+    q = np.concatenate([*(corners[own] for own in used), *(() if is_whole else ([OUTSIDE],))])
     if not len(q) or not (q[:, 2] > 0).all():
         return None
     x, y = q[:, 0] / q[:, 2], q[:, 1] / q[:, 2]

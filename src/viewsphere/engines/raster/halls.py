@@ -100,15 +100,27 @@ def _thrown(
     only_indoors: bool,
 ) -> _Throwing:
     start, low, high = arranged.geometry.triangle_start, np.zeros(3), np.zeros(3)
-    parts = [np.arange(start[i], start[i + 1], dtype=np.int32) for i in still]
+    casts = surfaces.looks[:, L_CASTS_FROM] <= 1
+    every = (start[i] + np.flatnonzero(casts[surfaces.material[start[i] : start[i + 1]]]).astype(np.int32) for i in still)
+    parts = [part for part in every if len(part)]
+    if parts:
+        bounds = np.array([[f(_corners(surfaces, part), axis=(0, 1)) for f in (np.nanmin, np.nanmax)] for part in parts])
+        low, high = np.nanmin(bounds[:, 0], axis=0), np.nanmax(bounds[:, 1], axis=0)
+        if only_indoors and not _is_roofed(_Roof((own, lengths), low, high, [_above(surfaces, parts, _eyes(low, high))])):
+            parts = []
     which = np.concatenate([np.empty(0, np.int32), *parts])
-    which = which[surfaces.looks[surfaces.material[which], L_CASTS_FROM] <= 1]
-    if len(which):
-        corners = surfaces.vertices[surfaces.triangles[which], 11:14]
-        if only_indoors and not _is_roofed(_Roof((own, lengths), corners)):
-            which = which[:0]
-        low, high = (np.asarray(f(corners.reshape(-1, 3), axis=0), np.float64) for f in (np.nanmin, np.nanmax))
-    return _Throwing(*own, lengths, surfaces.triangles, which, low, high)
+    return _Throwing(*own, lengths, surfaces.triangles, which, low.astype(np.float64), high.astype(np.float64))
+
+
+def _corners(surfaces: Surfaces, which: Int32) -> Float32:
+    """Where the corners of triangles (n,) are, (n, 3, 3)."""
+    return surfaces.vertices[surfaces.triangles[which], 11:14]
+
+
+def _above(surfaces: Surfaces, parts: list[Int32], height: np.float32) -> Float32:
+    """Those of them, in all parts, that reach higher, (n, 3, 3)."""
+    every = (_corners(surfaces, part) for part in parts)
+    return np.concatenate([corners[corners[..., 2].max(axis=1) > height] for corners in every])
 
 
 def _still(arranged: Arranged) -> list[int]:
@@ -119,22 +131,30 @@ def _still(arranged: Arranged) -> list[int]:
     return [i for i in own if i not in arranged.moving and len(arranged.whole[i].triangles)]
 
 
+def _eyes(low: Float32, high: Float32) -> np.float32:
+    """How high one looks up from in a place between two corners."""
+    return np.float32(low[2] + EYES * (high[2] - low[2]))
+
+
 @dataclass(frozen=True)
 class _Roof:
+    """A place between two corners (3,). above: the triangles (n, 3, 3) that reach higher than eyes, which are taken out where
+    they are looked at: what is known of a place is kept, its triangles are not.
+    """
+
     key: Hashable
-    corners: Float32 = field(compare=False)
+    low: Float32 = field(compare=False)
+    high: Float32 = field(compare=False)
+    above: list[Float32] = field(compare=False)
 
 
 @lru_cache(maxsize=4)
 def _is_roofed(roof: _Roof) -> bool:
     """Whether most places within a scenery have the underside of something above them; within a solid thing there is none."""
-    corners = roof.corners
-    low, high = np.nanmin(corners, axis=(0, 1)), np.nanmax(corners, axis=(0, 1))
     # A tree of what is above is small: of a street nearly nothing is.
+    low, high, above, eyes = roof.low, roof.high, roof.above.pop(), _eyes(roof.low, roof.high)
     at = (np.arange(LATTICE) + 0.5) / LATTICE
     x, y = np.meshgrid(*(low[k] + at * (high[k] - low[k]) for k in range(2)))
-    eyes = np.float32(low[2] + EYES * (high[2] - low[2]))
-    above = corners[corners[..., 2].max(axis=1) > eyes]
     if not len(above):
         return False
     places = np.stack([x, y, np.full_like(x, eyes)], axis=-1).reshape(-1, 3).astype(np.float32)

@@ -53,21 +53,27 @@ def _box(q, i0, i1, i2, reach, width, height):
 
 
 @njit(_nrt=True)
-def around(q, triangles, cutout, left_out, window):
-    """Triangles, int64, that may touch a window (x0, y0, x1, y1; pixels, both ends included), except those in `left_out`."""
+def around(q, triangles, runs, cutout, left_out, window):
+    """Triangles, int64, that may touch a window (x0, y0, x1, y1; pixels, both ends included), except those in `left_out`.
+    `runs` are those of `kernels_edges.with_corners_before`.
+    """
     x0, y0, x1, y1 = window
-    side = np.zeros(q.shape[0], np.uint8)  # one bit for each side of the window that the vertex is beyond
+    side = np.empty(q.shape[0], np.uint8)  # one bit for each side of the window that the vertex is beyond
     a, b, c, d = U(0), U(1), U(2), U(3)
-    for i in range(U(q.shape[0])):
-        if q[i, c] > 0.0:
-            x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
-            side[i] = (x < x0) | ((x > x1 + 1.0) << 1) | ((y < y0) << 2) | ((y > y1 + 1.0) << 3)
+    of_vertices, of_triangles = runs
+    for k in range(of_vertices.shape[0]):
+        for i in range(U(of_vertices[k, 0]), U(of_vertices[k, 1])):
+            side[i] = 0
+            if q[i, c] > 0.0:
+                x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+                side[i] = (x < x0) | ((x > x1 + 1.0) << 1) | ((y < y0) << 2) | ((y > y1 + 1.0) << 3)
     order = np.empty(triangles.shape[0] + 1, np.int64)
     n = U(0)
-    for t in range(U(triangles.shape[0])):
-        order[n] = t
-        beyond = side[U(triangles[t, a])] & side[U(triangles[t, b])] & side[U(triangles[t, c])]
-        n += U(((beyond == 0) | (cutout[t] < NEVER)) & (not left_out[t]))
+    for k in range(of_triangles.shape[0]):
+        for t in range(U(of_triangles[k, 0]), U(of_triangles[k, 1])):
+            order[n] = t
+            beyond = side[U(triangles[t, a])] & side[U(triangles[t, b])] & side[U(triangles[t, c])]
+            n += U(((beyond == 0) | (cutout[t] < NEVER)) & (not left_out[t]))
     return order[:n]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +26,12 @@ Key = tuple[bytes, float, float, int]
 
 @dataclass(frozen=True, eq=False)
 class StillMaps:
-    """Triangles that stand still in a sequence, those that move, and maps of the former. All share their vertices.
-    backdrop: the same of scenery alone.
+    """Surfaces of things that stand still in a sequence, and the ground's; of those that move; and maps of the former. They
+    share all arrays, each with its own range of triangles. backdrop: the same of scenery alone.
     """
 
-    still: Surfaces
-    moving: Surfaces
+    still: tuple[Surfaces, ...]
+    moving: tuple[Surfaces, ...]
     backdrop: StillMaps | None = None
     _maps: dict[Key, Float32] = field(default_factory=dict[Key, Float32])
 
@@ -39,12 +40,13 @@ class StillMaps:
         """Of the triangles of things, thing i's beginning at `triangle_start[i]`, of which these are `moving`; those behind the
         first `targets` are scenery.
         """
-        moves = np.zeros(len(surfaces.triangles), np.bool_)
-        for i in moving:
-            moves[triangle_start[i] : triangle_start[i + 1]] = True
-        is_scenery = np.arange(len(moves)) >= triangle_start[targets]
-        backdrop = cls(_chosen(surfaces, is_scenery & ~moves), _chosen(surfaces, is_scenery & moves))
-        return cls(_chosen(surfaces, ~moves), _chosen(surfaces, moves), backdrop)
+        own = [part_of(surfaces, *span) for span in pairwise((*triangle_start, len(surfaces.triangles)))]
+        moves = set(moving)
+
+        def parts(first: int, are_moving: bool) -> tuple[Surfaces, ...]:
+            return tuple(part for i, part in enumerate(own) if i >= first and (i in moves) == are_moving)
+
+        return cls(parts(0, False), parts(0, True), cls(parts(targets, False), parts(targets, True)))
 
     def begun(self, key: Key) -> Float32 | None:
         """The map of what stands still in this view, if it is kept."""
@@ -57,8 +59,9 @@ class StillMaps:
         self._maps[key] = depth.copy()
 
 
-def _chosen(surfaces: Surfaces, which: NDArray[np.bool_]) -> Surfaces:
-    return surfaces._replace(triangles=surfaces.triangles[which], material=surfaces.material[which])
+def part_of(surfaces: Surfaces, first: int, stop: int | None = None) -> Surfaces:
+    """Triangles [first, stop) alone."""
+    return surfaces._replace(triangles=surfaces.triangles[first:stop], material=surfaces.material[first:stop])
 
 
 def snapped(span: float, middle: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

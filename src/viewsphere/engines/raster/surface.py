@@ -92,8 +92,9 @@ def pack_surfaces(geometry: Geometry, meshes: Sequence[Mesh], materials: Materia
     for i in range(len(meshes)):
         _place(vertices, geometry, i, lengths)
     _place_ground(vertices, geometry, lengths)
-    triangles = geometry.triangles.astype(np.uint32)
-    return Surfaces(vertices, triangles, material, geometry.triangle_normals, materials.looks, materials.bundles)
+    return Surfaces(
+        vertices, geometry.triangles.view(np.uint32), material, geometry.triangle_normals, materials.looks, materials.bundles
+    )
 
 
 def move_surfaces(surfaces: Surfaces, geometry: Geometry, things: Sequence[int], lengths: Lengths) -> Surfaces:
