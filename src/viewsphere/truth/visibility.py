@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from viewsphere.geometry.camera import Window, has_unit_rays, pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.sparse import sparse
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
 
@@ -153,27 +153,29 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     if base or stop is not None or camera.distortion is not None:
         return projected(geometry, m, base, stop)
     end, left_out = len(geometry.coordinates), outside(geometry, camera, m)
-    q = np.empty((end, 4))
-    q[
-        [
-            start
-            for start, is_outside in zip(geometry.vertex_start, left_out.tolist(), strict=False)
-            if is_outside and start < end
-        ]
-    ] = OUTSIDE
-    for first, last in _runs(geometry.vertex_start, end, left_out):
+    q = sparse((end, 4), np.float64)
+    starts = zip(geometry.vertex_start, left_out.tolist(), strict=False)
+    q[[start for start, is_left_out in starts if is_left_out and start < end]] = OUTSIDE
+    for first, last in _shown(left_out, geometry.vertex_start, end).tolist():
         _project(geometry, m, first, last, q[first:last])
     return q
 
 
 def in_picture(geometry: Geometry, q: NDArray[np.float64], end: int | None = None) -> tuple[Runs, Runs]:
-    """The vertices and the triangles, up to `end` of these, that are not left out of `homogeneous` vertices q of all things."""
+    """The vertices and the triangles, up to `end` of these, that are not left out of `homogeneous` vertices q of all things:
+    as many runs of both, which belong together.
+    """
     start = np.array(geometry.vertex_start[:-1], np.intp)
-    left_out = (q[np.minimum(start, max(len(q) - 1, 0))] == OUTSIDE).all(axis=1) if len(q) else start < 0
+    left_out = (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1) if len(q) else start < 0
     last = len(geometry.triangles) if end is None else end
-    spans = _runs(geometry.vertex_start, len(q), left_out), _runs(geometry.triangle_start, last, left_out)
-    vertices, triangles = (np.array(list(runs), np.int64).reshape(-1, 2) for runs in spans)
-    return vertices, triangles
+    return _shown(left_out, geometry.vertex_start, len(q)), _shown(left_out, geometry.triangle_start, last)
+
+
+def _shown(left_out: NDArray[np.bool_], starts: tuple[int, ...], end: int) -> Runs:
+    """Runs, up to the end, of what things that are not left out own from these starts on, and the ground."""
+    is_shown = np.array([False, *~left_out, True, False])
+    borders = np.flatnonzero(is_shown[1:] != is_shown[:-1])
+    return np.array([*starts, end], np.int64)[borders].reshape(-1, 2)
 
 
 def projected(geometry: Geometry, m: NDArray[np.float64], base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
@@ -206,18 +208,6 @@ def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.fl
         u, v, w = (corners[..., 0] * m[0] + corners[..., 1] * m[1] + corners[..., 2] * m[2] + m[3] for m in pixels_from_world)
         sides = u < -w, u > (camera.width + 1) * w, v < -w, v > (camera.height + 1) * w, w < 0
         return np.logical_or.reduce([side.all(axis=1) for side in sides])
-
-
-def _runs(starts: tuple[int, ...], end: int, left_out: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Runs [first, stop), up to the end, of what things own from these starts on, without things that are left out."""
-    first = 0
-    for start, stop, is_left_out in zip(starts, starts[1:], left_out.tolist(), strict=False):
-        if is_left_out:
-            if start > first:
-                yield first, start
-            first = stop
-    if end > first:
-        yield first, end
 
 
 def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int32]:
@@ -327,13 +317,13 @@ def _draw(
         table, unit = t.arrays, has_unit_rays(camera.distortion)
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
         return nearest, seen
-    cell, canvas = np.empty((stop - base, 4), np.int32), (x0, y0, x1 - x0, y1 - y0)
-    vertices, triangles = np.array([[0, stop - base]]), np.array([[first, last]])
-    if 0 < len(q) == len(geometry.coordinates):  # of a thing that is outside the first vertex is, too
+    canvas, parts = (x0, y0, x1 - x0, y1 - y0), [(base, stop, first, last)]
+    if 0 < len(q) == len(geometry.coordinates):  # things may be left out
         vertices, triangles = in_picture(geometry, q, last)
-    for begin, end in vertices.tolist():
-        kernels.cells(q[begin:end], samples, *canvas, cell[begin:end])
-    cell[max(geometry.vertex_start[-1] - base, 0) :] = kernels.BEHIND
-    for begin, end in triangles.tolist():
-        kernels.draw(q, cell, geometry.triangles, (begin, end, base), (samples, x0, y0), *cut, nearest, seen)
+        parts = np.column_stack((vertices, triangles)).tolist()
+    for begin, end, first, last in parts:
+        own, cell = q[begin - base : end - base], np.empty((end - begin, 4), np.int32)
+        kernels.cells(own, samples, *canvas, cell)
+        cell[max(geometry.vertex_start[-1] - begin, 0) :] = kernels.BEHIND
+        kernels.draw(own, cell, geometry.triangles, (first, last, begin), (samples, x0, y0), *cut, nearest, seen)
     return nearest, seen
