@@ -145,13 +145,13 @@ def test_what_stands_still_is_drawn_once():
         stage.baked(i)
         maps.append(stage._packed[0].maps)
     assert all(each is maps[0] for each in maps) and len(maps[0]._maps) <= 2
-    assert sum(len(part.triangles) for part in maps[0].moving) == 12
-    assert sum(len(part.triangles) for part in maps[0].still) + 12 == len(stage.at(0).triangles)
+    assert sum(len(part().triangles) for part in maps[0].moving) == 12
+    assert sum(len(part().triangles) for part in maps[0].still) + 12 == len(stage.at(0).triangles)
 
 
 def test_few_maps_are_kept():
-    surfaces = stage_of(sequence_of("sun")).baked(0).surfaces
-    maps = StillMaps.of(surfaces, (0, len(surfaces.triangles)), (), 1)
+    rows = stage_of(sequence_of("sun")).baked(0).rows
+    maps = StillMaps.of(rows.part, 1, (), 1)
     for i in range(3 * MOST):
         maps.keep((b"", float(i), 0.0, 4), np.full((4, 20), i, np.float32))
     assert maps.begun((b"", 0.0, 0.0, 4)) is None

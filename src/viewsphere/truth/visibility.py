@@ -152,11 +152,11 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
     if base or stop is not None or camera.distortion is not None:
         return projected(geometry, m, base, stop)
-    end, left_out = len(geometry.coordinates), outside(geometry, camera, m)
+    end, without = len(geometry.coordinates), outside(geometry, camera, m)
     q = sparse((end, 4), np.float64)
-    starts = zip(geometry.vertex_start, left_out.tolist(), strict=False)
+    starts = zip(geometry.vertex_start, without.tolist(), strict=False)
     q[[start for start, is_left_out in starts if is_left_out and start < end]] = OUTSIDE
-    for first, last in _shown(left_out, geometry.vertex_start, end).tolist():
+    for first, last in _shown(without, geometry.vertex_start, end).tolist():
         _project(geometry, m, first, last, q[first:last])
     return q
 
@@ -165,15 +165,19 @@ def in_picture(geometry: Geometry, q: NDArray[np.float64], end: int | None = Non
     """The vertices and the triangles, up to `end` of these, that are not left out of `homogeneous` vertices q of all things:
     as many runs of both, which belong together.
     """
+    without, last = left_out(geometry, q), len(geometry.triangles) if end is None else end
+    return _shown(without, geometry.vertex_start, len(q)), _shown(without, geometry.triangle_start, last)
+
+
+def left_out(geometry: Geometry, q: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which things are left out of `homogeneous` vertices q of all of them."""
     start = np.array(geometry.vertex_start[:-1], np.intp)
-    left_out = (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1) if len(q) else start < 0
-    last = len(geometry.triangles) if end is None else end
-    return _shown(left_out, geometry.vertex_start, len(q)), _shown(left_out, geometry.triangle_start, last)
+    return (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1) if len(q) else start < 0
 
 
-def _shown(left_out: NDArray[np.bool_], starts: tuple[int, ...], end: int) -> Runs:
-    """Runs, up to the end, of what things that are not left out own from these starts on, and the ground."""
-    is_shown = np.array([False, *~left_out, True, False])
+def _shown(without: NDArray[np.bool_], starts: tuple[int, ...], end: int) -> Runs:
+    """Runs, up to the end, of what things own that are not left out, from these starts on, and the ground."""
+    is_shown = np.array([False, *~without, True, False])
     borders = np.flatnonzero(is_shown[1:] != is_shown[:-1])
     return np.array([*starts, end], np.int64)[borders].reshape(-1, 2)
 

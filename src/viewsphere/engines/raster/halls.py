@@ -16,8 +16,8 @@ from viewsphere.engines._arranged import Arranged
 from viewsphere.engines.raster.bounces import Hall
 from viewsphere.engines.raster.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.lights import Casters
-from viewsphere.engines.raster.records import Float32, Int32, Surfaces
-from viewsphere.engines.raster.surface import Lengths
+from viewsphere.engines.raster.records import Float32, Int32
+from viewsphere.engines.raster.surface import Lengths, Rows
 from viewsphere.engines.raster.tracing import cast, tree_of
 from viewsphere.model.thing import Thing
 
@@ -58,6 +58,7 @@ class Halls:
     def of(
         self,
         arranged: Arranged,
+        rows: Rows,
         casters: Casters,
         floor: Float32,
         lengths: Lengths,
@@ -69,7 +70,7 @@ class Halls:
         """
         if bounces == "off" or (bounces == "auto" and not arranged.has_scenery):
             return None
-        own = self._throwing(arranged, casters.surfaces, lengths, bounces == "auto")
+        own = self._throwing(arranged, rows, bounces == "auto")
         if not len(own.which):
             return None
         height = arranged.geometry.ground_z if has_ground else None
@@ -79,47 +80,43 @@ class Halls:
         limits = own.which, own.low, own.high
         return Hall(key, casters.surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map)
 
-    def _throwing(self, arranged: Arranged, surfaces: Surfaces, lengths: Lengths, only_indoors: bool) -> _Throwing:
-        still = _still(arranged)
+    def _throwing(self, arranged: Arranged, rows: Rows, only_indoors: bool) -> _Throwing:
+        still, surfaces, lengths = _still(arranged), rows.surfaces, rows.lengths
         things, meshes = tuple(arranged.things[i] for i in still), tuple(arranged.whole[i] for i in still)
         for last in self._last:
             same = len(last.things) == len(things) and all(map(is_, last.things, things)) and all(map(is_, last.meshes, meshes))
             if same and last.lengths == lengths and last.triangles is surfaces.triangles:
                 return last
-        found = _thrown(arranged, still, (things, meshes), surfaces, lengths, only_indoors)
+        found = _thrown(still, (things, meshes), rows, only_indoors)
         self._last[:] = [found]
         return found
 
 
-def _thrown(
-    arranged: Arranged,
-    still: list[int],
-    own: tuple[tuple[Thing, ...], tuple[Mesh, ...]],
-    surfaces: Surfaces,
-    lengths: Lengths,
-    only_indoors: bool,
-) -> _Throwing:
-    start, low, high = arranged.geometry.triangle_start, np.zeros(3), np.zeros(3)
-    casts = surfaces.looks[:, L_CASTS_FROM] <= 1
-    every = (start[i] + np.flatnonzero(casts[surfaces.material[start[i] : start[i + 1]]]).astype(np.int32) for i in still)
-    parts = [part for part in every if len(part)]
+def _thrown(still: list[int], own: tuple[tuple[Thing, ...], tuple[Mesh, ...]], rows: Rows, only_indoors: bool) -> _Throwing:
+    low, high = np.zeros(3), np.zeros(3)
+    casts = rows.surfaces.looks[:, L_CASTS_FROM] <= 1
+    every = ((i, np.flatnonzero(casts[rows.part(i).material])) for i in still)
+    parts = [(i, which) for i, which in every if len(which)]
     if parts:
-        bounds = np.array([[f(_corners(surfaces, part), axis=(0, 1)) for f in (np.nanmin, np.nanmax)] for part in parts])
+        bounds = np.array([[f(_corners(rows, *part), axis=(0, 1)) for f in (np.nanmin, np.nanmax)] for part in parts])
         low, high = np.nanmin(bounds[:, 0], axis=0), np.nanmax(bounds[:, 1], axis=0)
-        if only_indoors and not _is_roofed(_Roof((own, lengths), low, high, [_above(surfaces, parts, _eyes(low, high))])):
+        if only_indoors and not _is_roofed(_Roof((own, rows.lengths), low, high, [_above(rows, parts, _eyes(low, high))])):
             parts = []
-    which = np.concatenate([np.empty(0, np.int32), *parts])
-    return _Throwing(*own, lengths, surfaces.triangles, which, low.astype(np.float64), high.astype(np.float64))
+    rows.write(i for i, _ in parts)
+    start = rows.geometry.triangle_start
+    which = np.concatenate([np.empty(0, np.int32), *((start[i] + which).astype(np.int32) for i, which in parts)])
+    return _Throwing(*own, rows.lengths, rows.surfaces.triangles, which, low.astype(np.float64), high.astype(np.float64))
 
 
-def _corners(surfaces: Surfaces, which: Int32) -> Float32:
-    """Where the corners of triangles (n,) are, (n, 3, 3)."""
-    return surfaces.vertices[surfaces.triangles[which], 11:14]
+def _corners(rows: Rows, i: int, which: NDArray[np.intp]) -> Float32:
+    """Where the corners of these triangles (n,) of thing i are, (n, 3, 3)."""
+    part = rows.part(i)
+    return part.vertices[part.triangles[which], 11:14]
 
 
-def _above(surfaces: Surfaces, parts: list[Int32], height: np.float32) -> Float32:
+def _above(rows: Rows, parts: list[tuple[int, NDArray[np.intp]]], height: np.float32) -> Float32:
     """Those of them, in all parts, that reach higher, (n, 3, 3)."""
-    every = (_corners(surfaces, part) for part in parts)
+    every = (_corners(rows, *part) for part in parts)
     return np.concatenate([corners[corners[..., 2].max(axis=1) > height] for corners in every])
 
 

@@ -15,7 +15,8 @@ from viewsphere.engines.raster import kernels_shadow as kernels
 from viewsphere.engines.raster.kernels_arrive import AREA, DISTANT, POINT, SPOT
 from viewsphere.engines.raster.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures
-from viewsphere.engines.raster.still_maps import StillMaps, part_of, rounded, snapped
+from viewsphere.engines.raster.still_maps import Part, StillMaps, rounded, snapped
+from viewsphere.engines.raster.surface import part_of
 from viewsphere.model.scene import AnyLight, AreaLight, HemisphereLight, PointLight, SpotLight
 from viewsphere.surroundings.sun import Distant
 
@@ -389,7 +390,7 @@ def draw_views(views: Sequence[ShadowView], casters: Casters, opposite: bool = F
         farthest.fill(-np.inf)
         tilt = float(form[i, kernels.TILT]) if view.is_round else 0.0
         for part in _begin(view, tilt, casters, nearest):
-            _draw(view, tilt, part, casters.textures, nearest, farthest)
+            _draw(view, tilt, part(), casters.textures, nearest, farthest)
         np.negative(farthest, out=farthest)
     for i in range(count):
         _thin_out(result, i)
@@ -410,16 +411,16 @@ def _draw(
     kernels.draw_depth(corners, surfaces, textures, view.near, tilt, nearest, other)
 
 
-def _begin(view: ShadowView, tilt: float, casters: Casters, nearest: Float32) -> tuple[Surfaces, ...]:
+def _begin(view: ShadowView, tilt: float, casters: Casters, nearest: Float32) -> tuple[Part, ...]:
     """Draw what stands still in a sequence into an empty map; returns what is still to be drawn."""
     maps, key = casters.maps, (view.matrix.tobytes(), view.near, tilt, view.size)
     kept = None if maps is None else maps.begun(key)
     nearest[:] = np.inf if kept is None else kept
     if maps is None:
-        return (casters.surfaces,)
+        return (lambda: casters.surfaces,)
     if kept is None:
         for part in maps.still:
-            _draw(view, tilt, part, casters.textures, nearest)
+            _draw(view, tilt, part(), casters.textures, nearest)
         maps.keep(key, nearest)
     return maps.moving
 

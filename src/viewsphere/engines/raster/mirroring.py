@@ -55,6 +55,7 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
     geometry = replace(baked.geometry, triangles=kept)
     own = replace(baked, geometry=geometry, blended=replace(baked.blended, triangles=kept))
     found, view = rasterize(geometry, below), view_of(baked, below)
+    baked.rows.write_seen(below, found, geometry)
     triangle, depth = np.full(found.triangle.size, -1, np.int32), np.zeros(found.triangle.size, np.float32)
     triangle[at], depth[at] = found.triangle.reshape(-1)[at], found.inverse_depth.reshape(-1)[at]
     light = np.zeros((len(triangle), 4), np.float32)

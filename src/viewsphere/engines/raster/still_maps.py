@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,31 +20,31 @@ STEPS = 16
 of shadows.
 """
 
+Part = Callable[[], Surfaces]
 Key = tuple[bytes, float, float, int]
 """Of a view: its matrix, where it begins, its tilt and its size."""
 
 
 @dataclass(frozen=True, eq=False)
 class StillMaps:
-    """Surfaces of things that stand still in a sequence, and the ground's; of those that move; and maps of the former. They
-    share all arrays, each with its own range of triangles. backdrop: the same of scenery alone.
+    """What gives the surfaces of each thing that stands still in a sequence, and of the ground; of each that moves; and maps of
+    the former. backdrop: the same of scenery alone.
     """
 
-    still: tuple[Surfaces, ...]
-    moving: tuple[Surfaces, ...]
+    still: tuple[Part, ...]
+    moving: tuple[Part, ...]
     backdrop: StillMaps | None = None
     _maps: dict[Key, Float32] = field(default_factory=dict[Key, Float32])
 
     @classmethod
-    def of(cls, surfaces: Surfaces, triangle_start: Sequence[int], moving: Sequence[int], targets: int) -> StillMaps:
-        """Of the triangles of things, thing i's beginning at `triangle_start[i]`, of which these are `moving`; those behind the
-        first `targets` are scenery.
+    def of(cls, part: Callable[[int], Surfaces], count: int, moving: Sequence[int], targets: int) -> StillMaps:
+        """Of so many things and the ground, whose surfaces `part` gives, of which these are `moving`; those behind the first
+        `targets` are scenery.
         """
-        own = [part_of(surfaces, *span) for span in pairwise((*triangle_start, len(surfaces.triangles)))]
         moves = set(moving)
 
-        def parts(first: int, are_moving: bool) -> tuple[Surfaces, ...]:
-            return tuple(part for i, part in enumerate(own) if i >= first and (i in moves) == are_moving)
+        def parts(first: int, are_moving: bool) -> tuple[Part, ...]:
+            return tuple(partial(part, i) for i in range(first, count + 1) if (i in moves) == are_moving)
 
         return cls(parts(0, False), parts(0, True), cls(parts(targets, False), parts(targets, True)))
 
@@ -57,11 +57,6 @@ class StillMaps:
         if len(self._maps) == MOST:
             del self._maps[next(iter(self._maps))]
         self._maps[key] = depth.copy()
-
-
-def part_of(surfaces: Surfaces, first: int, stop: int | None = None) -> Surfaces:
-    """Triangles [first, stop) alone."""
-    return surfaces._replace(triangles=surfaces.triangles[first:stop], material=surfaces.material[first:stop])
 
 
 def snapped(span: float, middle: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
