@@ -262,7 +262,7 @@ class Sight:
         return np.empty(shape if components == 1 else (*shape, components), dtype)
 
     def per_triangle(self, table: NDArray[np.int32], empty: int) -> NDArray[np.int32]:
-        """An int32 channel: the table's number for the triangle seen, `empty` where nothing is seen."""
+        """An int32 channel: the table's number for the triangle seen, 0 beyond its end, `empty` where nothing is seen."""
         from viewsphere.truth import kernels_channels as kernels
 
         out = self.empty(np.int32)

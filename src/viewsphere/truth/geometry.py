@@ -21,10 +21,13 @@ from viewsphere.truth.cutouts import ENDLESS, NO_CUTOUTS, Cutouts, mesh_cutouts,
 BACKGROUND = 0
 """Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
 
+UP = np.array([0, 0, 1], np.float32)
+"""The ground's normal."""
+
 GROUND_REACH = 1000.0
 """Scene sizes from the middle to the ground's corners: as far as a renderer without endless planes has to draw it."""
 
-OF_VERTICES = ("coordinates", "own_normals", "is_used")
+OF_VERTICES = ("coordinates", "is_used")
 OF_TRIANGLES = (
     "triangle_object",
     "triangle_part",
@@ -44,12 +47,13 @@ class Geometry:
     """Triangles in the world: objects in id order, then scenery, the ground (if any) last.
 
     Where things are is held once a thing, not for each vertex: instants and instances share all else. poses (N, 4, 4) float64:
-    world from each thing; meshes: theirs; coordinates, own_normals (V, 3) float32: each vertex and its normal in its thing's
-    axes (the ground's are zero and up); ground (4, 3) float64: its corners in the world, (0, 3) without one.
+    world from each thing; meshes: theirs; coordinates (V, 3) float32: each vertex in its thing's axes (zero for the ground);
+    ground (4, 3) float64: its corners in the world, (0, 3) without one.
 
-    triangles (T, 3) int32; triangle_object, triangle_part, triangle_category, triangle_material, triangle_body_part (T,) int32,
-    0 for scenery and ground; triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32:
-    -1 all surface, -2 never seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
+    triangles (T, 3) int32; triangle_object (T,) int32: 0 for scenery and ground; triangle_part, triangle_category,
+    triangle_material, triangle_body_part int32: of the objects' triangles alone, which come first, all others have 0;
+    triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32: -1 all surface, -2 never
+    seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
 
     is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
     the highest of its used vertices, infinite where it has none.
@@ -64,7 +68,6 @@ class Geometry:
     poses: Corner
     meshes: tuple[Mesh, ...]
     coordinates: NDArray[np.float32]
-    own_normals: NDArray[np.float32]
     ground: Corner
     triangles: NDArray[np.int32]
     triangle_object: NDArray[np.int32]
@@ -148,7 +151,7 @@ class Facing:
     def of_vertices(self, geometry: Geometry) -> NDArray[np.float32]:
         """Their normals."""
         if self._vertices is None:
-            self._vertices = geometry.own_normals.copy()
+            self._vertices = np.tile(UP, (len(geometry.coordinates), 1))
         for i in self._elsewhere("vertices", geometry):
             own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
             _turn(geometry, i, self._vertices[own])
@@ -164,8 +167,7 @@ class Facing:
             if geometry.ground_z is not None:
                 start, base = geometry.triangle_start[-1], geometry.vertex_start[-1]
                 normals, side = (array[start:] for array in self._triangles)
-                up = geometry.own_normals[base:]
-                kernels.face(geometry.ground, up, geometry.triangles[start:], base, normals, side)
+                kernels.face(geometry.ground, np.tile(UP, (4, 1)), geometry.triangles[start:], base, normals, side)
         for i in self._elsewhere("triangles", geometry):
             first, stop, base = *geometry.triangle_start[i : i + 2], geometry.vertex_start[i]
             normals, side = (array[first:stop] for array in self._triangles)
@@ -188,7 +190,7 @@ def _turn(geometry: Geometry, i: int, turned: NDArray[np.float32]) -> None:
     """Write the world normals of thing i's vertices."""
     from viewsphere.truth import kernels_place as kernels
 
-    kernels.turn(geometry.poses[i], geometry.own_normals[geometry.vertex_start[i] : geometry.vertex_start[i + 1]], turned)
+    kernels.turn(geometry.poses[i], read_only(geometry.meshes[i].normals), turned)
 
 
 def placed_meshes(things: Sequence[Thing], load: Load) -> list[Mesh]:
@@ -237,7 +239,7 @@ def moved(geometry: Geometry, where: Mapping[int, tuple[Thing, Mesh]]) -> Geomet
     for i, (thing, mesh) in where.items():
         if mesh is not meshes[i]:
             own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
-            geometry.coordinates[own], geometry.own_normals[own], meshes[i] = mesh.vertices, mesh.normals, mesh
+            geometry.coordinates[own], meshes[i] = mesh.vertices, mesh
         poses[i] = thing.world_from_object
     placed = replace(geometry, poses=poses, bounds=bounds, meshes=tuple(meshes))
     for i in where:
@@ -276,7 +278,10 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
 def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
     vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
     triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], np.int32)
-    labels = _joined([_labels(p, m) for p, m in zip(things, meshes, strict=True)], np.int32, 6)
+    objects = sum(p.id > 0 for p in things)
+    held = list(zip(things, meshes, strict=True))
+    labels = _joined([_labels(p, m) for p, m in held[:objects]], np.int32, 6)
+    around = [labels[:, 3], *(_classes(p, m) for p, m in held[objects:])]
     cutouts, rows = stack_cutouts([mesh_cutouts(m, label_alpha) for m in meshes])
     is_used = np.zeros(vertex_start[-1], np.bool_)
     is_used[triangles] = True
@@ -284,13 +289,12 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         poses=np.array([thing.world_from_object for thing in things]).reshape(-1, 4, 4),
         meshes=meshes,
         coordinates=_joined([mesh.vertices for mesh in meshes], np.float32),
-        own_normals=_joined([mesh.normals for mesh in meshes], np.float32),
         ground=np.empty((0, 3)),
         triangles=triangles,
-        triangle_object=labels[:, 0],
+        triangle_object=np.concatenate([labels[:, 0], np.full(len(triangles) - len(labels), BACKGROUND, np.int32)]),
         triangle_part=labels[:, 1],
         triangle_category=labels[:, 2],
-        triangle_class=labels[:, 3],
+        triangle_class=np.concatenate(around),
         triangle_material=labels[:, 4],
         triangle_body_part=labels[:, 5],
         triangle_cutout=rows,
@@ -299,7 +303,7 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         bounds=np.empty((len(things), 2, 3)),
         vertex_start=vertex_start,
         triangle_start=(0, *accumulate(len(m.triangles) for m in meshes)),
-        object_count=sum(p.id > 0 for p in things),
+        object_count=objects,
         ground_z=None,
         facing=Facing(),
     )
@@ -331,36 +335,36 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
 
 
 def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
-    """Object, part, category, class, material and part of a body of each triangle, (T, 6)."""
+    """Object, part, category, class, material and part of a body of each triangle of an object, (T, 6)."""
     labels = np.full((len(mesh.triangles), 6), BACKGROUND, np.int32)
-    if thing.id:
-        labels[:, 0], labels[:, 1], labels[:, 2] = thing.id, mesh.triangle_part + 1, thing.model.category_id
-        labels[:, 3], labels[:, 4] = thing_class(thing.model.category_id), mesh.triangle_material + 1
-        if mesh.triangle_body_part is not None:
-            labels[:, 5] = mesh.triangle_body_part
-    else:
-        stuff = [stuff_of(thing.model.category, part) for part in mesh.parts]
-        labels[:, 3] = np.array(stuff, np.int32)[mesh.triangle_part]
+    labels[:, 0], labels[:, 1], labels[:, 2] = thing.id, mesh.triangle_part + 1, thing.model.category_id
+    labels[:, 3], labels[:, 4] = thing_class(thing.model.category_id), mesh.triangle_material + 1
+    if mesh.triangle_body_part is not None:
+        labels[:, 5] = mesh.triangle_body_part
     return labels
+
+
+def _classes(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
+    """Class of each triangle of scenery, (T,)."""
+    return np.array([stuff_of(thing.model.category, part) for part in mesh.parts], np.int32)[mesh.triangle_part]
 
 
 def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
     """A plane in two halves, below all that is placed, or where `floor` says, counter-clockwise seen from above."""
     corners = _ground_corners(bounds, floor)
-    up, background = np.tile(np.array([0, 0, 1], np.float32), (4, 1)), np.full(2, BACKGROUND, np.int32)
+    background, none = np.full(2, BACKGROUND, np.int32), np.empty(0, np.int32)
     return Geometry(
         poses=np.empty((0, 4, 4)),
         meshes=(),
-        coordinates=np.zeros_like(up),
-        own_normals=up,
+        coordinates=np.zeros((4, 3), np.float32),
         ground=corners,
         triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
         triangle_object=background,
-        triangle_part=background,
-        triangle_category=background,
+        triangle_part=none,
+        triangle_category=none,
         triangle_class=np.full(2, GROUND, np.int32),
-        triangle_material=background,
-        triangle_body_part=background,
+        triangle_material=none,
+        triangle_body_part=none,
         triangle_cutout=np.array(ENDLESS, np.int32),
         cutouts=NO_CUTOUTS,
         is_used=np.ones(4, np.bool_),
@@ -398,3 +402,10 @@ def _bound(geometry: Geometry, i: int) -> None:
 def _joined(arrays: Sequence[NDArray[Any]], dtype: type, width: int = 3) -> NDArray[Any]:
     """Rows of so many numbers, one after another."""
     return np.ascontiguousarray(np.concatenate([np.zeros((0, width), dtype), *arrays]), dtype)
+
+
+def read_only(array: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A view that cannot be written to, whatever the array is: kernels are compiled once for both."""
+    view = np.ascontiguousarray(array).view()
+    view.setflags(write=False)
+    return view

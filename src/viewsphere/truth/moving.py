@@ -19,9 +19,6 @@ from viewsphere.truth.geometry import Geometry, build_geometry, lay_ground, move
 ROOMS = 3
 """Instants whose geometries are there at once: a picture's own, the one before and the one after."""
 
-DEFORMED = ("coordinates", "own_normals")
-"""Arrays of a geometry that change where something deforms; all others are shared, but for where things are."""
-
 KEPT = (
     *("triangles", "triangle_material", "triangle_part", "triangle_body_part"),
     *("uv0", "uv1", "colors", "materials", "images"),
@@ -108,7 +105,7 @@ class Ring:
         is_deformed = any(a is not b for a, b in zip(room.meshes, meshes, strict=True))
         is_used = room is not free or any(other.coordinates is geometry.coordinates for other in others)
         if is_deformed and is_used:
-            geometry = replace(geometry, **{name: getattr(geometry, name).copy() for name in DEFORMED})
+            geometry = replace(geometry, coordinates=geometry.coordinates.copy())
         elsewhere = {i: (things[i], meshes[i]) for i in room.changed(things, meshes)}
         return _Room(things, meshes, floor, lay_ground(moved(geometry, elsewhere), floor))
 

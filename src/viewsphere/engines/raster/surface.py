@@ -19,7 +19,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint, Thing
 from viewsphere.surroundings.ground import ground_frame, ground_material
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.geometry import UP, Geometry, read_only
 from viewsphere.truth.sparse import sparse
 from viewsphere.truth.visibility import Visibility, homogeneous, left_out
 
@@ -152,12 +152,13 @@ class Rows:
         for first, values in ((3, mesh.uv0), (5, mesh.uv1), (7, mesh.colors)):
             if values is not None:
                 rows[:, first : first + values.shape[1]] = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        place_rows(g.poses[i], g.coordinates[own], g.own_normals[own], np.array(self.lengths.origin), self.lengths.unit, rows)
+        frame = np.array(self.lengths.origin), self.lengths.unit
+        place_rows(g.poses[i], g.coordinates[own], read_only(mesh.normals), *frame, rows)
 
     def _write_ground(self) -> None:
         g, rows = self.geometry, self.surfaces.vertices[self.geometry.vertex_start[-1] :]
         rows[:, 3:] = 0.0
-        rows[:, :3], rows[:, 7:11] = g.own_normals[g.vertex_start[-1] :], 1.0
+        rows[:, :3], rows[:, 7:11] = UP, 1.0
         rows[:, 11:14] = (g.ground - self.lengths.origin) / self.lengths.unit
 
 
