@@ -93,12 +93,12 @@ def front_face(shape: Shape, style: Grille, coats: Coats) -> list[Piece]:
     pieces.append(Piece("badge", coats.chrome, badge))
     mouth = float(shape.hull.outline.u_at_x(0.55 * half))
     duct = np.array([[-mouth * 0.92, low + 0.07], [mouth * 0.92, low + 0.07], [mouth, low + 0.16], [-mouth, low + 0.16]])
-    pieces.append(Piece("intake", coats.black, panel(surface, duct, 0.006, 0.2, 7, rings=2, corner=2)))
+    pieces.append(Piece("intake", coats.black, panel(surface, duct, 0.011, 0.2, 7, rings=2, corner=2)))
     a, b = (float(shape.hull.outline.u_at_x(f * half)) for f in (0.66, 0.8))
     fog = np.array([[a, low + 0.09], [b, low + 0.09], [b, low + 0.16], [a, low + 0.16]])
-    pieces += _pair("fog_light", coats.black, panel(surface, fog, 0.005, 0.4, 2, rings=1, corner=2))
+    pieces += _pair("fog_light", coats.black, panel(surface, fog, 0.009, 0.4, 2, rings=1, corner=2))
     pieces += _pair(
-        "fog_light", coats.white_lamp, panel(surface, _shrunk(fog, 0.25, 0.75, 0.15, 0.85), 0.009, 0.5, 1, 0.008, 1, 2)
+        "fog_light", coats.white_lamp, panel(surface, _shrunk(fog, 0.25, 0.75, 0.15, 0.85), 0.013, 0.5, 1, 0.008, 1, 2)
     )
     return pieces + plate(surface, 0.0, 0.5 * (low + 0.16 + line) + 0.01, 1.0, coats)
 
@@ -143,7 +143,7 @@ def rear_face(shape: Shape, coats: Coats, exhausts: int) -> list[Piece]:
     apron = np.array([[4 - m, low + 0.02], [4 + m, low + 0.02], [4 + m * 0.9, low + 0.1], [4 - m * 0.9, low + 0.1]])
     pieces = [
         *plate(surface, 4.0, at, -1.0, coats),
-        Piece("bumper_rear", coats.black, panel(surface, apron, 0.006, 0.2, 7, rings=2, corner=2)),
+        Piece("bumper_rear", coats.black, panel(surface, apron, 0.011, 0.2, 7, rings=2, corner=2)),
     ]
     grip = raised(surface, np.array([[4.0, at + 0.09]]), 0.006)[0]
     pieces.append(Piece("tailgate_handle", coats.chrome, moved(rounded_box((0.34, 0.02, 0.025), 0.009, 2), grip)))
