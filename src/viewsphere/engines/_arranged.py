@@ -46,7 +46,7 @@ class Arranged:
         """The meshes that the geometry was built from."""
         return present(self.things, self.whole)
 
-    @property
+    @cached_property
     def targets(self) -> int:
         """How many of the things, which come first, are not scenery."""
         return sum(not thing.scenery for thing in self.things)
@@ -108,7 +108,7 @@ class Arrangements:
     meshes: tuple[Mesh, ...]  # at rest
     floor: Floor | None
     ring: Ring
-    _things: dict[int, tuple[Thing, ...]] = field(default_factory=dict[int, "tuple[Thing, ...]"])
+    _known: dict[int, Arranged] = field(default_factory=dict[int, Arranged])
 
     @classmethod
     def build(cls, shot: Shot, load: Load) -> Arrangements:
@@ -122,17 +122,21 @@ class Arrangements:
 
     def of(self, shot: Shot) -> Arrangements:
         """The arrangements of another shot of an equal `stage_key`, which share the loaded meshes."""
-        own = replace(self, shot=shot, _things={})
+        own = replace(self, shot=shot, _known={})
         return replace(own, floor=shot_floor(shot, lambda instant: own._meshes(shot.things_at(instant))))
 
     def at(self, instant: int) -> Arranged:
         """The things as they stand at an instant, counted from 0 in the shot."""
-        things = self._things.pop(instant, None) or self.shot.things_at(instant)
-        self._things[instant] = things  # the last asked for comes last
-        if len(self._things) > ROOMS:
-            del self._things[next(iter(self._things))]
-        meshes = self._meshes(things)
-        return self._arranged(things, meshes, meshes, self.ring.at(things, meshes, self.floor))
+        known = self._known.pop(instant, None)
+        things = self.shot.things_at(instant) if known is None else known.things
+        meshes = self._meshes(things) if known is None else known.whole
+        geometry = self.ring.at(things, meshes, self.floor)
+        if known is None or known.geometry is not geometry:
+            known = self._arranged(things, meshes, meshes, geometry)
+        self._known[instant] = known  # the last asked for comes last
+        if len(self._known) > ROOMS:
+            del self._known[next(iter(self._known))]
+        return known
 
     def during(self, instant: int, moment: float) -> Arranged:
         """The things a moment after an instant (see `model.exposure.Sweep`) while the shutter is open. Its geometry is good

@@ -45,7 +45,10 @@ class _Room:
     def fits(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> bool:
         """Whether these are the same things, there or not there as before, made of the same triangles."""
         held = zip(self.things, self.meshes, things, meshes, strict=True)
-        return all(a.is_there == b.is_there and differs_in_shape_only(mesh, other) for a, mesh, b, other in held)
+        return all(
+            (a is b and mesh is other) or (a.is_there == b.is_there and differs_in_shape_only(mesh, other))
+            for a, mesh, b, other in held
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +115,8 @@ class Ring:
 
 def changed(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
     """Which of the same still things are elsewhere now, or have other meshes."""
+    if before is now and own is meshes:
+        return []
     held = zip(before, own, now, meshes, strict=True)
     return [i for i, (a, m, b, n) in enumerate(held) if m is not n or (a is not b and a.motion.poses != b.motion.poses)]
 
