@@ -125,9 +125,9 @@ class Rows:
         """These things, and the ground, are elsewhere, or deformed: their rows are written in place."""
         self.geometry, self.meshes = geometry, meshes
         self.surfaces = self.surfaces._replace(normals=geometry.triangle_normals)
-        moved = list(things)
-        self._written[moved] = False
-        self.write(moved)
+        for i in things:
+            if self._written[i]:
+                self._place(i, self.surfaces.vertices[self._own(i)])
         self._write_ground()
 
     def part(self, i: int) -> Surfaces:
@@ -145,15 +145,19 @@ class Rows:
         return slice(self.geometry.vertex_start[i], self.geometry.vertex_start[i + 1])
 
     def _write(self, i: int, rows: Float32) -> None:
-        """Write those of thing i. Without numbers for a normal a face is flat."""
-        g, own, mesh = self.geometry, self._own(i), self.meshes[i]
+        """Write those of thing i."""
+        mesh = self.meshes[i]
         rows[:] = 0.0
         rows[:, 7:11] = 1.0
         for first, values in ((3, mesh.uv0), (5, mesh.uv1), (7, mesh.colors)):
             if values is not None:
                 rows[:, first : first + values.shape[1]] = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        frame = np.array(self.lengths.origin), self.lengths.unit
-        place_rows(g.poses[i], g.coordinates[own], read_only(mesh.normals), *frame, rows)
+        self._place(i, rows)
+
+    def _place(self, i: int, rows: Float32) -> None:
+        """Write where thing i is, and its normals. Without numbers for a normal a face is flat."""
+        g, frame = self.geometry, (np.array(self.lengths.origin), self.lengths.unit)
+        place_rows(g.poses[i], g.coordinates[self._own(i)], read_only(self.meshes[i].normals), *frame, rows)
 
     def _write_ground(self) -> None:
         g, rows = self.geometry, self.surfaces.vertices[self.geometry.vertex_start[-1] :]
