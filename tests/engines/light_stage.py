@@ -15,7 +15,7 @@ from viewsphere.engines.raster.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.kernels_occlusion import occlude
 from viewsphere.engines.raster.lights import Casters, Extent, Lights, bake_lights
 from viewsphere.engines.raster.occlusion import Occlusion
-from viewsphere.engines.raster.surface import Lengths, pack_materials, pack_surfaces
+from viewsphere.engines.raster.surface import Lengths, Rows, pack_materials
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
@@ -76,7 +76,9 @@ class LightStage:
             self.origin, self.unit = np.zeros(3), 2.0 ** np.ceil(np.log2(np.abs(scenery.vertices).max()))
         lengths = Lengths(tuple(self.origin.tolist()), float(self.unit))
         materials = pack_materials(everything, None, lengths, len(meshes))
-        self.surfaces, self.textures = pack_surfaces(self.geometry, everything, materials, lengths), materials.textures
+        rows = Rows.of(self.geometry, everything, materials, lengths)
+        rows.write(range(len(everything)))
+        self.surfaces, self.textures = rows.surfaces, materials.textures
         low, high, floor = (low - self.origin) / self.unit, (high - self.origin) / self.unit, None
         if ground or scenery is not None:
             floor = float(low[2])

@@ -9,7 +9,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.engines.raster import kernels_block as block
 from viewsphere.engines.raster.kernels_material import material
 from viewsphere.engines.raster.records import PictureRays
-from viewsphere.engines.raster.surface import Lengths, pack_materials, pack_surfaces
+from viewsphere.engines.raster.surface import Lengths, Rows, pack_materials
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Thing
@@ -47,7 +47,9 @@ def packed(mesh: Mesh, ground: Ground | None = None, repaints=()):
     geometry = build_geometry((thing,), (mesh,), ground is not None, 0.01)
     metres = Lengths((0.0, 0.0, 0.0), 1.0)
     materials = pack_materials((mesh,), ground, metres, 1, (thing,))
-    return pack_surfaces(geometry, (mesh,), materials, metres), materials.textures
+    rows = Rows.of(geometry, (mesh,), materials, metres)
+    rows.write([0])
+    return rows.surfaces, materials.textures
 
 
 def view_of(rotation, rays=None) -> PictureRays:

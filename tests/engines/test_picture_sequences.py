@@ -145,13 +145,30 @@ def test_what_stands_still_is_drawn_once():
         stage.baked(i)
         maps.append(stage._packed[0].maps)
     assert all(each is maps[0] for each in maps) and len(maps[0]._maps) <= 2
-    assert len(maps[0].moving.triangles) == 12
-    assert len(maps[0].still.triangles) + 12 == len(stage.at(0).triangles)
+    assert sum(len(part().triangles) for part in maps[0].moving) == 12
+    assert sum(len(part().triangles) for part in maps[0].still) + 12 == len(stage.at(0).triangles)
+
+
+def test_what_is_in_no_picture_has_no_rows_but_casts_shadows():
+    """A wall behind the camera, which shades the ground before it, beside one that is looked at."""
+    behind = Motion.still(((1, 0, 0, 0.0), (0, 1, 0, -8.0), (0, 0, 3, 1.0), (0, 0, 0, 1)))
+    shot = sequence_of("sun", has_scenery=True)
+    low = SUN.model_copy(update={"azimuth_deg": 0.0, "elevation_deg": 20.0})
+    scene = shot.scene.model_copy(update={"sun": low})
+    shot = shot.model_copy(update={"things": (*shot.things, thing(0, "wall", behind, scenery=True)), "scene": scene})
+    stage = stage_of(shot)
+    own = picture(stage, 0)
+    rows = stage.baked(0).rows
+    assert rows._written.tolist() == [True, True, True, True, False]
+    rows.write([4])
+    assert np.array_equal(picture(stage, 0), own)
+    alone = shot.model_copy(update={"things": shot.things[:-1]})
+    assert (picture(stage_of(alone), 0).astype(int) - own > 20).any()
 
 
 def test_few_maps_are_kept():
-    surfaces = stage_of(sequence_of("sun")).baked(0).surfaces
-    maps = StillMaps.of(surfaces, (0, len(surfaces.triangles)), (), 1)
+    rows = stage_of(sequence_of("sun")).baked(0).rows
+    maps = StillMaps.of(rows.part, 1, (), 1)
     for i in range(3 * MOST):
         maps.keep((b"", float(i), 0.0, 4), np.full((4, 20), i, np.float32))
     assert maps.begun((b"", 0.0, 0.0, 4)) is None

@@ -93,7 +93,7 @@ def compare(geometry, cameras):
         z = s * pixel_rays(camera.intrinsics)[..., 2]
         errors.append(np.abs(observed["depth"] - z)[hit] / np.maximum(1, z[hit] / 10))
         objects = np.where(other >= 0, geometry.triangle_object[other], 0)
-        parts = np.where(other >= 0, geometry.triangle_part[other], 0)
+        parts = np.where(other >= 0, np.append(geometry.triangle_part, 0)[np.minimum(other, len(geometry.triangle_part))], 0)
         start = np.array(geometry.triangle_start)[np.maximum(objects - 1, 0)]
         equal("instances", "Embree's rays", observed["instances"][agreed], objects[agreed])
         equal("parts", "Embree's rays", observed["parts"][agreed], parts[agreed])

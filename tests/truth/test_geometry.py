@@ -45,8 +45,8 @@ def test_objects_lie_in_order_and_the_ground_last():
     np.testing.assert_allclose(geometry.vertices[24:48], geometry.coordinates[24:48] @ move[:3, :3].T + move[:3, 3], atol=1e-12)
     np.testing.assert_allclose(geometry.normals[24:48], cube().normals @ move[:3, :3].T, atol=1e-7)
     assert geometry.triangle_object.tolist() == [1] * 12 + [2] * 12 + [0] * 2
-    assert geometry.triangle_category.tolist() == [10] * 12 + [11] * 12 + [0] * 2
-    assert geometry.triangle_part.tolist() == [i // 2 + 1 for i in range(12)] * 2 + [0] * 2
+    assert geometry.triangle_category.tolist() == [10] * 12 + [11] * 12
+    assert geometry.triangle_part.tolist() == [i // 2 + 1 for i in range(12)] * 2
     assert geometry.ground_z == -0.5
     assert (geometry.vertices[48:, 2] == -0.5).all()
     assert np.array_equal(geometry.triangle_normals[24:], [[0, 0, 1]] * 2)

@@ -103,8 +103,7 @@ def _apart(one, other):
 
 def _at(geometry, turning, column):
     """All triangles at a column's moment."""
-    vertices = geometry.vertices.copy()
+    poses = geometry.poses.copy()
     for i, motion in turning.moved.items():
-        own = slice(*geometry.vertex_start[i : i + 2])
-        vertices[own] = vertices[own] @ motion[column][:3, :3].T + motion[column][:3, 3]
-    return replace(geometry, vertices=vertices)
+        poses[i] = motion[column] @ poses[i]
+    return replace(geometry, poses=poses)

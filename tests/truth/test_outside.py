@@ -8,7 +8,7 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.visibility import OUTSIDE, homogeneous, rasterize
+from viewsphere.truth.visibility import homogeneous, in_picture, rasterize
 
 LENS = Intrinsics(width=64, height=48, fx=50.0, fy=50.0, cx=32.0, cy=24.0)
 MESHES = [sphere(1, 0.8), cube(0.5)]
@@ -34,6 +34,9 @@ def test_what_is_seen_is_what_is_seen_when_all_are_drawn(seed):
     whole = rasterize(geometry, camera, window=(0, 0, camera.width, camera.height))
     assert own.triangle.tobytes() == whole.triangle.tobytes() and own.inverse_depth.tobytes() == whole.inverse_depth.tobytes()
     corners, everywhere = homogeneous(geometry, camera), homogeneous(geometry, camera, 0, len(geometry.vertices))
-    left_out = (corners == OUTSIDE).all(axis=1)
-    assert 0 < left_out.sum() < len(corners)
-    assert np.array_equal(corners[~left_out], everywhere[~left_out])
+    vertices, triangles = in_picture(geometry, corners)
+    assert 0 < np.diff(vertices).sum() < len(corners)
+    for first, stop in vertices:
+        assert np.array_equal(corners[first:stop], everywhere[first:stop])
+    drawn = np.concatenate([geometry.triangles[first:stop] for first, stop in triangles])
+    assert np.isin(drawn, np.concatenate([np.arange(first, stop) for first, stop in vertices])).all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint, Thing, TimeStep
 from viewsphere.truth.geometry import Geometry, placed_meshes, present
-from viewsphere.truth.moving import Ring, changed, differs_in_shape_only, shot_floor
+from viewsphere.truth.moving import ROOMS, Ring, changed, differs_in_shape_only, shot_floor
 
 STEPS = 16
 """Time steps of models whose meshes are kept for the next instants."""
@@ -45,7 +46,7 @@ class Arranged:
         """The meshes that the geometry was built from."""
         return present(self.things, self.whole)
 
-    @property
+    @cached_property
     def targets(self) -> int:
         """How many of the things, which come first, are not scenery."""
         return sum(not thing.scenery for thing in self.things)
@@ -107,6 +108,7 @@ class Arrangements:
     meshes: tuple[Mesh, ...]  # at rest
     floor: Floor | None
     ring: Ring
+    _known: dict[int, Arranged] = field(default_factory=dict[int, Arranged])
 
     @classmethod
     def build(cls, shot: Shot, load: Load) -> Arrangements:
@@ -120,14 +122,21 @@ class Arrangements:
 
     def of(self, shot: Shot) -> Arrangements:
         """The arrangements of another shot of an equal `stage_key`, which share the loaded meshes."""
-        own = replace(self, shot=shot)
+        own = replace(self, shot=shot, _known={})
         return replace(own, floor=shot_floor(shot, lambda instant: own._meshes(shot.things_at(instant))))
 
     def at(self, instant: int) -> Arranged:
         """The things as they stand at an instant, counted from 0 in the shot."""
-        things = self.shot.things_at(instant)
-        meshes = self._meshes(things)
-        return self._arranged(things, meshes, meshes, self.ring.at(things, meshes, self.floor))
+        known = self._known.pop(instant, None)
+        things = self.shot.things_at(instant) if known is None else known.things
+        meshes = self._meshes(things) if known is None else known.whole
+        geometry = self.ring.at(things, meshes, self.floor)
+        if known is None or known.geometry is not geometry:
+            known = self._arranged(things, meshes, meshes, geometry)
+        self._known[instant] = known  # the last asked for comes last
+        if len(self._known) > ROOMS:
+            del self._known[next(iter(self._known))]
+        return known
 
     def during(self, instant: int, moment: float) -> Arranged:
         """The things a moment after an instant (see `model.exposure.Sweep`) while the shutter is open. Its geometry is good
@@ -146,9 +155,12 @@ class Arrangements:
     def _arranged(
         self, things: tuple[Thing, ...], meshes: tuple[Mesh, ...], known: tuple[Mesh, ...], geometry: Geometry
     ) -> Arranged:
+        return Arranged(things, meshes, geometry, self._moving, known, bool(self.shot.sequence))
+
+    @cached_property
+    def _moving(self) -> tuple[int, ...]:
         swept = {i for each in self.shot.exposures if each for i, sweep in enumerate(each.things) if sweep}
-        moving = tuple(i for i, thing in enumerate(self.shot.things) if i in swept or not thing.motion.is_still)
-        return Arranged(things, meshes, geometry, moving, known, bool(self.shot.sequence))
+        return tuple(i for i, thing in enumerate(self.shot.things) if i in swept or not thing.motion.is_still)
 
     def _deformed(self, thing: Thing, steps: tuple[TimeStep | None, TimeStep | None, float], rest: Mesh, nearest: Mesh) -> Mesh:
         """The mesh between two time steps, or the nearest where these are not made of the same triangles."""

@@ -208,8 +208,15 @@ class Sight:
         g, count = self.geometry, self.geometry.object_count
         parts, points = pairwise(g.triangle_start[: count + 1]), pairwise(g.vertex_start[: count + 1])
         return tuple(
-            projected_bounds(self.camera, g.vertices, g.triangles, part, corners, g.is_used)
-            for part, corners in zip(parts, points, strict=True)
+            projected_bounds(
+                self.camera,
+                g.places(i),
+                g.triangles[first:stop] - np.int32(base),
+                (0, stop - first),
+                (0, end - base),
+                g.is_used[base:end],
+            )
+            for i, ((first, stop), (base, end)) in enumerate(zip(parts, points, strict=True))
         )
 
     def is_unobstructed(self, i: int) -> bool:
@@ -255,7 +262,7 @@ class Sight:
         return np.empty(shape if components == 1 else (*shape, components), dtype)
 
     def per_triangle(self, table: NDArray[np.int32], empty: int) -> NDArray[np.int32]:
-        """An int32 channel: the table's number for the triangle seen, `empty` where nothing is seen."""
+        """An int32 channel: the table's number for the triangle seen, 0 beyond its end, `empty` where nothing is seen."""
         from viewsphere.truth import kernels_channels as kernels
 
         out = self.empty(np.int32)

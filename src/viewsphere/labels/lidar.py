@@ -43,8 +43,9 @@ def compute(sight: Sight) -> NDArray[np.void]:
     out["range"], out["incidence"], out["intensity"] = distance, hits.incidence, intensity
     out["xyz"] = in_lidar_axes(sight.rays[ring, column]) * distance[:, None]
     out["time"] = ((column + 0.5) / width - 0.5) * lidar.sweep
+    objects = len(sight.geometry.triangle_category)  # their triangles come first
     out["instance"] = sight.geometry.triangle_object[hits.triangle]
-    out["category"] = sight.geometry.triangle_category[hits.triangle]
+    out["category"] = np.append(sight.geometry.triangle_category, 0)[np.minimum(hits.triangle, objects)]
     out["ring"], out["column"] = ring, column
     low, high = lidar.range
     return out[returns & (out["range"] > 0) & (out["range"] >= low) & (out["range"] <= high)]

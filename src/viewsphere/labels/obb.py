@@ -34,7 +34,7 @@ def compute(sight: Sight, i: int) -> Mapping[str, Any]:
 def _projected(sight: Sight, i: int) -> Any:
     g, camera = sight.geometry, sight.camera
     own = slice(g.vertex_start[i], g.vertex_start[i + 1])
-    vertices = g.vertices[own][g.is_used[own]]
+    vertices = g.places(i)[g.is_used[own]]
     pixels, in_front = project(camera.intrinsics, transform(rigid(camera.R, camera.t), vertices))
     if not len(pixels) or not in_front.all() or not np.isfinite(pixels).all():
         return None

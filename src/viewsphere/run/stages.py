@@ -361,8 +361,8 @@ def _arrange(views: ShotViews, instant: int, sensor: int, names: Sequence[str]) 
     needs = [labels()[name].needs for name in names]
     if any(need.tracks for need in needs):
         views.followed(sensor)
-    offsets = {offset for need in needs for offset in need.instants}
-    for offset in sorted({0, *offsets}):
-        other = views.shot.instant_after(instant, offset)
-        if other is not None:
-            views.labelled(other)
+    offsets = sorted({0, *(offset for need in needs for offset in need.instants)})
+    compared = [other for other in (views.shot.instant_after(instant, offset) for offset in offsets) if other is not None]
+    views.keep(compared)
+    for other in compared:
+        views.labelled(other)

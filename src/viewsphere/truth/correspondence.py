@@ -169,7 +169,7 @@ class Match:
         for view, chosen in ((self.view, triangle), (self.other, further)):
             world = stick(view.geometry, chosen, weights, np.empty((len(pixel), 3)))
             places.append(transform(view.camera.R, world) + view.camera.t)
-            corners.append(view.geometry.vertices[view.geometry.triangles[chosen]])
+            corners.append(view.geometry.corners(chosen))
         is_still = (corners[0] == corners[1]).all(axis=(1, 2)) & self.view.has_camera_of(self.other)
         return Deformed(pixel, places[0], places[1], is_still)
 

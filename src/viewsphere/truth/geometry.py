@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import accumulate, pairwise
 from typing import Any
@@ -21,13 +21,14 @@ from viewsphere.truth.cutouts import ENDLESS, NO_CUTOUTS, Cutouts, mesh_cutouts,
 BACKGROUND = 0
 """Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
 
+UP = np.array([0, 0, 1], np.float32)
+"""The ground's normal."""
+
 GROUND_REACH = 1000.0
 """Scene sizes from the middle to the ground's corners: as far as a renderer without endless planes has to draw it."""
 
-OF_VERTICES = ("vertices", "normals", "coordinates", "is_used")
+OF_VERTICES = ("coordinates", "is_used")
 OF_TRIANGLES = (
-    "triangle_normals",
-    "triangle_side",
     "triangle_object",
     "triangle_part",
     "triangle_category",
@@ -35,7 +36,7 @@ OF_TRIANGLES = (
     "triangle_material",
     "triangle_body_part",
 )
-STACKED = (*OF_VERTICES, *OF_TRIANGLES, "bounds")
+STACKED = (*OF_VERTICES, *OF_TRIANGLES, "poses", "bounds", "ground")
 """Arrays of a geometry that are those of its parts, one after another."""
 
 Corner = NDArray[np.float64]
@@ -43,16 +44,16 @@ Corner = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """World-space triangles: objects in id order, then scenery, the ground (if any) last.
+    """Triangles in the world: objects in id order, then scenery, the ground (if any) last.
 
-    vertices (V, 3) float64 world metres; triangles (T, 3) int32; normals (V, 3) float32 world, unit; coordinates (V, 3)
-    float32, each vertex in its object's axes (zero for the ground).
+    Where things are is held once a thing, not for each vertex: instants and instances share all else. poses (N, 4, 4) float64:
+    world from each thing; meshes: theirs; coordinates (V, 3) float32: each vertex in its thing's axes (zero for the ground);
+    ground (4, 3) float64: its corners in the world, (0, 3) without one.
 
-    triangle_normals (T, 3) float32 world, unit, by winding (zero for a degenerate triangle); triangle_side (T,) int8: 1 where
-    the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or -2 likewise where all three equal the
-    triangle's own; triangle_object, triangle_part, triangle_category, triangle_material, triangle_body_part (T,) int32, 0 for
-    scenery and ground; triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32: -1 all
-    surface, -2 never seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
+    triangles (T, 3) int32; triangle_object (T,) int32: 0 for scenery and ground; triangle_part, triangle_category,
+    triangle_material, triangle_body_part int32: of the objects' triangles alone, which come first, all others have 0;
+    triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32: -1 all surface, -2 never
+    seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
 
     is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
     the highest of its used vertices, infinite where it has none.
@@ -64,12 +65,11 @@ class Geometry:
     both have one entry more than there are things. The first `object_count` of them are the objects 1, 2, ...
     """
 
-    vertices: NDArray[np.float64]
-    triangles: NDArray[np.int32]
-    normals: NDArray[np.float32]
+    poses: Corner
+    meshes: tuple[Mesh, ...]
     coordinates: NDArray[np.float32]
-    triangle_normals: NDArray[np.float32]
-    triangle_side: NDArray[np.int8]
+    ground: Corner
+    triangles: NDArray[np.int32]
     triangle_object: NDArray[np.int32]
     triangle_part: NDArray[np.int32]
     triangle_category: NDArray[np.int32]
@@ -84,6 +84,49 @@ class Geometry:
     triangle_start: tuple[int, ...]
     object_count: int
     ground_z: float | None
+    facing: Facing
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """World metres (V, 3), made anew: of a part of them use `places` or `corners`."""
+        return np.concatenate([*(self.places(i) for i in range(len(self.poses))), self.ground])
+
+    @property
+    def normals(self) -> NDArray[np.float32]:
+        """Of the vertices (V, 3), world, unit. As the next two it is written to where another instant's are asked for."""
+        return self.facing.of_vertices(self)[: len(self.coordinates)]
+
+    @property
+    def triangle_normals(self) -> NDArray[np.float32]:
+        """Of the triangles (T, 3), world, unit, by winding; zero for a degenerate triangle."""
+        return self.facing.of_triangles(self)[0][: len(self.triangle_object)]
+
+    @property
+    def triangle_side(self) -> NDArray[np.int8]:
+        """Of each triangle (T,): 1 where the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or
+        -2 likewise where all three equal the triangle's own.
+        """
+        return self.facing.of_triangles(self)[1][: len(self.triangle_object)]
+
+    def places(self, i: int) -> NDArray[np.float64]:
+        """World vertices of thing i (n, 3); the ground's come after those of the last thing."""
+        from viewsphere.truth import kernels_place as kernels
+
+        if i == len(self.poses):
+            return self.ground
+        own = self.coordinates[self.vertex_start[i] : self.vertex_start[i + 1]]
+        placed = np.empty(own.shape)
+        kernels.place(self.poses[i], own, placed)
+        return placed
+
+    def corners(self, chosen: NDArray[np.integer]) -> NDArray[np.float64]:
+        """World corners (n, 3, 3) of triangles (n,); arbitrary for triangle -1."""
+        from viewsphere.truth import kernels_place as kernels
+
+        found = np.empty((len(chosen), 3, 3))
+        starts = np.array([*self.vertex_start, len(self.coordinates)])
+        kernels.corners(chosen.astype(np.int64), self.triangles, self.coordinates, starts, self.poses, self.ground, found)
+        return found
 
     @property
     def has_scenery(self) -> bool:
@@ -93,6 +136,61 @@ class Geometry:
     def extent(self, things: int | None = None) -> tuple[Corner, Corner]:
         """Lowest and highest corner (3,) of the first so many things, of all without a number; the origin if they have none."""
         return _extent(self.bounds[:things])
+
+
+@dataclass(eq=False)
+class Facing:
+    """Which way the vertices and triangles of a scene face in the world: arrays that are written to where they are asked for at
+    another instant, so that there is one of each for all instants.
+    """
+
+    _vertices: NDArray[np.float32] | None = None
+    _triangles: tuple[NDArray[np.float32], NDArray[np.int8]] | None = None
+    _shown: dict[str, tuple[Corner, tuple[Mesh, ...]]] = field(default_factory=dict[str, "tuple[Corner, tuple[Mesh, ...]]"])
+
+    def of_vertices(self, geometry: Geometry) -> NDArray[np.float32]:
+        """Their normals."""
+        if self._vertices is None:
+            self._vertices = np.tile(UP, (len(geometry.coordinates), 1))
+        for i in self._elsewhere("vertices", geometry):
+            own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+            _turn(geometry, i, self._vertices[own])
+        return self._vertices
+
+    def of_triangles(self, geometry: Geometry) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
+        """Their normals and sides."""
+        from viewsphere.truth import kernels_place as kernels
+
+        if self._triangles is None:
+            count = len(geometry.triangles)
+            self._triangles = np.empty((count, 3), np.float32), np.empty(count, np.int8)
+            if geometry.ground_z is not None:
+                start, base = geometry.triangle_start[-1], geometry.vertex_start[-1]
+                normals, side = (array[start:] for array in self._triangles)
+                kernels.face(geometry.ground, np.tile(UP, (4, 1)), geometry.triangles[start:], base, normals, side)
+        for i in self._elsewhere("triangles", geometry):
+            first, stop, base = *geometry.triangle_start[i : i + 2], geometry.vertex_start[i]
+            normals, side = (array[first:stop] for array in self._triangles)
+            turned = np.empty((geometry.vertex_start[i + 1] - base, 3), np.float32)
+            _turn(geometry, i, turned)
+            kernels.face(geometry.places(i), turned, geometry.triangles[first:stop], base, normals, side)
+        return self._triangles
+
+    def _elsewhere(self, name: str, geometry: Geometry) -> list[int]:
+        """Which things have moved, or deformed, since these arrays were written."""
+        if name in self._shown and self._shown[name][0] is geometry.poses:
+            return []
+        poses, meshes = self._shown.get(name, (np.full_like(geometry.poses, np.nan), geometry.meshes))
+        self._shown[name] = geometry.poses, geometry.meshes
+        moved = (poses != geometry.poses).any(axis=(1, 2)).tolist()
+        return [i for i, (was, now) in enumerate(zip(meshes, geometry.meshes, strict=True)) if moved[i] or was is not now]
+
+
+def _turn(geometry: Geometry, i: int, turned: NDArray[np.float32]) -> None:
+    """Write the world normals of thing i's vertices."""
+    from viewsphere.truth import kernels_place as kernels
+
+    kernels.turn(geometry.poses[i], read_only(geometry.meshes[i].normals), turned)
 
 
 def placed_meshes(things: Sequence[Thing], load: Load) -> list[Mesh]:
@@ -133,26 +231,28 @@ def build_geometry(
     return _stacked([*parts, _ground(np.concatenate([part.bounds for part in parts]), floor)] if ground else parts)
 
 
-def place(geometry: Geometry, i: int, thing: Thing, mesh: Mesh) -> None:
-    """Write where thing i of a geometry is, which is built for this mesh or one with the same triangles."""
-    from viewsphere.truth import kernels_place as kernels
-
-    own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
-    vertices, normals, is_used = geometry.vertices[own], geometry.normals[own], geometry.is_used[own]
-    geometry.coordinates[own] = mesh.vertices
-    read_only = (_read_only(mesh.vertices), _read_only(mesh.normals))
-    kernels.place(np.array(thing.world_from_object), *read_only, is_used, vertices, normals, geometry.bounds[i])
-    _face(geometry, geometry.triangle_start[i], geometry.triangle_start[i + 1])
+def moved(geometry: Geometry, where: Mapping[int, tuple[Thing, Mesh]]) -> Geometry:
+    """The same with these things elsewhere, or deformed: by their numbers, as they are, and their meshes, which have the same
+    triangles. Coordinates of what is deformed are written in place.
+    """
+    poses, bounds, meshes = geometry.poses.copy(), geometry.bounds.copy(), list(geometry.meshes)
+    for i, (thing, mesh) in where.items():
+        if mesh is not meshes[i]:
+            own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+            geometry.coordinates[own], meshes[i] = mesh.vertices, mesh
+        poses[i] = thing.world_from_object
+    placed = replace(geometry, poses=poses, bounds=bounds, meshes=tuple(meshes))
+    for i in where:
+        _bound(placed, i)
+    return placed
 
 
 def lay_ground(geometry: Geometry, floor: Floor | None) -> Geometry:
-    """The same with its ground, if any, where `build_geometry` lays it; its corners are written in place."""
+    """The same with its ground, if any, where `build_geometry` lays it."""
     if geometry.ground_z is None:
-        return geometry
+        return replace(geometry)
     corners = _ground_corners(geometry.bounds, floor)
-    geometry.vertices[geometry.vertex_start[-1] :] = corners
-    _face(geometry, geometry.triangle_start[-1], len(geometry.triangles))
-    return replace(geometry, ground_z=float(corners[0, 2]))
+    return replace(geometry, ground=corners, ground_z=float(corners[0, 2]))
 
 
 def without_ground(geometry: Geometry) -> Geometry:
@@ -162,6 +262,7 @@ def without_ground(geometry: Geometry) -> Geometry:
     vertices, triangles = geometry.vertex_start[-1], geometry.triangle_start[-1]
     kept = {name: getattr(geometry, name)[:vertices] for name in OF_VERTICES}
     kept |= {name: getattr(geometry, name)[:triangles] for name in (*OF_TRIANGLES, "triangles", "triangle_cutout")}
+    kept["ground"] = geometry.ground[:0]
     return replace(geometry, **kept, ground_z=None)
 
 
@@ -177,21 +278,23 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
 def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
     vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
     triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], np.int32)
-    labels = _joined([_labels(p, m) for p, m in zip(things, meshes, strict=True)], np.int32, 6)
+    objects = sum(p.id > 0 for p in things)
+    held = list(zip(things, meshes, strict=True))
+    labels = _joined([_labels(p, m) for p, m in held[:objects]], np.int32, 6)
+    around = [labels[:, 3], *(_classes(p, m) for p, m in held[objects:])]
     cutouts, rows = stack_cutouts([mesh_cutouts(m, label_alpha) for m in meshes])
     is_used = np.zeros(vertex_start[-1], np.bool_)
     is_used[triangles] = True
     part = Geometry(
-        vertices=np.empty((vertex_start[-1], 3)),
+        poses=np.array([thing.world_from_object for thing in things]).reshape(-1, 4, 4),
+        meshes=meshes,
+        coordinates=_joined([mesh.vertices for mesh in meshes], np.float32),
+        ground=np.empty((0, 3)),
         triangles=triangles,
-        normals=np.empty((vertex_start[-1], 3), np.float32),
-        coordinates=np.empty((vertex_start[-1], 3), np.float32),
-        triangle_normals=np.empty((len(triangles), 3), np.float32),
-        triangle_side=np.empty(len(triangles), np.int8),
-        triangle_object=labels[:, 0],
+        triangle_object=np.concatenate([labels[:, 0], np.full(len(triangles) - len(labels), BACKGROUND, np.int32)]),
         triangle_part=labels[:, 1],
         triangle_category=labels[:, 2],
-        triangle_class=labels[:, 3],
+        triangle_class=np.concatenate(around),
         triangle_material=labels[:, 4],
         triangle_body_part=labels[:, 5],
         triangle_cutout=rows,
@@ -200,11 +303,12 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         bounds=np.empty((len(things), 2, 3)),
         vertex_start=vertex_start,
         triangle_start=(0, *accumulate(len(m.triangles) for m in meshes)),
-        object_count=sum(p.id > 0 for p in things),
+        object_count=objects,
         ground_z=None,
+        facing=Facing(),
     )
-    for i, (thing, mesh) in enumerate(zip(things, meshes, strict=True)):
-        place(part, i, thing, mesh)
+    for i in range(len(things)):
+        _bound(part, i)
     return part
 
 
@@ -213,7 +317,7 @@ _scenery = lru_cache(maxsize=1)(_placed)
 
 def _stacked(parts: Sequence[Geometry]) -> Geometry:
     """One after another; where the last is the ground, it stays that."""
-    firsts = (0, *accumulate(len(part.vertices) for part in parts))
+    firsts = (0, *accumulate(len(part.coordinates) for part in parts))
     cutouts, rows = stack_cutouts([(part.cutouts, part.triangle_cutout) for part in parts])
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in STACKED}
     return Geometry(
@@ -225,40 +329,42 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
         triangle_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.triangle_start))),
         object_count=sum(part.object_count for part in parts),
         ground_z=parts[-1].ground_z,
+        meshes=tuple(mesh for part in parts for mesh in part.meshes),
+        facing=Facing(),
     )
 
 
 def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
-    """Object, part, category, class, material and part of a body of each triangle, (T, 6)."""
+    """Object, part, category, class, material and part of a body of each triangle of an object, (T, 6)."""
     labels = np.full((len(mesh.triangles), 6), BACKGROUND, np.int32)
-    if thing.id:
-        labels[:, 0], labels[:, 1], labels[:, 2] = thing.id, mesh.triangle_part + 1, thing.model.category_id
-        labels[:, 3], labels[:, 4] = thing_class(thing.model.category_id), mesh.triangle_material + 1
-        if mesh.triangle_body_part is not None:
-            labels[:, 5] = mesh.triangle_body_part
-    else:
-        stuff = [stuff_of(thing.model.category, part) for part in mesh.parts]
-        labels[:, 3] = np.array(stuff, np.int32)[mesh.triangle_part]
+    labels[:, 0], labels[:, 1], labels[:, 2] = thing.id, mesh.triangle_part + 1, thing.model.category_id
+    labels[:, 3], labels[:, 4] = thing_class(thing.model.category_id), mesh.triangle_material + 1
+    if mesh.triangle_body_part is not None:
+        labels[:, 5] = mesh.triangle_body_part
     return labels
+
+
+def _classes(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
+    """Class of each triangle of scenery, (T,)."""
+    return np.array([stuff_of(thing.model.category, part) for part in mesh.parts], np.int32)[mesh.triangle_part]
 
 
 def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
     """A plane in two halves, below all that is placed, or where `floor` says, counter-clockwise seen from above."""
     corners = _ground_corners(bounds, floor)
-    up, background = np.tile(np.array([0, 0, 1], np.float32), (4, 1)), np.full(2, BACKGROUND, np.int32)
-    ground = Geometry(
-        vertices=corners,
+    background, none = np.full(2, BACKGROUND, np.int32), np.empty(0, np.int32)
+    return Geometry(
+        poses=np.empty((0, 4, 4)),
+        meshes=(),
+        coordinates=np.zeros((4, 3), np.float32),
+        ground=corners,
         triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
-        normals=up,
-        coordinates=np.zeros_like(up),
-        triangle_normals=np.empty((2, 3), np.float32),
-        triangle_side=np.empty(2, np.int8),
         triangle_object=background,
-        triangle_part=background,
-        triangle_category=background,
+        triangle_part=none,
+        triangle_category=none,
         triangle_class=np.full(2, GROUND, np.int32),
-        triangle_material=background,
-        triangle_body_part=background,
+        triangle_material=none,
+        triangle_body_part=none,
         triangle_cutout=np.array(ENDLESS, np.int32),
         cutouts=NO_CUTOUTS,
         is_used=np.ones(4, np.bool_),
@@ -267,9 +373,8 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         triangle_start=(0,),
         object_count=0,
         ground_z=float(corners[0, 2]),
+        facing=Facing(),
     )
-    _face(ground, 0, 2)
-    return ground
 
 
 def _ground_corners(bounds: NDArray[np.float64], floor: Floor | None) -> Corner:
@@ -286,13 +391,12 @@ def _extent(bounds: NDArray[np.float64]) -> tuple[Corner, Corner]:
     return (low, high) if low[0] <= high[0] else (np.zeros(3), np.zeros(3))
 
 
-def _face(geometry: Geometry, first: int, stop: int) -> None:
-    """Write which way triangles [first, stop) face."""
+def _bound(geometry: Geometry, i: int) -> None:
+    """Write the bounds of thing i."""
     from viewsphere.truth import kernels_place as kernels
 
-    own = slice(first, stop)
-    normals, side = geometry.triangle_normals[own], geometry.triangle_side[own]
-    kernels.face(geometry.vertices, geometry.normals, geometry.triangles[own], normals, side)
+    own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+    kernels.bound(geometry.poses[i], geometry.coordinates[own], geometry.is_used[own], geometry.bounds[i])
 
 
 def _joined(arrays: Sequence[NDArray[Any]], dtype: type, width: int = 3) -> NDArray[Any]:
@@ -300,7 +404,7 @@ def _joined(arrays: Sequence[NDArray[Any]], dtype: type, width: int = 3) -> NDAr
     return np.ascontiguousarray(np.concatenate([np.zeros((0, width), dtype), *arrays]), dtype)
 
 
-def _read_only(array: NDArray[np.float32]) -> NDArray[np.float32]:
+def read_only(array: NDArray[np.float32]) -> NDArray[np.float32]:
     """A view that cannot be written to, whatever the array is: kernels are compiled once for both."""
     view = np.ascontiguousarray(array).view()
     view.setflags(write=False)

@@ -48,12 +48,12 @@ def positions(inverse, rays, world_from_ray, center, out):
 
 @njit
 def labels(seen, table, empty, out):
-    """table[triangle] for each pixel, or `empty` where no triangle is seen."""
+    """table[triangle] for each pixel, 0 beyond the table's end, or `empty` where no triangle is seen."""
     height, width = seen.shape
     for y in range(height):
         for x in range(width):
             t = seen[y, x]
-            out[y, x] = table[np.uintp(t)] if t >= 0 else empty
+            out[y, x] = empty if t < 0 else table[np.uintp(t)] if t < table.shape[0] else 0
 
 
 @njit

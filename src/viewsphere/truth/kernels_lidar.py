@@ -26,15 +26,12 @@ def incidence(rays, normals, chosen, rotation, angle, cosine):
 
 
 @njit
-def weights(points, vertices, triangles, chosen, out):
-    """Fill (N, 3) with the weights, none negative, of the corners of the `chosen` triangles (N,) at points (N, 3) of their
-    planes.
-    """
+def weights(points, corners, out):
+    """Fill (N, 3) with the weights, none negative, of the corners (N, 3, 3) of triangles at points (N, 3) of their planes."""
     for i in range(out.shape[0]):
-        t = triangles[chosen[i]]
-        a = vertices[t[0]]
-        bx, by, bz = vertices[t[1], 0] - a[0], vertices[t[1], 1] - a[1], vertices[t[1], 2] - a[2]
-        cx, cy, cz = vertices[t[2], 0] - a[0], vertices[t[2], 1] - a[1], vertices[t[2], 2] - a[2]
+        a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
+        bx, by, bz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        cx, cy, cz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
         px, py, pz = points[i, 0] - a[0], points[i, 1] - a[1], points[i, 2] - a[2]
         nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
         second = (py * cz - pz * cy) * nx + (pz * cx - px * cz) * ny + (px * cy - py * cx) * nz

@@ -25,18 +25,18 @@ def weights(triangles, chosen, q, rays, out):
 
 
 @njit
-def stick(vertices, triangles, chosen, barycentrics, out):
-    """Write the points (N, 3) of the `chosen` triangles (N,) that have these barycentrics (N, 3); none for -1."""
+def stick(corners, chosen, barycentrics, out):
+    """Write the points (N, 3) that have these barycentrics (N, 3) in triangles of these corners (N, 3, 3); none where the
+    triangle `chosen` (N,) is -1.
+    """
     for i in range(chosen.shape[0]):
         ui = np.uintp(i)
         if chosen[ui] < 0:
             continue
-        t = np.uintp(chosen[ui])
-        i0, i1, i2 = np.uintp(triangles[t, A]), np.uintp(triangles[t, B]), np.uintp(triangles[t, C])
         b0, b1, b2 = barycentrics[ui, A], barycentrics[ui, B], barycentrics[ui, C]
         for c in range(3):
             uc = np.uintp(c)
-            out[ui, uc] = b0 * vertices[i0, uc] + b1 * vertices[i1, uc] + b2 * vertices[i2, uc]
+            out[ui, uc] = b0 * corners[ui, A, uc] + b1 * corners[ui, B, uc] + b2 * corners[ui, C, uc]
 
 
 @njit

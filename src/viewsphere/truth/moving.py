@@ -14,13 +14,10 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.model.scene import Floor, Row
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.truth.geometry import Geometry, build_geometry, lay_ground, place, present
+from viewsphere.truth.geometry import Geometry, build_geometry, lay_ground, moved, present
 
 ROOMS = 3
 """Instants whose geometries are there at once: a picture's own, the one before and the one after."""
-
-MOVED = ("vertices", "normals", "coordinates", "triangle_normals", "triangle_side", "bounds")
-"""Arrays of a geometry that change where something moves, or deforms."""
 
 KEPT = (
     *("triangles", "triangle_material", "triangle_part", "triangle_body_part"),
@@ -48,13 +45,17 @@ class _Room:
     def fits(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> bool:
         """Whether these are the same things, there or not there as before, made of the same triangles."""
         held = zip(self.things, self.meshes, things, meshes, strict=True)
-        return all(a.is_there == b.is_there and differs_in_shape_only(mesh, other) for a, mesh, b, other in held)
+        return all(
+            (a is b and mesh is other) or (a.is_there == b.is_there and differs_in_shape_only(mesh, other))
+            for a, mesh, b, other in held
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Ring:
     """Gives the geometries of one scene's things, which are the same but for where they are, and for how their meshes are
-    deformed. Arrays of a geometry are written to again when those of three other instants were asked for since.
+    deformed. Coordinates of a geometry are written to again when those of three other instants were asked for since, and
+    which way all faces when another instant's is asked for (`geometry.Facing`).
 
     `ground`, `label_alpha` and `keeps_scenery`: see `build_geometry`, to whose result all are equal to the bit.
     """
@@ -73,14 +74,14 @@ class Ring:
         room = self._held(things, meshes, floor)
         if room is None:
             fitting = [room for room in self._rooms if room.fits(things, meshes)]
-            room = self._made(things, meshes, floor, fitting, self._rooms.pop(0) if len(self._rooms) == ROOMS else None, True)
+            room = self._made(things, meshes, floor, fitting, self._rooms.pop(0) if len(self._rooms) == ROOMS else None)
         self._rooms.append(room)  # the last asked for comes last
         return room.geometry
 
     def passing(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None = None) -> Geometry:
         """The same between two instants: the arrays are written to again by the next call of this."""
         fitting = [room for room in (*self._passing, *self._rooms) if room.fits(things, meshes)]
-        room = self._made(things, meshes, floor, fitting, self._passing.pop() if self._passing else None, False)
+        room = self._made(things, meshes, floor, fitting, self._passing.pop() if self._passing else None)
         self._passing.append(room)
         return room.geometry
 
@@ -97,30 +98,25 @@ class Ring:
         floor: Floor | None,
         fitting: list[_Room],
         free: _Room | None,
-        shares: bool,
     ) -> _Room:
-        """Made of one of the fitting rooms, of the free one if it is the first of them. One that `shares` has the coordinates
-        of another where these are the same.
-        """
+        """Made of one of the fitting rooms, of the free one if it is the first of them, whose coordinates are written over."""
         if not fitting:
             geometry = build_geometry(things, present(things, meshes), self.ground, self.label_alpha, floor, self.keeps_scenery)
             return _Room(things, meshes, floor, geometry)
         room = fitting[0] if fitting[0] is free else fitting[-1]
-        geometry = room.geometry
+        geometry, others = room.geometry, [other.geometry for other in fitting if other is not room]
         is_deformed = any(a is not b for a, b in zip(room.meshes, meshes, strict=True))
-        copied = set(MOVED if room is not free else ())
-        if shares and not is_deformed:  # coordinates are those of the meshes, wherever things are
-            copied.discard("coordinates")
-        elif any(other.geometry.coordinates is geometry.coordinates for other in fitting if other is not room):
-            copied.add("coordinates")
-        geometry = replace(geometry, **{name: getattr(geometry, name).copy() for name in copied})
-        for i in room.changed(things, meshes):
-            place(geometry, i, things[i], meshes[i])
-        return _Room(things, meshes, floor, replace(lay_ground(geometry, floor)))
+        is_used = room is not free or any(other.coordinates is geometry.coordinates for other in others)
+        if is_deformed and is_used:
+            geometry = replace(geometry, coordinates=geometry.coordinates.copy())
+        elsewhere = {i: (things[i], meshes[i]) for i in room.changed(things, meshes)}
+        return _Room(things, meshes, floor, lay_ground(moved(geometry, elsewhere), floor))
 
 
 def changed(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
     """Which of the same still things are elsewhere now, or have other meshes."""
+    if before is now and own is meshes:
+        return []
     held = zip(before, own, now, meshes, strict=True)
     return [i for i, (a, m, b, n) in enumerate(held) if m is not n or (a is not b and a.motion.poses != b.motion.poses)]
 

@@ -17,7 +17,7 @@ from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import product
 from viewsphere.truth.kernel_constants import FOUR, NEARER
 from viewsphere.truth.view import View
-from viewsphere.truth.visibility import pixels_of
+from viewsphere.truth.visibility import pixels_of, projected
 
 Float = NDArray[np.float64]
 Whole = NDArray[np.int32]
@@ -198,14 +198,10 @@ def _pinhole(
     bounds: tuple[float, float, float, float],
 ) -> tuple[Float, tuple[int, int], NDArray[np.intp], Float, Float]:
     """The pinhole of this size whose picture shows x/z and y/z within `bounds`, turned from the view's camera axes."""
-    from viewsphere.truth import kernels_draw
-
     u0, v0, u1, v1 = bounds
     du, dv = size[0] / ((u1 - u0) * (1 + 1e-9) or 1.0), size[1] / ((v1 - v0) * (1 + 1e-9) or 1.0)
     k = np.array([[du, 0.0, -du * u0], [0.0, dv, -dv * v0], [0.0, 0.0, 1.0]])
-    projected = product(k, product(turned, np.column_stack((view.camera.R, view.camera.t))))
-    q = np.empty((len(view.geometry.vertices), 4))
-    kernels_draw.transform(view.geometry.vertices, 0, len(q), projected, q)
+    q = projected(view.geometry, product(k, product(turned, np.column_stack((view.camera.R, view.camera.t)))))
     x, y, z = product(turned, rays.T)
     xy = np.column_stack((du * (x / z) - du * u0, dv * (y / z) - dv * v0))
     return q, size, at, np.clip(xy, 0.0, np.nextafter(np.array(size, np.float64), 0.0)), near / z

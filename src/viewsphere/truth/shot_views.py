@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -107,6 +107,11 @@ class ShotViews:
         while len(self._views) > self._instants * self._sensors:
             del self._views[next(iter(self._views))]
         return view
+
+    def keep(self, instants: Collection[int]) -> None:
+        """Forget the views of all other instants, whose vertices take much memory."""
+        for known in [known for known in self._views if known[0] not in instants]:
+            del self._views[known]
 
     @property
     def _instants(self) -> int:

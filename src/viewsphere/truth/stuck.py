@@ -39,7 +39,7 @@ def stick(geometry: Geometry, triangle: Whole, weights: Float, out: Float) -> Fl
     """Write where points (N, 3) of these triangles (N,) are in the world, leaving those of triangle -1; returns `out`."""
     from viewsphere.truth import kernels_stick as kernels
 
-    kernels.stick(geometry.vertices, geometry.triangles, triangle, weights, out)
+    kernels.stick(geometry.corners(triangle), triangle, weights, out)
     return out
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.geometry.rotation import product
 from viewsphere.model.camera import Camera
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility, lens_rays, rasterize
+from viewsphere.truth.visibility import Visibility, homogeneous, lens_rays, rasterize
 
 Float = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def still_hits(geometry: Geometry, camera: Camera, visibility: Visibility) -> Hi
     distance = 1.0 / visibility.inverse_depth[ring, column].astype(np.float64)
     rays = _rays(camera)[ring, column]
     place = product(camera.R.T, (rays * distance[:, None] - camera.t)[..., None])[..., 0]
-    weights = _weights(place, geometry.vertices, geometry.triangles, triangle)
+    weights = _weights(place, geometry.corners(triangle))
     angle, cosine = _incidence(rays, geometry.triangle_normals, triangle, camera.R)
     return Hits(ring, column, triangle, distance, angle, cosine, place, weights)
 
@@ -75,7 +75,8 @@ def swept_hits(geometry: Geometry, camera: Camera, turning: Turning) -> Hits:
     for first, stop in pairwise(edges):
         middle = (first + stop - 1) // 2
         then = Camera(camera.intrinsics, turning.rotation[middle], turning.shift[middle])
-        seen = rasterize(_moved(geometry, turning, middle), then, window=(first, 0, stop, camera.height))
+        corners = _moved(geometry, then, turning, middle)
+        seen = rasterize(geometry, then, window=(first, 0, stop, camera.height), corners=corners)
         ring, column = np.nonzero(seen.inverse_depth > 0)
         distance = 1.0 / seen.inverse_depth[ring, column].astype(np.float64)
         parts.append(_own_moment(geometry, camera, turning, (ring, column + first, seen.triangle[ring, column], distance)))
@@ -83,22 +84,23 @@ def swept_hits(geometry: Geometry, camera: Camera, turning: Turning) -> Hits:
     return Hits(*(np.concatenate([getattr(part, one.name) for part in parts])[order] for one in fields(Hits)))
 
 
-def _moved(geometry: Geometry, turning: Turning, column: int) -> Geometry:
-    """All triangles where they are at a column's moment."""
-    if not turning.moved:
-        return geometry
-    vertices = geometry.vertices.copy()
+def _moved(geometry: Geometry, camera: Camera, turning: Turning, column: int) -> Float:
+    """All vertices where they are at a column's moment, in the axes of the camera then: see `truth.visibility.homogeneous`."""
+    from viewsphere.truth import kernels_draw as kernels
+
+    q, m = homogeneous(geometry, camera), np.column_stack((camera.R, camera.t))
     for i, motion in turning.moved.items():
         own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
-        vertices[own] = _transformed(motion[column], vertices[own])
-    return replace(geometry, vertices=vertices)
+        placed = _transformed(motion[column], geometry.places(i))
+        kernels.transform(placed, 0, len(placed), m, q[own])
+    return q
 
 
 def _own_moment(geometry: Geometry, camera: Camera, turning: Turning, found: tuple[Any, Any, Any, Float]) -> Hits:
     """Hits (ring, column, triangle, distance) of a sector's middle, taken to the moments of their columns."""
     ring, column, triangle, distance = found
     rays = _rays(camera)[ring, column]
-    corners = geometry.vertices[geometry.triangles[triangle]]
+    corners = geometry.corners(triangle)
     for i, motion in turning.moved.items():
         own = np.flatnonzero((triangle >= geometry.triangle_start[i]) & (triangle < geometry.triangle_start[i + 1]))
         corners[own] = _transformed(motion[column[own]][:, None], corners[own])
@@ -117,16 +119,16 @@ def _own_moment(geometry: Geometry, camera: Camera, turning: Turning, found: tup
     seen = rays * distance[:, None]
     back = turning.rotation[column].swapaxes(1, 2)
     place = product(back, (seen - turning.shift[column])[..., None])[..., 0]
-    weights = _weights(seen, placed.reshape(-1, 3), np.arange(3 * len(own), dtype=np.int32).reshape(-1, 3), own)
+    weights = _weights(seen, placed)
     return Hits(ring, column, triangle, distance, incidence, cosine, place, weights)
 
 
-def _weights(points: Float, vertices: Float, triangles: NDArray[np.int32], chosen: NDArray[np.int32]) -> Float:
-    """Weights (N, 3) of the corners of the chosen triangles at points (N, 3) of their planes."""
+def _weights(points: Float, corners: Float) -> Float:
+    """Weights (N, 3) of the corners (N, 3, 3) of triangles at points (N, 3) of their planes."""
     from viewsphere.truth import kernels_lidar as kernels
 
     out = np.empty((len(points), 3))
-    kernels.weights(points, vertices, triangles, chosen, out)
+    kernels.weights(points, corners, out)
     return out
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from viewsphere.geometry.camera import Window, has_unit_rays, pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.sparse import sparse
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
 
@@ -25,6 +25,9 @@ EDGE_ON = 1e-9
 
 OUTSIDE = (-1e9, 0.0, 1.0, 1.0)
 """`homogeneous` of a vertex that is far from the picture."""
+
+Runs = NDArray[np.int64]
+"""Ranges [first, stop), (n, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +95,13 @@ def rasterize(
     all vertices, where it is known. `keeps_exact`: keep 1/s before it was rounded, too, which labels that compare pictures
     need; still pictures are spared its memory.
     """
-    everything = (0, _last_drawn(geometry, camera), 0, len(geometry.vertices))
+    everything = (0, _last_drawn(geometry, camera), 0, len(geometry.coordinates))
     part = _range(geometry, object_id) if object_id else everything
     is_whole = part == everything and window is None
     if is_whole:
         q = homogeneous(geometry, camera) if corners is None else corners
+    elif part == everything and corners is not None:
+        q = corners
     else:
         q = homogeneous(geometry, camera, *part[2:])
     nearest, seen = _draw(geometry, camera, subdivision, part, window, q)
@@ -106,7 +111,7 @@ def rasterize(
 
 def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:
     """A new buffer: `visibility`, which shows everything else, with the ground of this geometry drawn into it."""
-    ground = geometry.triangle_start[-1], _last_drawn(geometry, camera), geometry.vertex_start[-1], len(geometry.vertices)
+    ground = geometry.triangle_start[-1], _last_drawn(geometry, camera), geometry.vertex_start[-1], len(geometry.coordinates)
     shown = visibility.inverse_depth.astype(np.float64), visibility.triangle.copy()
     nearest, seen = _draw(geometry, camera, 1, ground, None, homogeneous(geometry, camera, *ground[2:]), shown)
     return Visibility(seen, nearest.astype(np.float32))
@@ -139,24 +144,62 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     """Vertices [base, stop) before the perspective division, and the inverse of their third coordinate, (n, 4).
 
     K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens. The inverse is infinite unless positive. Of all
-    vertices, those of things that lie outside of a pinhole's picture are at `OUTSIDE`, wherever they are.
+    vertices, those of things that lie outside of a pinhole's picture are left out: the first of them is `OUTSIDE`, the others
+    are arbitrary. `in_picture` gives those that are not.
     """
-    from viewsphere.truth import kernels_draw as kernels
-
-    end = len(geometry.vertices) if stop is None else stop
-    q = np.empty((end - base, 4))
     k = camera.K if camera.distortion is None else np.eye(3)
     moved = np.column_stack((camera.R, camera.t))
     m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
     if base or stop is not None or camera.distortion is not None:
-        kernels.transform(geometry.vertices, base, end, m, q)
-        return q
-    for first, last, is_outside in _runs(geometry.vertex_start, end, outside(geometry, camera, m)):
-        if is_outside:
-            q[first:last] = OUTSIDE
-        else:
-            kernels.transform(geometry.vertices, first, last, m, q[first:last])
+        return projected(geometry, m, base, stop)
+    end, without = len(geometry.coordinates), outside(geometry, camera, m)
+    q = sparse((end, 4), np.float64)
+    starts = zip(geometry.vertex_start, without.tolist(), strict=False)
+    q[[start for start, is_left_out in starts if is_left_out and start < end]] = OUTSIDE
+    for first, last in _shown(without, geometry.vertex_start, end).tolist():
+        _project(geometry, m, first, last, q[first:last])
     return q
+
+
+def in_picture(geometry: Geometry, q: NDArray[np.float64], end: int | None = None) -> tuple[Runs, Runs]:
+    """The vertices and the triangles, up to `end` of these, that are not left out of `homogeneous` vertices q of all things:
+    as many runs of both, which belong together.
+    """
+    without, last = left_out(geometry, q), len(geometry.triangles) if end is None else end
+    return _shown(without, geometry.vertex_start, len(q)), _shown(without, geometry.triangle_start, last)
+
+
+def left_out(geometry: Geometry, q: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which things are left out of `homogeneous` vertices q of all of them."""
+    start = np.array(geometry.vertex_start[:-1], np.intp)
+    return (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1) if len(q) else start < 0
+
+
+def _shown(without: NDArray[np.bool_], starts: tuple[int, ...], end: int) -> Runs:
+    """Runs, up to the end, of what things own that are not left out, from these starts on, and the ground."""
+    is_shown = np.array([False, *~without, True, False])
+    borders = np.flatnonzero(is_shown[1:] != is_shown[:-1])
+    return np.array([*starts, end], np.int64)[borders].reshape(-1, 2)
+
+
+def projected(geometry: Geometry, m: NDArray[np.float64], base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
+    """(n, 4): m (x, y, z, 1) of the vertices [base, stop), and the inverse of its third coordinate, as `homogeneous`."""
+    end = len(geometry.coordinates) if stop is None else stop
+    q = np.empty((end - base, 4))
+    _project(geometry, m, base, end, q)
+    return q
+
+
+def _project(geometry: Geometry, m: NDArray[np.float64], base: int, stop: int, q: NDArray[np.float64]) -> None:
+    """Write `projected`."""
+    from viewsphere.truth import kernels_draw, kernels_place
+
+    starts = np.array(geometry.vertex_start, np.int64)
+    kernels_place.project(geometry.coordinates, starts, geometry.poses, m, base, stop, q)
+    first = max(geometry.vertex_start[-1], base)
+    if first < stop:
+        low, high = first - geometry.vertex_start[-1], stop - geometry.vertex_start[-1]
+        kernels_draw.transform(geometry.ground, low, high, m, q[first - base :])
 
 
 def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -171,26 +214,20 @@ def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.fl
         return np.logical_or.reduce([side.all(axis=1) for side in sides])
 
 
-def _runs(starts: tuple[int, ...], end: int, flags: NDArray[np.bool_]) -> Iterator[tuple[int, int, bool]]:
-    """Runs [first, stop) of what things own from these starts on, up to the end, which things of one flag own; False beyond."""
-    first, flag = 0, False
-    for start, own in zip(starts, (*flags.tolist(), False), strict=True):
-        if own != flag:
-            if start > first:
-                yield first, start, flag
-            first, flag = start, own
-    if end > first:
-        yield first, end, flag
-
-
 def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int32]:
     """The range of pixels that each vertex may touch in a pinhole's picture of this (width, height), (n, 4), as
     `kernels_points.boxes` has it; corners: `homogeneous` vertices.
     """
     from viewsphere.truth import kernels_points as kernels
 
-    box = np.empty((len(corners), 4), np.int32)
-    kernels.boxes(corners, geometry.vertex_start[-1], *size, box)
+    box, nowhere = np.empty((len(corners), 4), np.int32), np.empty((1, 4), np.int32)
+    kernels.boxes(np.array([OUTSIDE]), 1, *size, nowhere)
+    done = 0
+    for first, stop in in_picture(geometry, corners)[0].tolist():
+        box[done:first] = nowhere
+        kernels.boxes(corners[first:stop], geometry.vertex_start[-1] - first, *size, box[first:stop])
+        done = stop
+    box[done:] = nowhere
     return box
 
 
@@ -284,18 +321,13 @@ def _draw(
         table, unit = t.arrays, has_unit_rays(camera.distortion)
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
         return nearest, seen
-    cell, canvas = np.empty((stop - base, 4), np.int32), (x0, y0, x1 - x0, y1 - y0)
-    vertices, triangles = [(0, stop - base, False)], [(first, last, False)]
-    if 0 < len(q) == len(geometry.vertices):  # of a thing that is outside the first vertex is, too
-        start = np.array(geometry.vertex_start[:-1], np.intp)
-        hidden = (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1)
-        vertices = list(_runs(geometry.vertex_start, stop, hidden))
-        triangles = list(_runs(geometry.triangle_start, last, hidden))
-    for begin, end, is_outside in vertices:
-        if not is_outside:
-            kernels.cells(q[begin:end], samples, *canvas, cell[begin:end])
-    cell[max(geometry.vertex_start[-1] - base, 0) :] = kernels.BEHIND
-    for begin, end, is_outside in triangles:
-        if not is_outside:
-            kernels.draw(q, cell, geometry.triangles, (begin, end, base), (samples, x0, y0), *cut, nearest, seen)
+    canvas, parts = (x0, y0, x1 - x0, y1 - y0), [(base, stop, first, last)]
+    if 0 < len(q) == len(geometry.coordinates):  # things may be left out
+        vertices, triangles = in_picture(geometry, q, last)
+        parts = np.column_stack((vertices, triangles)).tolist()
+    for begin, end, first, last in parts:
+        own, cell = q[begin - base : end - base], np.empty((end - begin, 4), np.int32)
+        kernels.cells(own, samples, *canvas, cell)
+        cell[max(geometry.vertex_start[-1] - begin, 0) :] = kernels.BEHIND
+        kernels.draw(own, cell, geometry.triangles, (first, last, begin), (samples, x0, y0), *cut, nearest, seen)
     return nearest, seen

@@ -22,7 +22,7 @@ def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int]:
     width, height = camera.width, camera.height
     # Twice of each side: room for what the filter spreads into the picture. Where all hold, z is positive.
     sides = np.array([(1, 0, AROUND), (-1, 0, width + AROUND), (0, 1, AROUND), (0, -1, height + AROUND)], float)
-    places = homogeneous(geometry, camera, 0, len(geometry.vertices))[:, :3]  # also of things that lie beside the picture
+    places = homogeneous(geometry, camera, 0, len(geometry.coordinates))[:, :3]  # also of things that lie beside the picture
     x, y, z = places.T
     beyond = np.zeros(len(places), np.uint8)  # the sides beyond which a vertex lies, a bit each
     for bit, (across, down, room) in enumerate(sides):

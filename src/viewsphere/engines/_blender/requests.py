@@ -157,7 +157,7 @@ def _material_request(material: Material, repaints: Sequence[Repaint]) -> Reques
 
 def _ground_request(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put) -> Request:
     """The ground with truth's own triangles, the texture coordinates of the raster engine, and the range of its fading."""
-    vertices = geometry.vertices[geometry.vertex_start[-1] :]
+    vertices = geometry.ground
     triangles = geometry.triangles[geometry.triangle_start[-1] :] - geometry.vertex_start[-1]
     material, images = ground_material(ground)
     if ground.has_slabs:

@@ -395,7 +395,7 @@ def clip_of(visibility: Visibility, geometry: Geometry, camera: Camera) -> Clip:
     near, far = 1 / (SPARE * float(known.max())), SPARE / float(known.min())
     if geometry.ground_z is None:
         return near, far
-    corners = geometry.vertices[geometry.vertex_start[-1] :]
+    corners = geometry.ground
     return near, min(far, SPARE * float(np.linalg.norm(corners - camera.center, axis=1).max()))
 
 

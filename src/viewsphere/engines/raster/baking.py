@@ -25,7 +25,7 @@ from viewsphere.engines.raster.options import Options
 from viewsphere.engines.raster.painting import Baked
 from viewsphere.engines.raster.records import NO_BOUNCES, Float32, Int32, Surfaces
 from viewsphere.engines.raster.still_maps import StillMaps
-from viewsphere.engines.raster.surface import Lengths, Materials, made_of, move_surfaces, pack_materials, pack_surfaces
+from viewsphere.engines.raster.surface import Lengths, Materials, Rows, made_of, pack_materials
 from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.surroundings.ground import SLABS, ground_albedo, ground_frame, ground_material, only_scatters
@@ -40,12 +40,17 @@ class Packed:
     arranged: Arranged
     lengths: Lengths
     materials: Materials
-    surfaces: Surfaces
+    rows: Rows
     kind: NDArray[np.uint8]
     owner: Int32
     see_through: NDArray[np.bool_]
     blended: Geometry
     maps: StillMaps | None
+
+    @property
+    def surfaces(self) -> Surfaces:
+        """Of all things; see `surface.Rows`."""
+        return self.rows.surfaces
 
     def at(self, arranged: Arranged, ground: Ground | None, lengths: Lengths) -> Packed:
         """The same where things are elsewhere. Nothing of this one may be used then: what moved is written in place."""
@@ -54,12 +59,12 @@ class Packed:
         is_alike = geometry.triangles is self.arranged.geometry.triangles and arranged.moving == self.arranged.moving
         if materials is None or not is_alike:
             return pack(arranged, ground, lengths, materials)
+        self.rows.move(geometry, arranged.meshes, arranged.changed_since(self.arranged))
         is_blended = self.blended is not self.arranged.geometry
         blended = {"cutouts": self.blended.cutouts, "triangle_cutout": self.blended.triangle_cutout}
         return replace(
             self,
             arranged=arranged,
-            surfaces=move_surfaces(self.surfaces, geometry, arranged.changed_since(self.arranged), lengths),
             blended=replace(geometry, **blended) if is_blended else geometry,
         )
 
@@ -69,7 +74,9 @@ def pack(arranged: Arranged, ground: Ground | None, lengths: Lengths, materials:
     geometry, meshes = arranged.geometry, arranged.meshes
     if materials is None:
         materials = pack_materials(arranged.whole, ground, lengths, arranged.targets, arranged.things)
-    surfaces = pack_surfaces(geometry, meshes, materials, lengths)
+    rows = Rows.of(geometry, meshes, materials, lengths)
+    surfaces, is_drive = rows.surfaces, arranged.is_sequence and arranged.has_scenery
+    rows.write({*range(arranged.targets), *arranged.moving} if is_drive else range(len(meshes)))
     see_through = np.append(_is_see_through(surfaces.looks)[surfaces.material], False)
     kind = np.where(see_through[:-1], kernels_paint.SEE_THROUGH, kernels_paint.SOLID).astype(np.uint8)
     kind[geometry.triangle_start[-1] :] = kernels_paint.FLOOR
@@ -77,14 +84,12 @@ def pack(arranged: Arranged, ground: Ground | None, lengths: Lengths, materials:
         arranged=arranged,
         lengths=lengths,
         materials=materials,
-        surfaces=surfaces,
+        rows=rows,
         kind=np.append(kind, np.uint8(kernels_paint.NOTHING)),
         owner=(geometry.triangle_object * len(surfaces.looks) + surfaces.material).astype(np.int32),
         see_through=see_through,
         blended=with_blended_colors(geometry, meshes),
-        maps=StillMaps.of(surfaces, geometry.triangle_start, arranged.moving, arranged.targets)
-        if arranged.is_sequence
-        else None,
+        maps=StillMaps.of(rows.part, len(meshes), arranged.moving, arranged.targets) if arranged.is_sequence else None,
     )
 
 
@@ -128,7 +133,7 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
         occlusion = shades.bake(packed.arranged, casters, lengths.unit, has_ground, options.ambient_occlusion)
     else:
         occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
-    hall = halls.of(packed.arranged, casters, floor, lengths, has_ground, options.bounces)
+    hall = halls.of(packed.arranged, packed.rows, casters, floor, lengths, has_ground, options.bounces)
     bounces = NO_BOUNCES if hall is None else bake_bounces(hall, surrounding, lights)
     if hall is not None and hall.has_map:
         occlusion = of_ground_alone(occlusion)
@@ -137,6 +142,7 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
         origin=np.array(lengths.origin),
         unit=lengths.unit,
         surfaces=surfaces,
+        rows=packed.rows,
         textures=packed.materials.textures,
         floor=floor,
         surrounding=surrounding,

@@ -16,8 +16,8 @@ from viewsphere.engines._arranged import Arranged
 from viewsphere.engines.raster.bounces import Hall
 from viewsphere.engines.raster.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.lights import Casters
-from viewsphere.engines.raster.records import Float32, Int32, Surfaces
-from viewsphere.engines.raster.surface import Lengths
+from viewsphere.engines.raster.records import Float32, Int32
+from viewsphere.engines.raster.surface import Lengths, Rows
 from viewsphere.engines.raster.tracing import cast, tree_of
 from viewsphere.model.thing import Thing
 
@@ -58,6 +58,7 @@ class Halls:
     def of(
         self,
         arranged: Arranged,
+        rows: Rows,
         casters: Casters,
         floor: Float32,
         lengths: Lengths,
@@ -69,7 +70,7 @@ class Halls:
         """
         if bounces == "off" or (bounces == "auto" and not arranged.has_scenery):
             return None
-        own = self._throwing(arranged, casters.surfaces, lengths, bounces == "auto")
+        own = self._throwing(arranged, rows, bounces == "auto")
         if not len(own.which):
             return None
         height = arranged.geometry.ground_z if has_ground else None
@@ -79,36 +80,44 @@ class Halls:
         limits = own.which, own.low, own.high
         return Hall(key, casters.surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map)
 
-    def _throwing(self, arranged: Arranged, surfaces: Surfaces, lengths: Lengths, only_indoors: bool) -> _Throwing:
-        still = _still(arranged)
+    def _throwing(self, arranged: Arranged, rows: Rows, only_indoors: bool) -> _Throwing:
+        still, surfaces, lengths = _still(arranged), rows.surfaces, rows.lengths
         things, meshes = tuple(arranged.things[i] for i in still), tuple(arranged.whole[i] for i in still)
         for last in self._last:
             same = len(last.things) == len(things) and all(map(is_, last.things, things)) and all(map(is_, last.meshes, meshes))
             if same and last.lengths == lengths and last.triangles is surfaces.triangles:
                 return last
-        found = _thrown(arranged, still, (things, meshes), surfaces, lengths, only_indoors)
+        found = _thrown(still, (things, meshes), rows, only_indoors)
         self._last[:] = [found]
         return found
 
 
-def _thrown(
-    arranged: Arranged,
-    still: list[int],
-    own: tuple[tuple[Thing, ...], tuple[Mesh, ...]],
-    surfaces: Surfaces,
-    lengths: Lengths,
-    only_indoors: bool,
-) -> _Throwing:
-    start, low, high = arranged.geometry.triangle_start, np.zeros(3), np.zeros(3)
-    parts = [np.arange(start[i], start[i + 1], dtype=np.int32) for i in still]
-    which = np.concatenate([np.empty(0, np.int32), *parts])
-    which = which[surfaces.looks[surfaces.material[which], L_CASTS_FROM] <= 1]
-    if len(which):
-        corners = surfaces.vertices[surfaces.triangles[which], 11:14]
-        if only_indoors and not _is_roofed(_Roof((own, lengths), corners)):
-            which = which[:0]
-        low, high = (np.asarray(f(corners.reshape(-1, 3), axis=0), np.float64) for f in (np.nanmin, np.nanmax))
-    return _Throwing(*own, lengths, surfaces.triangles, which, low, high)
+def _thrown(still: list[int], own: tuple[tuple[Thing, ...], tuple[Mesh, ...]], rows: Rows, only_indoors: bool) -> _Throwing:
+    low, high = np.zeros(3), np.zeros(3)
+    casts = rows.surfaces.looks[:, L_CASTS_FROM] <= 1
+    every = ((i, np.flatnonzero(casts[rows.part(i).material])) for i in still)
+    parts = [(i, which) for i, which in every if len(which)]
+    if parts:
+        bounds = np.array([[f(_corners(rows, *part), axis=(0, 1)) for f in (np.nanmin, np.nanmax)] for part in parts])
+        low, high = np.nanmin(bounds[:, 0], axis=0), np.nanmax(bounds[:, 1], axis=0)
+        if only_indoors and not _is_roofed(_Roof((own, rows.lengths), low, high, [_above(rows, parts, _eyes(low, high))])):
+            parts = []
+    rows.write(i for i, _ in parts)
+    start = rows.geometry.triangle_start
+    which = np.concatenate([np.empty(0, np.int32), *((start[i] + which).astype(np.int32) for i, which in parts)])
+    return _Throwing(*own, rows.lengths, rows.surfaces.triangles, which, low.astype(np.float64), high.astype(np.float64))
+
+
+def _corners(rows: Rows, i: int, which: NDArray[np.intp]) -> Float32:
+    """Where the corners of these triangles (n,) of thing i are, (n, 3, 3)."""
+    part = rows.part(i)
+    return part.vertices[part.triangles[which], 11:14]
+
+
+def _above(rows: Rows, parts: list[tuple[int, NDArray[np.intp]]], height: np.float32) -> Float32:
+    """Those of them, in all parts, that reach higher, (n, 3, 3)."""
+    every = (_corners(rows, *part) for part in parts)
+    return np.concatenate([corners[corners[..., 2].max(axis=1) > height] for corners in every])
 
 
 def _still(arranged: Arranged) -> list[int]:
@@ -119,22 +128,30 @@ def _still(arranged: Arranged) -> list[int]:
     return [i for i in own if i not in arranged.moving and len(arranged.whole[i].triangles)]
 
 
+def _eyes(low: Float32, high: Float32) -> np.float32:
+    """How high one looks up from in a place between two corners."""
+    return np.float32(low[2] + EYES * (high[2] - low[2]))
+
+
 @dataclass(frozen=True)
 class _Roof:
+    """A place between two corners (3,). above: the triangles (n, 3, 3) that reach higher than eyes, which are taken out where
+    they are looked at: what is known of a place is kept, its triangles are not.
+    """
+
     key: Hashable
-    corners: Float32 = field(compare=False)
+    low: Float32 = field(compare=False)
+    high: Float32 = field(compare=False)
+    above: list[Float32] = field(compare=False)
 
 
 @lru_cache(maxsize=4)
 def _is_roofed(roof: _Roof) -> bool:
     """Whether most places within a scenery have the underside of something above them; within a solid thing there is none."""
-    corners = roof.corners
-    low, high = np.nanmin(corners, axis=(0, 1)), np.nanmax(corners, axis=(0, 1))
     # A tree of what is above is small: of a street nearly nothing is.
+    low, high, above, eyes = roof.low, roof.high, roof.above.pop(), _eyes(roof.low, roof.high)
     at = (np.arange(LATTICE) + 0.5) / LATTICE
     x, y = np.meshgrid(*(low[k] + at * (high[k] - low[k]) for k in range(2)))
-    eyes = np.float32(low[2] + EYES * (high[2] - low[2]))
-    above = corners[corners[..., 2].max(axis=1) > eyes]
     if not len(above):
         return False
     places = np.stack([x, y, np.full_like(x, eyes)], axis=-1).reshape(-1, 3).astype(np.float32)

@@ -64,19 +64,24 @@ def spread(pixels, count, limit, around):
 
 
 @njit
-def with_corners_before(q, triangles, wanted, limit, near, others):
-    """Mark in `others` (T,) unwanted triangles that have a vertex before the limit of its pixel; `near` (V,) is scratch."""
+def with_corners_before(q, triangles, runs, wanted, limit, near, others):
+    """Mark in `others` (T,) unwanted triangles that have a vertex before the limit of its pixel; `near` (V,) is scratch. `runs`
+    are those of vertices and of triangles that are looked at: `truth.visibility.in_picture`.
+    """
     height, width = limit.shape
     a, b, c, d = U(0), U(1), U(2), U(3)
-    for i in range(U(q.shape[0])):
-        x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
-        near[i] = 0
-        if (q[i, c] > 0.0) & (x > -1.0) & (y > -1.0) & (x < width + 1.0) & (y < height + 1.0):
-            column, row = min(max(np.int64(x), 0), width - 1), min(max(np.int64(y), 0), height - 1)
-            near[i] = f4(q[i, d]) * FLUSH > limit[U(row), U(column)]
-    for t in range(U(triangles.shape[0])):
-        others[t] = near[U(triangles[t, a])] | near[U(triangles[t, b])] | near[U(triangles[t, c])]
-        others[t] &= wanted[t] ^ 1
+    of_vertices, of_triangles = runs
+    for k in range(of_vertices.shape[0]):
+        for i in range(U(of_vertices[k, 0]), U(of_vertices[k, 1])):
+            x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+            near[i] = 0
+            if (q[i, c] > 0.0) & (x > -1.0) & (y > -1.0) & (x < width + 1.0) & (y < height + 1.0):
+                column, row = min(max(np.int64(x), 0), width - 1), min(max(np.int64(y), 0), height - 1)
+                near[i] = f4(q[i, d]) * FLUSH > limit[U(row), U(column)]
+    for k in range(of_triangles.shape[0]):
+        for t in range(U(of_triangles[k, 0]), U(of_triangles[k, 1])):
+            others[t] = near[U(triangles[t, a])] | near[U(triangles[t, b])] | near[U(triangles[t, c])]
+            others[t] &= wanted[t] ^ 1
 
 
 @njit

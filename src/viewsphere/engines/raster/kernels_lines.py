@@ -26,27 +26,30 @@ NARROW = 1.0  # pixels: a line as wide as this is seen at some centre
 
 
 @njit
-def on_others(q, triangles, cutout, owner, triangle, depth, shown, lines):
+def on_others(q, triangles, runs, cutout, owner, triangle, depth, shown, lines):
     """Mark in `lines` (T,) triangles with a vertex on a visible surface of another owner that hides it at most a little.
 
-    shown (V,) int32 is scratch.
+    shown (V,) int32 is scratch; `runs` are those of `kernels_edges.with_corners_before`.
     """
     height, width = triangle.shape
     a, b, c, d = U(0), U(1), U(2), U(3)
-    for i in range(U(q.shape[0])):
-        x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
-        shown[i] = -1
-        if (q[i, c] > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height):
-            row, column = U(np.int64(y)), U(np.int64(x))
-            level = depth[row, column]
-            here = f4(q[i, d])
-            if (here > level * (f4(1) - BEHIND)) & (here < level * (f4(1) + BEFORE)):
-                shown[i] = owner[U(triangle[row, column])]
-    for t in range(U(triangles.shape[0])):
-        o = owner[t]
-        s0, s1, s2 = shown[U(triangles[t, a])], shown[U(triangles[t, b])], shown[U(triangles[t, c])]
-        is_on = ((s0 >= 0) & (s0 != o)) | ((s1 >= 0) & (s1 != o)) | ((s2 >= 0) & (s2 != o))
-        lines[t] = is_on & (cutout[t] != NEVER)
+    of_vertices, of_triangles = runs
+    for k in range(of_vertices.shape[0]):
+        for i in range(U(of_vertices[k, 0]), U(of_vertices[k, 1])):
+            x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+            shown[i] = -1
+            if (q[i, c] > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height):
+                row, column = U(np.int64(y)), U(np.int64(x))
+                level = depth[row, column]
+                here = f4(q[i, d])
+                if (here > level * (f4(1) - BEHIND)) & (here < level * (f4(1) + BEFORE)):
+                    shown[i] = owner[U(triangle[row, column])]
+    for k in range(of_triangles.shape[0]):
+        for t in range(U(of_triangles[k, 0]), U(of_triangles[k, 1])):
+            o = owner[t]
+            s0, s1, s2 = shown[U(triangles[t, a])], shown[U(triangles[t, b])], shown[U(triangles[t, c])]
+            is_on = ((s0 >= 0) & (s0 != o)) | ((s1 >= 0) & (s1 != o)) | ((s2 >= 0) & (s2 != o))
+            lines[t] = is_on & (cutout[t] != NEVER)
 
 
 @njit

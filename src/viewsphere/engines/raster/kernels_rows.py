@@ -7,13 +7,18 @@ import math
 import numpy as np
 
 from viewsphere.kernels.jit import njit
+from viewsphere.truth.kernels_place import there, turned
 
 
 @njit
-def place_rows(vertices, normals, origin, unit, rows):
-    """Write positions (V, 3) from `origin` in `unit`s, and normals (V, 3), in rows of `Surfaces.vertices`; 0 for no number."""
+def place_rows(m, own, own_normals, origin, unit, rows):
+    """Write positions (V, 3) from `origin` in `unit`s, and normals (V, 3), of a mesh in the pose m (4, 4) in rows of
+    `Surfaces.vertices`; 0 for no number.
+    """
     for i in range(rows.shape[0]):
+        world = there(m, own[i, 0], own[i, 1], own[i, 2])
         for r in range(3):
-            normal, place = normals[i, r], np.float32((vertices[i, r] - origin[r]) / unit)
+            normal = turned(m, r, own_normals[i, 0], own_normals[i, 1], own_normals[i, 2])
+            place = np.float32((world[r] - origin[r]) / unit)
             rows[i, r] = normal if math.isfinite(normal) else np.float32(0)
             rows[i, 11 + r] = place if math.isfinite(place) else np.float32(0)

@@ -53,21 +53,27 @@ def _box(q, i0, i1, i2, reach, width, height):
 
 
 @njit(_nrt=True)
-def around(q, triangles, cutout, left_out, window):
-    """Triangles, int64, that may touch a window (x0, y0, x1, y1; pixels, both ends included), except those in `left_out`."""
+def around(q, triangles, runs, cutout, left_out, window):
+    """Triangles, int64, that may touch a window (x0, y0, x1, y1; pixels, both ends included), except those in `left_out`.
+    `runs` are those of `kernels_edges.with_corners_before`.
+    """
     x0, y0, x1, y1 = window
-    side = np.zeros(q.shape[0], np.uint8)  # one bit for each side of the window that the vertex is beyond
+    side = np.empty(q.shape[0], np.uint8)  # one bit for each side of the window that the vertex is beyond
     a, b, c, d = U(0), U(1), U(2), U(3)
-    for i in range(U(q.shape[0])):
-        if q[i, c] > 0.0:
-            x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
-            side[i] = (x < x0) | ((x > x1 + 1.0) << 1) | ((y < y0) << 2) | ((y > y1 + 1.0) << 3)
+    of_vertices, of_triangles = runs
+    for k in range(of_vertices.shape[0]):
+        for i in range(U(of_vertices[k, 0]), U(of_vertices[k, 1])):
+            side[i] = 0
+            if q[i, c] > 0.0:
+                x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+                side[i] = (x < x0) | ((x > x1 + 1.0) << 1) | ((y < y0) << 2) | ((y > y1 + 1.0) << 3)
     order = np.empty(triangles.shape[0] + 1, np.int64)
     n = U(0)
-    for t in range(U(triangles.shape[0])):
-        order[n] = t
-        beyond = side[U(triangles[t, a])] & side[U(triangles[t, b])] & side[U(triangles[t, c])]
-        n += U(((beyond == 0) | (cutout[t] < NEVER)) & (not left_out[t]))
+    for k in range(of_triangles.shape[0]):
+        for t in range(U(of_triangles[k, 0]), U(of_triangles[k, 1])):
+            order[n] = t
+            beyond = side[U(triangles[t, a])] & side[U(triangles[t, b])] & side[U(triangles[t, c])]
+            n += U(((beyond == 0) | (cutout[t] < NEVER)) & (not left_out[t]))
     return order[:n]
 
 
@@ -102,7 +108,7 @@ def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragm
     """Draw the triangles in `order` through a pinhole.
 
     `points` is (grid, pixels, offsets, (lowest, highest offset)), `solid` (nearest, seen, farthest, tiles), `fragments`
-    (inverses, listed, counts, vertices).
+    (inverses, listed, counts, q).
     """
     grid, _, _, _ = points
     farthest, tiles = solid[2], solid[3][1]
@@ -340,13 +346,13 @@ def _insert(t, inverse, p, triangles, fragments):
     is the other's back.
     """
     k, m = p
-    inverses, listed, counts, vertices = fragments
+    inverses, listed, counts, q = fragments
     near, here = inverses[k, m], listed[k, m]
     capacity, count = len(near), np.int64(counts[p])
     at = count
     while at > 0 and inverse * (1.0 + TIE) >= near[at - 1]:
         at -= 1
-        if inverse <= near[at] * (1.0 + TIE) and _share_edge(vertices, triangles, t, here[at]):
+        if inverse <= near[at] * (1.0 + TIE) and _share_edge(q, triangles, t, here[at]):
             return
     if at == capacity:
         return
@@ -357,13 +363,13 @@ def _insert(t, inverse, p, triangles, fragments):
 
 
 @inner
-def _share_edge(vertices, triangles, s, t):
+def _share_edge(q, triangles, s, t):
     """Whether two corners of triangle s are where corners of t are."""
     same = 0
     for i in range(3):
         for j in range(3):
             a, b = triangles[s, i], triangles[t, j]
-            if vertices[a, 0] == vertices[b, 0] and vertices[a, 1] == vertices[b, 1] and vertices[a, 2] == vertices[b, 2]:
+            if q[a, 0] == q[b, 0] and q[a, 1] == q[b, 1] and q[a, 2] == q[b, 2]:
                 same += 1
     return same >= 2
 

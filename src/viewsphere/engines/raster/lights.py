@@ -15,7 +15,8 @@ from viewsphere.engines.raster import kernels_shadow as kernels
 from viewsphere.engines.raster.kernels_arrive import AREA, DISTANT, POINT, SPOT
 from viewsphere.engines.raster.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures
-from viewsphere.engines.raster.still_maps import StillMaps, rounded, snapped
+from viewsphere.engines.raster.still_maps import Part, StillMaps, rounded, snapped
+from viewsphere.engines.raster.surface import part_of
 from viewsphere.model.scene import AnyLight, AreaLight, HemisphereLight, PointLight, SpotLight
 from viewsphere.surroundings.sun import Distant
 
@@ -263,8 +264,7 @@ def _backdrop(source: _Source, casters: Casters, size: int) -> _Backdrop:
     low, high = casters.extent.low, casters.extent.high
     span = 2.0 ** math.ceil(math.log2(float(np.linalg.norm(high - low)) or 1.0))
     surfaces, start = casters.surfaces, casters.extent.triangles
-    behind = surfaces._replace(triangles=surfaces.triangles[start:], material=surfaces.material[start:])
-    scenery = casters.alone(behind, casters.maps and casters.maps.backdrop)
+    scenery = casters.alone(part_of(surfaces, start), casters.maps and casters.maps.backdrop)
     reach = casters.extent.reach if casters.maps is None else rounded(casters.extent.reach)
     return _Backdrop(casters.scenery, (x, y, z), math.tan(source.radius), span, reach, size, scenery)
 
@@ -389,8 +389,8 @@ def draw_views(views: Sequence[ShadowView], casters: Casters, opposite: bool = F
         farthest = _level(result, i + len(views), view.size) if opposite else np.empty((0, 0), np.float32)
         farthest.fill(-np.inf)
         tilt = float(form[i, kernels.TILT]) if view.is_round else 0.0
-        last = _begin(view, tilt, casters, nearest)
-        _draw(view, tilt, last, casters.textures, nearest, farthest)
+        for part in _begin(view, tilt, casters, nearest):
+            _draw(view, tilt, part(), casters.textures, nearest, farthest)
         np.negative(farthest, out=farthest)
     for i in range(count):
         _thin_out(result, i)
@@ -411,15 +411,16 @@ def _draw(
     kernels.draw_depth(corners, surfaces, textures, view.near, tilt, nearest, other)
 
 
-def _begin(view: ShadowView, tilt: float, casters: Casters, nearest: Float32) -> Surfaces:
+def _begin(view: ShadowView, tilt: float, casters: Casters, nearest: Float32) -> tuple[Part, ...]:
     """Draw what stands still in a sequence into an empty map; returns what is still to be drawn."""
     maps, key = casters.maps, (view.matrix.tobytes(), view.near, tilt, view.size)
     kept = None if maps is None else maps.begun(key)
     nearest[:] = np.inf if kept is None else kept
     if maps is None:
-        return casters.surfaces
+        return (lambda: casters.surfaces,)
     if kept is None:
-        _draw(view, tilt, maps.still, casters.textures, nearest)
+        for part in maps.still:
+            _draw(view, tilt, part(), casters.textures, nearest)
         maps.keep(key, nearest)
     return maps.moving
 

@@ -36,7 +36,8 @@ class Mirrored(NamedTuple):
 
 def lying(geometry: Geometry, height: float) -> NDArray[np.bool_]:
     """Which triangles (T,) lie below a height altogether."""
-    return np.max(geometry.vertices[:, 2][geometry.triangles], axis=1) < height
+    below = np.concatenate([*(geometry.places(i)[:, 2] for i in range(len(geometry.poses))), geometry.ground[:, 2]]) < height
+    return np.all(below[geometry.triangles], axis=1)
 
 
 def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> tuple[Float, Float]:
@@ -54,6 +55,7 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
     geometry = replace(baked.geometry, triangles=kept)
     own = replace(baked, geometry=geometry, blended=replace(baked.blended, triangles=kept))
     found, view = rasterize(geometry, below), view_of(baked, below)
+    baked.rows.write_seen(below, found, geometry)
     triangle, depth = np.full(found.triangle.size, -1, np.int32), np.zeros(found.triangle.size, np.float32)
     triangle[at], depth[at] = found.triangle.reshape(-1)[at], found.inverse_depth.reshape(-1)[at]
     light = np.zeros((len(triangle), 4), np.float32)

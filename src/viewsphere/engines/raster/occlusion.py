@@ -132,16 +132,15 @@ def hidden_by(casters: Casters, has_ground: bool, fineness: Fineness) -> Hidden:
     return Hidden(volume, frame, floor, floor_frame)
 
 
-def joined(hidden: Sequence[Hidden], poses: Sequence[Float], reach: Float) -> Occlusion:
+def joined(hidden: Sequence[Hidden], poses: Sequence[Float], reach: Float, volume: Float32 | None = None) -> Occlusion:
     """All of these, each where it stands: `poses` (4, 4) are rigid, from the axes of baking to the stage, and `reach` (N, 6)
-    is that of `Occlusion`.
+    is that of `Occlusion`. volume: what `joined_volumes` gives for them, if that is known.
     """
     volumes = {id(each.volume): each.volume for each in hidden}
     firsts = dict(zip(volumes, np.cumsum([0, *(v[..., 0].size for v in volumes.values())]).tolist(), strict=False))
     inverse = [np.column_stack([pose[:3, :3].T, -transform(pose[:3, :3].T, pose[:3, 3])]) for pose in poses]
-    flat = [volume.reshape(-1, kernels.COEFFICIENTS) for volume in volumes.values()]
     return Occlusion(
-        volume=flat[0] if len(flat) == 1 else np.concatenate(flat),
+        volume=joined_volumes(tuple(volumes.values())) if volume is None else volume,
         grid=np.array([[firsts[id(each.volume)], *each.volume.shape[:3]] for each in hidden], np.int64),
         frame=np.array([each.frame for each in hidden]),
         floor=np.repeat(np.array([each.floor for each in hidden])[..., None], 2, axis=3),
@@ -149,6 +148,12 @@ def joined(hidden: Sequence[Hidden], poses: Sequence[Float], reach: Float) -> Oc
         pose=np.array(inverse, np.float32).reshape(-1, 12),
         reach=np.asarray(reach, np.float32),
     )
+
+
+def joined_volumes(volumes: Sequence[Float32]) -> Float32:
+    """Different ones, one after another, (cells, 8)."""
+    flat = [volume.reshape(-1, kernels.COEFFICIENTS) for volume in volumes]
+    return flat[0] if len(flat) == 1 else np.concatenate(flat)
 
 
 def with_ground_light(occlusion: Occlusion, lights: Lights, ambient: float) -> Occlusion:

@@ -16,6 +16,7 @@ from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.occlusion import Occlusion
 from viewsphere.engines.raster.records import Bounces, Float32, Int32, PictureRays, Surfaces, Textures
 from viewsphere.engines.raster.samples import Layer, Marks, Samples, differs_behind, edge_samples, layers
+from viewsphere.engines.raster.surface import Rows
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.imaging.air import Air
 from viewsphere.model.camera import Camera
@@ -44,6 +45,7 @@ class Baked:
     origin: NDArray[np.float64]
     unit: float
     surfaces: Surfaces
+    rows: Rows
     textures: Textures
     floor: Float32
     surrounding: Surrounding
@@ -82,6 +84,7 @@ def paint(
     Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, else 0. `split`, if it is not empty,
     is filled with the parts of this light, (H * W, 6 or 9) float32 as `kernels_split` has them; it must be 0 before.
     """
+    baked.rows.write_seen(camera, visibility, baked.geometry)
     view = view_of(baked, camera)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     air = None if fog is None else Air.of(fog, camera, is_outdoors=is_outdoors)
@@ -101,6 +104,7 @@ def paint(
 
 def materials(baked: Baked, camera: Camera, visibility: Visibility) -> Float32:
     """Roughness and metallic of what a camera's pixel centres see, (H * W, 2) float32; 0 for nothing and a shadow catcher."""
+    baked.rows.write_seen(camera, visibility, baked.geometry)
     view, out = view_of(baked, camera), np.zeros((visibility.triangle.size, 2), np.float32)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     is_floor = baked.kind[triangle] == kernels_paint.FLOOR

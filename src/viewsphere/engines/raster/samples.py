@@ -15,7 +15,7 @@ from viewsphere.engines.raster import kernels_samples as kernels
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import RayTable, Visibility, homogeneous, index_rays, lens_table
+from viewsphere.truth.visibility import RayTable, Runs, Visibility, homogeneous, in_picture, index_rays, lens_table
 
 OFFSETS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
 """Places of the four samples in a pixel: a rotated grid, in which each row and each column of quarters holds one sample."""
@@ -132,9 +132,10 @@ def layers(
     A see-through surface that lies on a solid one (1/z equal within 1e-5) is in front of it, and of two see-through surfaces
     that lie on one another the later triangle is in front: decals are on top.
     """
-    clear = np.flatnonzero(see_through)
-    if len(clear) == 0:
+    if not see_through.any():
         return []
+    q = homogeneous(geometry, camera) if corners is None else corners
+    clear = _within(in_picture(geometry, q)[1], see_through)
     shape, count = (camera.height, camera.width), 1 if pixels is None else 4
     shown = triangle.reshape(-1, count), inverse_depth.reshape(-1, count)
     farthest = kernels_chosen.shown_farthest(*shown, _NO_PIXELS if pixels is None else pixels, *shape)
@@ -142,7 +143,6 @@ def layers(
     if pixels is not None:
         row_of = np.zeros(shape[0] * shape[1], np.int32)
         row_of[pixels] = np.arange(len(pixels))
-    q = homogeneous(geometry, camera) if corners is None else corners
     if camera.distortion is None:
         reach = _CENTER_REACH if count == 1 else _ROTATED_REACH
         chosen = np.flatnonzero(kernels.touched_boxes(q, clear, geometry.triangles, reach, farthest))
@@ -191,7 +191,8 @@ def _pile(
         if points.camera.distortion is None:
             y, x = np.divmod(points.pixels[:-1][behind], points.camera.width)
             window = x.min(), y.min(), x.max(), y.max()
-            solid = kernels.around(q, geometry.triangles, geometry.triangle_cutout, see_through, tuple(map(float, window)))
+            surfaces = geometry.triangles, in_picture(geometry, q), geometry.triangle_cutout
+            solid = kernels.around(q, *surfaces, see_through, tuple(map(float, window)))
         else:
             solid = np.flatnonzero(~see_through[:-1])
         points.draw(geometry, q, see_through, solid)
@@ -252,7 +253,7 @@ class _Points:
     def draw(self, geometry: Geometry, q: NDArray[np.float64], see_through: Bool, order: NDArray[np.int64]) -> None:
         """Draw these triangles."""
         count, lens = self.nearest.shape[1], self.camera.distortion
-        fragments = self.inverses, self.listed, self.counts, geometry.vertices
+        fragments = self.inverses, self.listed, self.counts, q
         surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays, see_through
         if lens is not None:
             side = 1 if count == 1 else 2
@@ -289,8 +290,10 @@ def _pinhole_edges(
     shown, (height, width) = (visibility.triangle, visibility.inverse_depth), visibility.triangle.shape
     wanted, chosen = np.zeros((2, len(geometry.triangles)), np.uint8)
     are_wanted, are_chosen = wanted.view(np.bool_), chosen.view(np.bool_)  # numpy searches booleans faster
-    kernels_lines.on_others(q, geometry.triangles, geometry.triangle_cutout, owner, *shown, np.empty(len(q), np.int32), chosen)
-    kernels_lines.mark(np.flatnonzero(are_chosen), q, geometry.triangles, owner, _ROTATED, *shown, marks, wanted)
+    runs = in_picture(geometry, q)
+    surfaces = q, geometry.triangles, runs
+    kernels_lines.on_others(*surfaces, geometry.triangle_cutout, owner, *shown, np.empty(len(q), np.int32), chosen)
+    kernels_lines.mark(_within(runs[1], are_chosen), q, geometry.triangles, owner, _ROTATED, *shown, marks, wanted)
     marked = np.flatnonzero(marks != 0)
     most = len(marked) + height * width // 8  # room for pixels that are found while drawing
     pixels = np.empty(most, np.int32)
@@ -301,12 +304,19 @@ def _pinhole_edges(
     kernels_edges.begin(pixels, len(marked), *shown, grid, limit, bound, nearest, seen, wanted)
     surfaces = q, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays
     canvas = _room(width), _ROTATED, *shown, grid, limit, pixels, starts
-    count = kernels_edges.draw(np.flatnonzero(are_wanted), *surfaces, *canvas, len(bound), nearest, seen)
+    count = kernels_edges.draw(_within(runs[1], are_wanted), *surfaces, *canvas, len(bound), nearest, seen)
     around = limit.copy()
     kernels_edges.spread(pixels, count, limit, around)
-    kernels_edges.with_corners_before(q, geometry.triangles, wanted, around, np.empty(len(q), np.uint8), chosen)
-    count = kernels_edges.draw(np.flatnonzero(are_chosen), *surfaces, *canvas, count, nearest, seen)
+    kernels_edges.with_corners_before(q, geometry.triangles, runs, wanted, around, np.empty(len(q), np.uint8), chosen)
+    count = kernels_edges.draw(_within(runs[1], are_chosen), *surfaces, *canvas, count, nearest, seen)
     return _differing(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, geometry.triangle_normals, behind)
+
+
+def _within(runs: Runs, marks: Bool) -> NDArray[np.int64]:
+    """The marked ones among runs of triangles, in their order."""
+    return np.concatenate(
+        [np.empty(0, np.int64), *(first + np.flatnonzero(marks[first:stop]) for first, stop in runs.tolist())]
+    )
 
 
 def _room(width: int) -> tuple[NDArray[np.uint32], Float32]:

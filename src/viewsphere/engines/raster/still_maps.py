@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,32 +20,33 @@ STEPS = 16
 of shadows.
 """
 
+Part = Callable[[], Surfaces]
 Key = tuple[bytes, float, float, int]
 """Of a view: its matrix, where it begins, its tilt and its size."""
 
 
 @dataclass(frozen=True, eq=False)
 class StillMaps:
-    """Triangles that stand still in a sequence, those that move, and maps of the former. All share their vertices.
-    backdrop: the same of scenery alone.
+    """What gives the surfaces of each thing that stands still in a sequence, and of the ground; of each that moves; and maps of
+    the former. backdrop: the same of scenery alone.
     """
 
-    still: Surfaces
-    moving: Surfaces
+    still: tuple[Part, ...]
+    moving: tuple[Part, ...]
     backdrop: StillMaps | None = None
     _maps: dict[Key, Float32] = field(default_factory=dict[Key, Float32])
 
     @classmethod
-    def of(cls, surfaces: Surfaces, triangle_start: Sequence[int], moving: Sequence[int], targets: int) -> StillMaps:
-        """Of the triangles of things, thing i's beginning at `triangle_start[i]`, of which these are `moving`; those behind the
-        first `targets` are scenery.
+    def of(cls, part: Callable[[int], Surfaces], count: int, moving: Sequence[int], targets: int) -> StillMaps:
+        """Of so many things and the ground, whose surfaces `part` gives, of which these are `moving`; those behind the first
+        `targets` are scenery.
         """
-        moves = np.zeros(len(surfaces.triangles), np.bool_)
-        for i in moving:
-            moves[triangle_start[i] : triangle_start[i + 1]] = True
-        is_scenery = np.arange(len(moves)) >= triangle_start[targets]
-        backdrop = cls(_chosen(surfaces, is_scenery & ~moves), _chosen(surfaces, is_scenery & moves))
-        return cls(_chosen(surfaces, ~moves), _chosen(surfaces, moves), backdrop)
+        moves = set(moving)
+
+        def parts(first: int, are_moving: bool) -> tuple[Part, ...]:
+            return tuple(partial(part, i) for i in range(first, count + 1) if (i in moves) == are_moving)
+
+        return cls(parts(0, False), parts(0, True), cls(parts(targets, False), parts(targets, True)))
 
     def begun(self, key: Key) -> Float32 | None:
         """The map of what stands still in this view, if it is kept."""
@@ -55,10 +57,6 @@ class StillMaps:
         if len(self._maps) == MOST:
             del self._maps[next(iter(self._maps))]
         self._maps[key] = depth.copy()
-
-
-def _chosen(surfaces: Surfaces, which: NDArray[np.bool_]) -> Surfaces:
-    return surfaces._replace(triangles=surfaces.triangles[which], material=surfaces.material[which])
 
 
 def snapped(span: float, middle: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.repaint import repainted
@@ -13,10 +15,13 @@ from viewsphere.engines.raster.bundles import BundlePacker
 from viewsphere.engines.raster.kernels_rows import place_rows
 from viewsphere.engines.raster.material_rows import material_row
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures
+from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint, Thing
 from viewsphere.surroundings.ground import ground_frame, ground_material
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.geometry import UP, Geometry, read_only
+from viewsphere.truth.sparse import sparse
+from viewsphere.truth.visibility import Visibility, homogeneous, left_out
 
 
 class Lengths(NamedTuple):
@@ -76,33 +81,91 @@ def pack_materials(
     return Materials(*packed, packer.pack(), tuple(first), made_of(meshes))
 
 
-def pack_surfaces(geometry: Geometry, meshes: Sequence[Mesh], materials: Materials, lengths: Lengths) -> Surfaces:
-    """Arrays for all triangles of a geometry and of the meshes it was built from, made of `pack_materials` of these."""
-    vertices = np.zeros((len(geometry.vertices), 16), np.float32)
-    vertices[:, 7:11] = 1.0
-    material = np.empty(len(geometry.triangles), np.int32)
-    for i, mesh in enumerate(meshes):
-        own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+@dataclass(eq=False)
+class Rows:
+    """The vertices of a stage's surfaces: those of a thing are written where it is looked at for the first time. Most things of
+    a town are never in a picture: they cast shadows, for which rows will do that are made anew.
+    """
+
+    surfaces: Surfaces
+    geometry: Geometry
+    meshes: Sequence[Mesh]
+    lengths: Lengths
+    _written: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, geometry: Geometry, meshes: Sequence[Mesh], materials: Materials, lengths: Lengths) -> Rows:
+        """Of all triangles of a geometry and of the meshes it was built from, made of `pack_materials` of these."""
+        vertices = sparse((len(geometry.coordinates), 16), np.float32)
+        material = np.empty(len(geometry.triangles), np.int32)
+        for i, mesh in enumerate(meshes):
+            own = slice(geometry.triangle_start[i], geometry.triangle_start[i + 1])
+            material[own] = mesh.triangle_material + materials.first[i]
+        material[geometry.triangle_start[-1] :] = len(materials.looks) - 1
+        triangles, normals = geometry.triangles.view(np.uint32), geometry.triangle_normals
+        surfaces = Surfaces(vertices, triangles, material, normals, materials.looks, materials.bundles)
+        rows = cls(surfaces, geometry, meshes, lengths, np.zeros(len(meshes), np.bool_))
+        rows._write_ground()
+        return rows
+
+    def write(self, things: Iterable[int]) -> None:
+        """Write what is not yet written of these things."""
+        for i in things:
+            if not self._written[i]:
+                self._write(i, self.surfaces.vertices[self._own(i)])
+                self._written[i] = True
+
+    def write_seen(self, camera: Camera, visibility: Visibility, geometry: Geometry) -> None:
+        """Write what may be in a picture of these triangles."""
+        if not self._written.all():
+            q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
+            self.write(np.flatnonzero(~left_out(geometry, q)).tolist())
+
+    def move(self, geometry: Geometry, meshes: Sequence[Mesh], things: Iterable[int]) -> None:
+        """These things, and the ground, are elsewhere, or deformed: their rows are written in place."""
+        self.geometry, self.meshes = geometry, meshes
+        self.surfaces = self.surfaces._replace(normals=geometry.triangle_normals)
+        for i in things:
+            if self._written[i]:
+                self._place(i, self.surfaces.vertices[self._own(i)])
+        self._write_ground()
+
+    def part(self, i: int) -> Surfaces:
+        """Thing i alone, or the ground, which comes after the last."""
+        starts = (*self.geometry.triangle_start, len(self.geometry.triangles))
+        own = part_of(self.surfaces, starts[i], starts[i + 1])
+        if i == len(self._written) or self._written[i]:
+            return own
+        span = self._own(i)
+        rows = np.empty((span.stop - span.start, 16), np.float32)
+        self._write(i, rows)
+        return own._replace(vertices=rows, triangles=own.triangles - np.uint32(span.start))
+
+    def _own(self, i: int) -> slice:
+        return slice(self.geometry.vertex_start[i], self.geometry.vertex_start[i + 1])
+
+    def _write(self, i: int, rows: Float32) -> None:
+        """Write those of thing i."""
+        mesh = self.meshes[i]
+        rows[:] = 0.0
+        rows[:, 7:11] = 1.0
         for first, values in ((3, mesh.uv0), (5, mesh.uv1), (7, mesh.colors)):
             if values is not None:
-                vertices[own, first : first + values.shape[1]] = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        own = slice(geometry.triangle_start[i], geometry.triangle_start[i + 1])
-        material[own] = mesh.triangle_material + materials.first[i]
-    material[geometry.triangle_start[-1] :] = len(materials.looks) - 1
-    _place(vertices, geometry, slice(None), lengths)
-    triangles = geometry.triangles.astype(np.uint32)
-    return Surfaces(vertices, triangles, material, geometry.triangle_normals, materials.looks, materials.bundles)
+                rows[:, first : first + values.shape[1]] = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+        self._place(i, rows)
+
+    def _place(self, i: int, rows: Float32) -> None:
+        """Write where thing i is, and its normals. Without numbers for a normal a face is flat."""
+        g, frame = self.geometry, (np.array(self.lengths.origin), self.lengths.unit)
+        place_rows(g.poses[i], g.coordinates[self._own(i)], read_only(self.meshes[i].normals), *frame, rows)
+
+    def _write_ground(self) -> None:
+        g, rows = self.geometry, self.surfaces.vertices[self.geometry.vertex_start[-1] :]
+        rows[:, 3:] = 0.0
+        rows[:, :3], rows[:, 7:11] = UP, 1.0
+        rows[:, 11:14] = (g.ground - self.lengths.origin) / self.lengths.unit
 
 
-def move_surfaces(surfaces: Surfaces, geometry: Geometry, things: Sequence[int], lengths: Lengths) -> Surfaces:
-    """The same where these things, and the ground, are elsewhere: their vertices are written in place."""
-    starts = geometry.vertex_start
-    for i in things:
-        _place(surfaces.vertices, geometry, slice(starts[i], starts[i + 1]), lengths)
-    _place(surfaces.vertices, geometry, slice(starts[-1], None), lengths)
-    return surfaces._replace(normals=geometry.triangle_normals)
-
-
-def _place(rows: Float32, geometry: Geometry, own: slice, lengths: Lengths) -> None:
-    """Without numbers for a normal a face is flat."""
-    place_rows(geometry.vertices[own], geometry.normals[own], np.array(lengths.origin), lengths.unit, rows[own])
+def part_of(surfaces: Surfaces, first: int, stop: int | None = None) -> Surfaces:
+    """Triangles [first, stop) alone."""
+    return surfaces._replace(triangles=surfaces.triangles[first:stop], material=surfaces.material[first:stop])

@@ -6,8 +6,9 @@ so however a sequence is cut into shots, its pictures are the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from operator import is_
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,17 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.engines._arranged import Arranged
 from viewsphere.engines.raster.kernels_occlusion import CLEAR
 from viewsphere.engines.raster.lights import Casters, Extent
-from viewsphere.engines.raster.occlusion import NO_OCCLUSION, Fineness, Hidden, Occlusion, Quality, hidden_by, joined
+from viewsphere.engines.raster.occlusion import (
+    NO_OCCLUSION,
+    Fineness,
+    Hidden,
+    Occlusion,
+    Quality,
+    hidden_by,
+    joined,
+    joined_volumes,
+)
+from viewsphere.engines.raster.records import Float32
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Repaint
@@ -43,6 +54,7 @@ class TargetShades:
     """Bakes what each target of a sequence hides; the last `MOST` are kept."""
 
     _known: dict[Key, Hidden] = field(default_factory=dict[Key, Hidden])
+    _joined: list[tuple[tuple[Float32, ...], Float32]] = field(default_factory=list[tuple[tuple[Float32, ...], Float32]])
 
     def bake(self, arranged: Arranged, casters: Casters, unit: float, has_ground: bool, quality: Quality) -> Occlusion:
         """What targets hide where they stand, in a stage of this unit in metres whose origin is the world's; the light of lamps
@@ -61,7 +73,14 @@ class TargetShades:
             hidden.append(own)
             poses.append(pose)
             reach.append(_reach(own, pose))
-        return joined(hidden, poses, np.array(reach)) if hidden else NO_OCCLUSION
+        return joined(hidden, poses, np.array(reach), self._volume(hidden)) if hidden else NO_OCCLUSION
+
+    def _volume(self, hidden: Sequence[Hidden]) -> Float32:
+        """That of all of them, which are the same at most instants."""
+        own = tuple({id(each.volume): each.volume for each in hidden}.values())
+        if not (self._joined and len(own) == len(self._joined[0][0]) and all(map(is_, own, self._joined[0][0]))):
+            self._joined[:] = [(own, joined_volumes(own))]
+        return self._joined[0][1]
 
     def _hidden(
         self, arranged: Arranged, i: int, casters: Casters, unit: float, has_ground: bool, fineness: Fineness

@@ -84,8 +84,8 @@ def handles(shape: Shape, coats: Coats, rear_door: bool, chrome: bool) -> list[P
         u = float(hull.outline.u_at_y(y - 0.17))
         z = float(hull.top(np.array([u]))[1][0]) - hull.edge - 0.085
         at = raised(hull.surface, np.array([[u, z]]), 0.018)[0]
-        grip = moved(rounded_box((0.018, 0.2, 0.028), 0.009, 2), at)
-        feet = [moved(rounded_box((0.04, 0.03, 0.022), 0.006, 1), np.add(at, (-0.014, dy, 0))) for dy in (-0.08, 0.08)]
+        grip = moved(rounded_box((0.018, 0.2, 0.028), 0.009, 1), at)
+        feet = [moved(rounded_box((0.04, 0.03, 0.022), 0.0, 0), np.add(at, (-0.014, dy, 0))) for dy in (-0.08, 0.08)]
         material = coats.chrome if chrome else coats.paint
         solid = join(grip, *feet)
         pieces += [
@@ -102,8 +102,8 @@ def mirrors(shape: Shape, coats: Coats, tall: bool) -> list[Piece]:
     height = 0.25 if tall else 0.145
     at = np.add(root, (0.155, 0.02, 0.075 if tall else 0.05))
     shell = moved(turned(rounded_box((0.21, 0.1, height), 0.048, 3), 2, -0.12), at)
-    glass = moved(turned(rounded_box((0.17, 0.012, height - 0.035), 0.005, 2), 2, -0.12), np.add(at, (-0.006, 0.046, 0)))
-    arm = tube([root - (0.03, 0, 0.02), np.add(root, (0.03, 0.01, 0.0)), at - (0.03, 0, 0.03)], 0.022, 10)
+    glass = moved(turned(rounded_box((0.17, 0.012, height - 0.035), 0.005, 1), 2, -0.12), np.add(at, (-0.006, 0.046, 0)))
+    arm = tube([root - (0.03, 0, 0.02), np.add(root, (0.03, 0.01, 0.0)), at - (0.03, 0, 0.03)], 0.022, 8)
     pieces: list[Piece] = []
     for side, place in (("left", None), ("right", mirrored)):
         for material, solid in ((coats.paint, shell), (coats.chrome, glass), (coats.black, arm)):
@@ -158,7 +158,7 @@ def aerial(shape: Shape, coats: Coats) -> list[Piece]:
     top = shape.cabin.top
     y = top.rear - 0.2 * (top.rear - top.front) * 0.7
     at = roof_line(shape, 0.0, np.array([y]), 0.0)[0]
-    box = rounded_box((0.05, 0.17, 0.1), 0.024, 3)
+    box = rounded_box((0.05, 0.17, 0.1), 0.024, 2)
     lean = box.vertices.copy()
     height = (lean[:, 2] + 0.05) / 0.1
     lean[:, 1] = lean[:, 1] * (1 - 0.65 * height) + 0.05 * height

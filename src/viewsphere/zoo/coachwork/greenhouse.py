@@ -63,23 +63,23 @@ class Greenhouse:
 
     def roof_solid(self) -> Solid:
         """Rounded edge and crown of the whole roof."""
-        near = np.linspace(1, 0, 8, endpoint=False) ** 1.7
+        near = np.linspace(1, 0, 6, endpoint=False) ** 1.7
         left = np.concatenate([1 - near, [1.0], 1 + near[:0:-1], 3 - near, [3.0], 3 + near[::-1]])
         u = np.concatenate([-left[:0:-1], left])
         _, edge = self._corners(u)
         start = self.surface(u, np.ones_like(u))
         middle = np.array([0.0, (self.top.front + self.top.rear) / 2])
-        k = np.array([0.88, 0.8, 0.66, 0.48, 0.28, 0.1])
+        k = np.array([0.88, 0.76, 0.56, 0.32, 0.1])
         plan = middle + (edge[:, :2] - middle) * k[:, None, None]
         inner = np.concatenate([plan, (curve(plan[..., 1], self.roof) - self.drop * k[:, None] ** 4)[..., None]], -1)
-        t = np.linspace(0, 1, 6)[:-1, None, None]
+        t = np.linspace(0, 1, 5)[:-1, None, None]
         round_ = (1 - t) ** 2 * start + 2 * t * (1 - t) * edge + t**2 * inner[0]
         rings = np.concatenate([round_, inner, np.broadcast_to(inner[-1].mean(axis=0), (1, *edge.shape))])
         return flipped(grid(rings, wrap=True))
 
     def wall(self, cell: Cell) -> Solid:
         """A cell without a pane."""
-        u, v = np.meshgrid(np.linspace(cell.start, cell.stop, 9), np.linspace(0, 1, 9), indexing="ij")
+        u, v = np.meshgrid(np.linspace(cell.start, cell.stop, 6), np.linspace(0, 1, 6), indexing="ij")
         return grid(self.surface(u, v))
 
     def opening(self, cell: Cell) -> Float:
@@ -100,7 +100,7 @@ class Greenhouse:
         corners = [(cell.start, 0.0), (cell.stop, 0.0), (cell.stop, 1.0), (cell.start, 1.0)]
         around, ring = frame(self.surface, corners, self.opening(cell), rounding, count)
         seal = rim(self.surface, ring, (0.0, -0.5 * GLASS_DEPTH), 0.012)
-        u, v = np.meshgrid(np.linspace(cell.start, cell.stop, 2 * count), np.linspace(-0.03, 1.02, 8), indexing="ij")
+        u, v = np.meshgrid(np.linspace(cell.start, cell.stop, count + 3), np.linspace(-0.03, 1.02, 6), indexing="ij")
         return around, seal, grid(self._inset(u, v))
 
     def _inset(self, u: Float, v: Float) -> Float:

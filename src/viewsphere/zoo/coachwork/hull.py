@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from viewsphere.zoo.coachwork.outline import Outline
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, grid
 
-LOWER, UPPER, EDGE = 3, 9, 4
+LOWER, UPPER, EDGE = 2, 7, 3
 """Rows of the wall below the bumper line, above it, and around its top edge."""
 
 
@@ -84,12 +84,12 @@ class Hull:
     def stations(self) -> Float:
         """Parameters u of the left half's columns, dense around arches and corners."""
         o = self.outline
-        ends = [np.linspace(0, 0.8, 8), np.linspace(0.8, 1.25, 13), np.linspace(2.75, 3.2, 13), np.linspace(3.2, 4, 8)]
-        flank = o.u_at_y(np.arange(o.point(1.25)[1], o.point(2.75)[1], 0.13))
+        ends = [np.linspace(0, 0.8, 6), np.linspace(0.8, 1.25, 9), np.linspace(2.75, 3.2, 9), np.linspace(3.2, 4, 6)]
+        flank = o.u_at_y(np.arange(o.point(1.25)[1], o.point(2.75)[1], 0.2))
         free = np.unique(np.concatenate([*ends, flank]))
         y = o.point(free)[:, 1]
         away = np.all([np.abs(y - a.y) > 1.06 * a.radius for a in self.arches], axis=0)
-        across = np.concatenate([[1.03], np.cos(np.linspace(0, np.pi, 23)), [-1.03]])
+        across = np.concatenate([[1.03], np.cos(np.linspace(0, np.pi, 17)), [-1.03]])
         return np.sort(np.concatenate([free[away], *(o.u_at_y(a.y - a.radius * across) for a in self.arches)]))
 
     def lower_edge(self, u: Float) -> Float:
@@ -116,8 +116,8 @@ class Hull:
         shoulder = line + np.minimum(0.024, 0.1 * (high - line))  # the ledge above the bumpers
         fold = np.minimum(self.crease, shoulder + 0.6 * (high - shoulder))
         after = fold + np.minimum(0.023, 0.2 * (high - fold))
-        below = shoulder[:, None] + (fold - shoulder)[:, None] * np.linspace(0, 1, UPPER - 4)
-        upper = np.concatenate([below, after[:, None] + (high - after)[:, None] * np.linspace(0, 1, 4)], axis=1)
+        below = shoulder[:, None] + (fold - shoulder)[:, None] * np.linspace(0, 1, UPPER - 3)
+        upper = np.concatenate([below, after[:, None] + (high - after)[:, None] * np.linspace(0, 1, 3)], axis=1)
         rows = self.surface(u[:, None], np.concatenate([lower, upper], axis=1))
         angle = np.linspace(0, np.pi / 2, EDGE + 1)[1:]
         n = self.outline.normal(u)[:, None]
@@ -126,7 +126,7 @@ class Hull:
         rise = (top - self.edge)[:, None] + self.edge * np.sin(angle)
         return np.concatenate([rows, np.concatenate([plan, rise[..., None]], axis=-1)], axis=1)
 
-    def deck_to(self, inner: Float, steps: int = 6) -> Solid:
+    def deck_to(self, inner: Float, steps: int = 5) -> Solid:
         """The left half of the deck, from the wall's top inwards to a plan curve (stations, 2)."""
         outer, _ = self.top(self.stations)
         share = np.linspace(0, 1, steps + 1)[:, None]

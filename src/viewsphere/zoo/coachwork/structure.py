@@ -34,7 +34,7 @@ def hull_pieces(hull: Hull, track: float, coats: Coats, bumpers: tuple[str, str]
 def arch_trims(hull: Hull, coats: Coats, flare: float) -> list[Piece]:
     """A raised lip around each opening; flare is its height, metres."""
     pieces: list[Piece] = []
-    angle = np.linspace(0.0, np.pi, 27)
+    angle = np.linspace(0.0, np.pi, 21)
     for arch in hull.arches:
         grow = np.array([0.0, 0.004, 0.03 + flare, 0.044 + flare, 0.047 + flare])
         height = np.array([-0.004, flare, flare, 0.6 * flare, -0.012])

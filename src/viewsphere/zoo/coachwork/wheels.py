@@ -8,7 +8,7 @@ import numpy as np
 
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, join, lathe, loft, moved, turned
 
-SEGMENTS = 32
+SEGMENTS = 28
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ def tyre(w: Wheel) -> Solid:
     side = [(q, 0.84), (q + 0.006, 0.93), (q + 0.45 * (r - q), 1.0), (r - 0.022, 0.95), (r - 0.005, 0.82)]
     tread: list[tuple[float, float]] = []
     for c in (-0.32, 0.32):
-        tread += [(r, c - 0.055), (r - 0.007, c - 0.05), (r - 0.007, c + 0.05), (r, c + 0.055)]
+        tread += [(r, c - 0.055), (r - 0.007, c), (r, c + 0.055)]
     back = [(0.0, -0.6), (q, -0.6)]
-    profile = np.array([*back, *((a, -b) for a, b in side[::2]), (r, -0.7), *tread, (r, 0.7), *side[::-1]])
+    profile = np.array([*back, *((a, -b) for a, b in side[2::2]), *tread, *side[::-1]])
     return _on_axle(lathe(profile * (1, half), SEGMENTS))
 
 
@@ -46,15 +46,15 @@ def rim(w: Wheel, phase: float) -> tuple[Solid, Solid, Solid]:
     """Alloy (lip, spokes, hub), brake disc, and the dark inside; phase turns the spokes, radians."""
     q, half = w.radius * w.rim, w.width / 2
     lip = [(q + 0.004, 0.84), (q + 0.005, 0.93), (q - 0.002, 0.95), (q - 0.012, 0.93), (q - 0.02, 0.8)]
-    well = [(q - 0.02, 0.8), (q - 0.03, 0.3), (q - 0.035, -0.2), (0.0, -0.2)]
+    well = [(q - 0.02, 0.8), (q - 0.035, -0.2), (0.0, -0.2)]
     cap = [(0.19 * q, 0.3), (0.185 * q, 0.66), (0.16 * q, 0.72), (0.0, 0.74)]
-    disc = [(0.66 * q, -0.1), (0.66 * q, 0.05), (0.3 * q, 0.06), (0.28 * q, 0.3), (0.0, 0.3)]
-    bolts = lathe([(0.006, 0.0), (0.006, 0.006), (0.0, 0.007)], 5)
+    disc = [(0.66 * q, -0.1), (0.66 * q, 0.05), (0.3 * q, 0.06), (0.18 * q, 0.3)]
+    bolts = lathe([(0.0065, 0.0), (0.0, 0.007)], 5)
     circle = [moved(bolts, (0.12 * q * np.cos(a), 0.12 * q * np.sin(a), 0.72 * half)) for a in np.arange(5) * 2 * np.pi / 5]
     arms = [turned(_spoke(w), 2, phase + angle) for angle in _angles(w)]
     return (
-        _on_axle(join(lathe(_scaled(lip, half), SEGMENTS), lathe(_scaled(cap, half), 24), *arms, *circle)),
-        _on_axle(lathe(_scaled(disc, half), 24)),
+        _on_axle(join(lathe(_scaled(lip, half), SEGMENTS), lathe(_scaled(cap, half), 16), *arms, *circle)),
+        _on_axle(lathe(_scaled(disc, half), 20)),
         _on_axle(lathe(_scaled(well, half), SEGMENTS)),
     )
 
