@@ -153,7 +153,7 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
         see_through=packed.see_through,
         bounces=bounces,
         blended=packed.blended,
-        glass=glass_of(surfaces),
+        glass=glass_of(packed.rows),
     )
 
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from viewsphere.engines.raster.kernels_material import L_BENDS
-from viewsphere.engines.raster.records import Float32, Int32, Surfaces
+from viewsphere.engines.raster.records import Float32, Int32
+from viewsphere.engines.raster.surface import Rows
 from viewsphere.engines.raster.tracing import tree_of
 
 
@@ -32,14 +33,17 @@ NO_GLASS = Glass(
 )
 
 
-def glass_of(surfaces: Surfaces) -> Glass:
+def glass_of(rows: Rows) -> Glass:
     """All triangles that bound solid glass."""
+    surfaces = rows.surfaces
     bends = surfaces.looks[:, L_BENDS] > 0
     if not bends.any():
         return NO_GLASS
     own = np.flatnonzero(bends[surfaces.material])
     if not len(own):
         return NO_GLASS
+    things = np.searchsorted(rows.geometry.triangle_start, own, side="right") - 1
+    rows.write(np.unique(things).tolist())
     corners = surfaces.vertices[surfaces.triangles[own]]
     tree = tree_of(corners[..., 11:14])
     normals = corners[tree.order, :, :3].reshape(-1, 9)
