@@ -65,11 +65,14 @@ def stage_of(mesh: Mesh, scene: Scene, scenery: Mesh | None = None, **options):
 
 
 def probed(stage, places, normals) -> np.ndarray:
-    """Radiance (N, 3) of white matt surfaces at world places (N, 3) that have these normals, by bounced light and sky alone."""
+    """Radiance (N, 3) of white matt surfaces at world places (N, 3) that have these normals, by bounced light and sky alone, as
+    probes know it.
+    """
     baked = stage.baked(0)
     at = ((np.asarray(places, float) - baked.origin) / baked.unit).astype(np.float32)
     glow, inside = np.empty(at.shape, np.float32), np.empty(len(at), np.float32)
-    look_up(baked.bounces, at, np.ascontiguousarray(normals, np.float32), glow, inside)
+    alone = np.full(len(at), -1, np.int32)  # of no triangle that a lightmap may know
+    look_up(baked.bounces, at, np.ascontiguousarray(normals, np.float32), alone, glow, inside)
     assert (inside == 1).all()
     return glow
 

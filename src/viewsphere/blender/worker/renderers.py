@@ -74,6 +74,8 @@ def _set_up_cycles(scene, settings):
     cycles.use_adaptive_sampling = False
     cycles.use_light_tree = False
     cycles.max_bounces = settings["bounces"]
+    # Cycles counts each kind for itself, too, by default to four: too few where light goes back and forth between walls.
+    cycles.diffuse_bounces = cycles.glossy_bounces = cycles.transmission_bounces = settings["bounces"]
     cycles.transparent_max_bounces = 16
     cycles.seed = 0
     _denoise(cycles, settings["denoise"], settings["samples"])

@@ -16,15 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_probes as kernels
-from viewsphere.engines.raster.environment import Surrounding
+from viewsphere.engines.raster import patch_rays
+from viewsphere.engines.raster.environment import Surrounding, sky_along
+from viewsphere.engines.raster.gathering import Gathering, Look, around_of, look
 from viewsphere.engines.raster.kernels_bounce import COLUMNS, terms
 from viewsphere.engines.raster.kernels_environment import LAMPS
-from viewsphere.engines.raster.kernels_lanterns import shine_at_probes, shine_down, shine_near
+from viewsphere.engines.raster.kernels_lanterns import shine_at, shine_at_probes, shine_near
 from viewsphere.engines.raster.kernels_views import FOLD, NODES, send_views, spread_views
 from viewsphere.engines.raster.lanterns import Lanterns, lanterns_of
+from viewsphere.engines.raster.lightmaps import has_planes
 from viewsphere.engines.raster.lights import Lights
+from viewsphere.engines.raster.patch_rays import PatchRays
 from viewsphere.engines.raster.patches import Patches, Rays, patches_of
-from viewsphere.engines.raster.records import NO_BOUNCES, Bounces, Float32, Int32, Surfaces, Textures
+from viewsphere.engines.raster.records import NO_BOUNCES, NO_LIGHTMAP, Bounces, Float32, Int32, Surfaces, Textures
 from viewsphere.engines.raster.tracing import Tree, cast, tree_of, unblocked
 
 Float = NDArray[np.float64]
@@ -41,7 +45,7 @@ metres below to so many above, whose light fades out over so many cells.
 """
 
 RAYS, FEW_RAYS, MANY_PROBES = 384, 256, 24_000
-"""Of a probe, and of one of so many."""
+"""Of a probe, and of one of so many; half of them beside a lightmap."""
 
 TURNS = 8
 """Ways to turn the rays: two neighbours never look the same way, so that a probe and those around it see as one with all of
@@ -68,9 +72,6 @@ SHADOWS = 2e-3
 
 UNCHANGED, ROUNDS = 0.004, 48
 """The share of all light below which another bounce is not seen, and how many there are at most."""
-
-SKY_ROUGHNESS = 0.3
-"""Of a mirror that blurs the sky about as far as to the next ray."""
 
 TERMS = np.array([1 / 4, *[1 / 2] * 3, *[15 / 16] * 2, 5 / 64, 15 / 16, 15 / 64], np.float32) / np.float32(math.pi)
 """Factors of the terms of irradiance / pi: the constants of spherical harmonics, squared, times the share of each degree that
@@ -100,7 +101,8 @@ class Hall:
 
 class _Seen(NamedTuple):
     """What depends on no light. own (N,): which probe each ray's origin is; opens (3, N): whether nothing lies between a probe
-    and the next one along x, y and z; rank (N,): see `kernels_probes.screen`; below: rays of the ground's map.
+    and the next one along x, y and z; rank (N,): see `kernels_probes.screen`; below: rays of the ground's map;
+    look, around: of the lightmap and of the patches beside it.
     """
 
     bounces: Bounces
@@ -111,6 +113,8 @@ class _Seen(NamedTuple):
     rank: NDArray[np.uint8]
     patches: Patches
     below: Rays | None
+    look: Look | None
+    around: PatchRays | None
 
 
 @dataclass(frozen=True)
@@ -134,7 +138,12 @@ def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounce
     lamps = tuple(values.tobytes() for values in lights if isinstance(values, np.ndarray))
     sky = tuple(values.tobytes() for values in (surrounding.texels, surrounding.light, surrounding.up))
     lighting = _Lighting(hall, lamps, sky, surrounding, lights)
-    return _bake.__wrapped__(lighting) if hall.key is None else _bake(lighting)
+    bounces = _bake.__wrapped__(lighting) if hall.key is None else _bake(lighting)
+    if not len(bounces.lightmap.chart):
+        return bounces
+    chart = np.full(len(hall.surfaces.triangles), -1, np.int32)
+    chart[hall.which] = bounces.lightmap.chart
+    return bounces._replace(lightmap=bounces.lightmap._replace(chart=chart))
 
 
 @lru_cache(maxsize=1)
@@ -145,45 +154,72 @@ def _bake(lighting: _Lighting) -> Bounces:
     light, views = np.zeros_like(bounces.light), np.zeros((len(bounces.light), NODES, 4), np.float32)
     bounces = bounces._replace(light=light, views=views.reshape(-1, 4), floor=np.zeros_like(bounces.floor))
     off = SHADOWS / float(bounces.frame[3])
-    lit = patches.lit(hall.surfaces, hall.textures, hall.floor, surrounding.albedo, seen.tree, lighting.lights, off)
-    sky = np.empty(rays.directions.shape, np.float32)
-    kernels.sky_from(surrounding, rays.directions.reshape(-1, 3), np.float32(SKY_ROUGHNESS), sky.reshape(-1, 3))
+    lit = patches.lit(hall.which, hall.surfaces, hall.textures, hall.floor, surrounding.albedo, seen.tree, lighting.lights, off)
+    sky = sky_along(surrounding, rays.directions)
     weights = irradiance_weights(rays.directions)
     lanterns = lanterns_of(hall.which, hall.surfaces, patches, lit.emitted, TURNS)
     shining, near = _shining(seen, lanterns, lit.emitted, weights, off)
     own = lit.emitted * (lanterns.froms == 0)[:, None] + lit.reflectance * lit.arrived / np.float32(math.pi)
     places, normals, sent = patches.places, patches.normals, own
     glow, inside = np.empty_like(own), np.empty(len(own), np.float32)
+    gathering = _gathering(seen, surrounding, lanterns, lit.emitted, off)
+    if gathering is not None:
+        bounces = bounces._replace(lightmap=gathering.lightmap)
     sources = patches.ids[0], rays.turn, seen.own
     facing = (1 + normals[:, 2:]) / 2
     elsewhere = facing * surrounding.up + (1 - facing) * surrounding.below
+    buried = seen.rank == 0
     for _ in range(ROUNDS):
         kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
         bounces.light[:] += shining
-        kernels.look_up(bounces, places, normals, glow, inside)
+        bounces.light[buried] = 0
+        if gathering is not None:
+            gathering.receive(sent)
+        kernels.look_up(bounces, places, normals, patches.triangles, glow, inside)
+        if gathering is not None:
+            gathering.look_around(sent, glow, inside)
         before = sent
         sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * elsewhere)
         if np.abs(sent - before).sum(dtype=np.float64) <= UNCHANGED * sent.sum(dtype=np.float64):
             break
     kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
     bounces.light[:] += shining
+    bounces.light[buried] = 0
+    if gathering is not None:
+        gathering.receive(sent)
+        gathering.smooth()
     send_views(*sources, rays.directions, patches.is_ground, sent, FOLD, views)
     views += near
     spread_views(rays.turn, seen.own, rays.directions, FOLD, views)
+    views[buried] = 0
     for known in (bounces.light, views.reshape(len(views), -1)):
         _smooth(known, seen.opens, bounces.grid)
     chosen = np.empty(len(views), np.int32)
     kernels.choose(seen.rank, bounces.grid, bounces.light, chosen)
-    buried = seen.rank == 0
     for known in (bounces.light, views):
         known[buried] = known[chosen[buried]]
     if seen.below is not None:
-        floor = np.empty((bounces.floor.shape[0] ** 2, 4), np.float32)
-        kernels.send_down(patches.ids[1], sent, floor)
-        lamps = lanterns.froms, lit.emitted, np.float32(off)
-        shine_down(seen.tree, seen.below.origins, TURNS, lanterns.points, patches.ids[1], seen.below.far, *lamps, floor)
-        bounces.floor[:] = floor.reshape(bounces.floor.shape) * _window(len(bounces.floor))[..., None].astype(np.float32)
+        bounces.floor[:] = _on_ground(seen, seen.below, sent, lanterns, lit.emitted, off).reshape(bounces.floor.shape)
     return bounces
+
+
+def _gathering(seen: _Seen, surrounding: Surrounding, lanterns: Lanterns, emitted: Float32, off: float) -> Gathering | None:
+    """How light is gathered on flat surfaces and beside them, None where there are none."""
+    if seen.look is None or seen.around is None:
+        return None
+    return Gathering.of(seen.look, seen.around, seen.patches, surrounding, seen.tree, lanterns, TURNS, emitted, off)
+
+
+def _on_ground(
+    seen: _Seen, below: Rays, sent: Float32, lanterns: Lanterns, emitted: Float32, off: float
+) -> NDArray[np.float32]:
+    """The ground's map, of MAP * MAP rows: see `Bounces.floor`."""
+    floor, ids = np.empty((MAP * MAP, 4), np.float32), seen.patches.ids[1]
+    kernels.send_down(ids, sent, floor)
+    up = np.tile(np.array([0, 0, 1], np.float32), (len(floor), 1))
+    near = ids, below.far, lanterns.froms, emitted, np.float32(off)
+    shine_at(seen.tree, below.origins, up, TURNS, np.float32(1), lanterns.points, *near, floor)
+    return floor * _window(MAP).reshape(-1, 1).astype(np.float32)
 
 
 def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32, off: float) -> tuple[Float32, Float32]:
@@ -214,37 +250,47 @@ def _look(hall: Hall) -> _Seen:
     tree = tree_of(corners)
     corner, cells, shape, fade = _grid(hall)
     points, turn, own = _points(corner, cells, shape)
-    directions = _turned(_sphere(FEW_RAYS if len(points) > MANY_PROBES else RAYS))
-    met, far = cast(tree, points, directions, turn, np.inf)
     normals = hall.surfaces.normals[hall.which]
+    has_charts = fade == 1 and has_planes(corners, hall.unit)
+    directions = _turned(_sphere((FEW_RAYS if len(points) > MANY_PROBES else RAYS) // (2 if has_charts else 1)))
+    met, far = cast(tree, points, directions, turn, np.inf)
     screens = np.empty((len(points), 72), np.float32)
     buried = np.empty(len(points), np.uint8)
     kernels.bury(met, far, directions, turn, own, normals, np.float32(cells), buried)
-    if (buried > 0).mean() > INSIDE_OUT:
+    is_inside_out = bool((buried > 0).mean() > INSIDE_OUT)
+    if is_inside_out:
         buried[buried == 1] = 0
     rank = np.zeros_like(buried)
     kernels.screen(met, far, directions, turn, own, normals, np.float32(cells), shape, buried, screens, rank)
-    rays = Rays(points, directions, turn, _whole(hall, met), far)
+    # What a buried probe sees counts for nothing: the inner sides of things need no patches.
+    met[:, buried[own] > 0] = -1
+    rays = Rays(points, directions, turn, met, far)
     bundles, below, floor, floor_frame = [rays], None, NO_BOUNCES.floor, NO_BOUNCES.floor_frame
     if hall.has_map and hall.ground_z is not None:
         places, floor_frame = _map(hall, hall.ground_z)
         floor, up, same = np.zeros((MAP, MAP, 4), np.float32), _dome(MAP_RAYS)[None], np.zeros(len(places), np.int32)
         met, far = cast(tree, places, up, same, np.inf)
-        below = Rays(places, up, same, _whole(hall, met), far)
+        below = Rays(places, up, same, met, far)
         bundles.append(below)
+    looked = look(tree, corners, normals, hall.unit, is_inside_out) if has_charts else None
+    if looked is not None:
+        bundles.append(looked.nodes)
     last = corner + (shape[::-1] - 1) / cells
-    patches = patches_of(
-        bundles,
-        hall.surfaces.normals,
-        hall.surfaces.material,
+    made_of = (
+        normals,
+        hall.surfaces.material[hall.which],
         np.array([*corner, *last], np.float32),
         cells * PATCHES,
         _ground(hall),
     )
+    patches, around = patches_of(bundles, *made_of), None
+    if looked is not None:
+        around = around_of(looked, patches, _dome(patch_rays.RAYS * patch_rays.WAYS), tree, SHADOWS / cells)
+        patches = patches_of([*bundles, around.rays], *made_of)
     frame = np.array([*corner, cells, PUSH, hall.ground_z is not None, 1 / fade], np.float32)
     light = np.zeros((len(points), COLUMNS), np.float32)
     return _Seen(
-        Bounces(light, NO_BOUNCES.views, screens, shape, frame, floor, floor_frame),
+        Bounces(light, NO_BOUNCES.views, screens, shape, frame, floor, floor_frame, NO_LIGHTMAP),
         tree,
         rays,
         own,
@@ -252,12 +298,9 @@ def _look(hall: Hall) -> _Seen:
         rank,
         patches,
         below,
+        looked,
+        around,
     )
-
-
-def _whole(hall: Hall, met: Int32) -> Int32:
-    """Triangles of a hall as those of its surfaces."""
-    return np.where(met >= 0, hall.which[met], np.int32(-1))
 
 
 def _grid(hall: Hall) -> tuple[Float, float, NDArray[np.int64], float]:

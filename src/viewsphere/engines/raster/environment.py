@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from viewsphere.engines.raster import kernels_environment as kernels
 from viewsphere.engines.raster.arriving import arriving
 from viewsphere.engines.raster.kernels_arrive import DISTANT
+from viewsphere.engines.raster.kernels_probes import sky_from
 from viewsphere.engines.raster.lights import Extent, Lights
 from viewsphere.engines.raster.records import Float32, Int32, PictureRays
 from viewsphere.model.scene import AnySky, Daylight, Environment, Sky, Sun
@@ -41,6 +42,10 @@ _ABOVE_MEAN = 20.0
 _OF_ALL = 0.08
 _LOWEST = 0.05  # lowest elevation of a photographed sun, as a sine
 _NO_LIGHT: Float = np.zeros((2, 3))
+
+
+SKY_ROUGHNESS = 0.12
+"""Of a mirror that blurs the sky about as far as to the next ray of those that are baked."""
 
 
 class Surrounding(NamedTuple):
@@ -82,6 +87,13 @@ class Surrounding(NamedTuple):
     def lamps(self) -> Float32:
         """Radiance that lamps give the ground close by, (3,)."""
         return self.light[kernels.LAMPS]
+
+
+def sky_along(surrounding: Surrounding, directions: Float32) -> Float32:
+    """Radiance from far away along rays (..., 3), blurred about as far as to the next ray."""
+    light = np.empty(directions.shape, np.float32)
+    sky_from(surrounding, directions.reshape(-1, 3), np.float32(SKY_ROUGHNESS), light.reshape(-1, 3))
+    return light
 
 
 class _Maps(NamedTuple):

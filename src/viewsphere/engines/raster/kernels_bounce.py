@@ -27,6 +27,7 @@ from viewsphere.engines.raster.kernels_block import (
     LX,
     LY,
     LZ,
+    MAPPED,
     NX,
     NY,
     NZ,
@@ -43,6 +44,7 @@ from viewsphere.engines.raster.kernels_block import (
     T6,
     T7,
 )  # fmt: skip
+from viewsphere.engines.raster.kernels_lightmap import forget_map, read_map
 from viewsphere.engines.raster.kernels_views import CORNERS
 from viewsphere.kernels.jit import inner
 from viewsphere.kernels.lanes import FAST, clamp, dot, lanewise, least, load, most, scatter, spread, where
@@ -138,6 +140,8 @@ def _read(count, light, columns, layer, b):
     """Rows PROBES on: the weighted sum of the columns of the eight probes. layer: probes in one."""
     one = U(1)
     for i in range(U(count)):
+        if b[U(MAPPED) + i] > f4(0):
+            continue
         p = U(i4(b[U(PLACE) + i]))
         q, r = p + columns, p + layer
         s = r + columns
@@ -153,13 +157,13 @@ def terms(x, y, z):
 @lanewise
 def _shine(b):
     """GLOW."""
-    inside, open_ = b[INSIDE], b[OPEN]
+    inside, open_, is_mapped = b[INSIDE], b[OPEN], b[MAPPED] > 0
     polynomials = terms(*b.get(NX, NY, NZ))
     for k, row in enumerate((GLOW_R, GLOW_G, GLOW_B)):
         value = b[PROBES, k * BLOCK]
         for j, polynomial in enumerate(polynomials, 1):
             value = value + polynomial * b[PROBES, (3 * j + k) * BLOCK]
-        b[row] = most(value, 0) * inside * open_
+        b[row] = where(is_mapped, b[row], most(value, 0) * inside) * open_
 
 
 @lanewise
@@ -174,7 +178,7 @@ def _place_on_floor(frame, across, b):
     right = fu * fv
     b[T0] = where(is_within, row * across + column + 1, 0)
     b.put((T1, T2, T3, T4), (1 - fu - fv + right, fu - right, fv - right, right))
-    for row in (GLOW_R, GLOW_G, GLOW_B, INSIDE):
+    for row in (GLOW_R, GLOW_G, GLOW_B, INSIDE, MAPPED):
         b[row] = 0
     for k in range(CORNERS + 1):
         b[KEPT, k * BLOCK] = 0
@@ -201,9 +205,9 @@ def _darken(b):
 
 
 @inner
-def bounced(count, bounces, is_ground, b):
-    """Fill GLOW and INSIDE of a block that has been occluded, and from KEPT on the weights of the eight probes around and which
-    is the first.
+def bounced(count, bounces, is_ground, own, b):
+    """Fill GLOW, INSIDE and MAPPED of a block that has been occluded, and from KEPT on the weights of the eight probes around
+    and which is the first. own: the samples' triangles, unless they are of the ground.
 
     Overwrites the rows of a light.
     """
@@ -215,5 +219,9 @@ def bounced(count, bounces, is_ground, b):
     _place(count, bounces.frame, f4(columns), f4(rows), f4(layers), b)
     _screen(count, bounces.screens, b)
     _weigh(count, b)
+    if is_ground or bounces.lightmap.chart.shape[0] == 0:
+        forget_map(count, b)
+    else:
+        read_map(count, bounces.lightmap, own, b)
     _read(count, bounces.light, columns, rows * columns, b)
     _shine(count, b)

@@ -22,7 +22,7 @@ POINT_X, NORMAL_X, POWER_R, FROM, POINT_COLUMNS = 0, 3, 6, 9, 10
 
 
 @inner
-def _shine(tree, point, p, off, stack):
+def shine_from(tree, point, p, off, stack):
     """The direction to a point of a lantern, and the factor of its power; 0 where it is hidden or near."""
     d = point[POINT_X] - p[0], point[POINT_X + 1] - p[1], point[POINT_X + 2] - p[2]
     squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
@@ -53,7 +53,7 @@ def shine_at_probes(tree, places, turn, own, turns, points, squares, off, per, f
     for i in range(places.shape[0]):
         p, at = (places[i, 0], places[i, 1], places[i, 2]), own[i]
         for j in range(turn[i], points.shape[0], turns):
-            (x, y, z), factor = _shine(tree, points[j], p, off, stack)
+            (x, y, z), factor = shine_from(tree, points[j], p, off, stack)
             if factor <= f4(0):
                 continue
             t = (f4(1), y, z, x, x * y, y * z, f4(3) * z * z - f4(1), x * z, x * x - y * y)
@@ -85,21 +85,22 @@ def shine_near(ids, far, turn, own, weights, directions, froms, emitted, fold, l
 
 
 @njit(_nrt=True)
-def shine_down(tree, places, turns, points, ids, far, froms, emitted, off, floor):
-    """Add to floor (N, 4) the radiance of white matt ground at places (N, 3) that lanterns light: by points, and by
-    cosine-weighted rays (K, N).
+def shine_at(tree, places, normals, step, share, points, ids, far, froms, emitted, off, light):
+    """Add to light (N, 3 or more) the radiance of white matt surfaces at places (N, 3) that lanterns light: by every `step`-th
+    point, which counts `share`, and by cosine-weighted rays (K, N).
     """
     stack = np.empty((DEEP, 2), np.float32)
     per = f4(1) / f4(ids.shape[0])
     for i in range(places.shape[0]):
         p = places[i, 0], places[i, 1], places[i, 2]
-        for j in range(i % turns, points.shape[0], turns):
-            d, factor = _shine(tree, points[j], p, off, stack)
-            if d[2] > f4(0) and factor > f4(0):
+        for j in range(i % step, points.shape[0], step):
+            d, factor = shine_from(tree, points[j], p, off, stack)
+            along = d[0] * normals[i, 0] + d[1] * normals[i, 1] + d[2] * normals[i, 2]
+            if along > f4(0) and factor > f4(0):
                 for c in range(3):
-                    floor[i, c] += points[j, POWER_R + c] * factor * d[2] * f4(1 / np.pi)
+                    light[i, c] += points[j, POWER_R + c] * factor * along * share * f4(1 / np.pi)
         for k in range(ids.shape[0]):
             met = ids[k, i]
             if met >= 0 and far[k, i] * far[k, i] <= froms[met]:
                 for c in range(3):
-                    floor[i, c] += emitted[met, c] * per
+                    light[i, c] += emitted[met, c] * per

@@ -18,7 +18,7 @@ import numpy as np
 from viewsphere.engines.raster.kernels_blend import blend
 from viewsphere.engines.raster.kernels_block import (
     ALPHA, BASE_R, BENT, BENT_X, BENT_Y, BENT_Z, BLOCK, BLUE, BOUNCE, COAT, COAT_ROUGH, CX, CY, CZ, DR, EDGE_R, ER, F0R,
-    FACE_R, GLOW_R, GREEN, GX, GY, GZ, IB, IG, INSIDE, IR, LOBE, LX, LY, LZ, METAL, NX, NY, NZ, OPEN, OPENX, OPENY, RED,
+    FACE_R, GLOW_R, GREEN, GX, GY, GZ, IB, IG, INSIDE, IR, LOBE, LX, LY, LZ, MAPPED, METAL, NX, NY, NZ, OPEN, OPENX, OPENY, RED,
     RIM, ROUGH, SHARE, SR, STAIN_B, STAIN_G, STAIN_R, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION,
     UNLIT, VX, VY, VZ, WIDTH,
 )  # fmt: skip
@@ -321,9 +321,9 @@ def _scatter(b):
 
 @lanewise
 def _scatter_bounced(b):
-    """`_scatter`, where probes know the light of the sky, too, as far as INSIDE says."""
+    """`_scatter`, where GLOW has the light of the sky, too, as far as INSIDE and MAPPED say."""
     for k in range(0, 3 * BLOCK, BLOCK):
-        light = b[T3 + k] * b[OPEN] * (1 - b[INSIDE]) + b[GLOW_R + k]
+        light = b[T3 + k] * b[OPEN] * (1 - most(b[INSIDE], b[MAPPED])) + b[GLOW_R + k]
         b[DR + k] = b[DR + k] + b[BASE_R + k] * light
 
 

@@ -203,7 +203,7 @@ def shade(
             arrive(count, lights, k, b)
             _take(count, is_matte, b)
         if is_bounced:
-            bounced(count, bounces, is_ground, b)
+            bounced(count, bounces, is_ground, own, b)
         if is_matte:
             ambient_matte(count, surrounding, is_bounced, b)
             _finish_matte(count, b)

@@ -246,23 +246,23 @@ def sky_from(surrounding, directions, rough, light):
 
 
 @njit(fastmath=FAST, _nrt=True)
-def look_up(bounces, places, normals, glow, inside):
-    """Radiance of white matt surfaces lit by the probes, at places (M, 3) with these normals (M, 3), into glow (M, 3), and the
-    share of it that the probes know, into inside (M,).
+def look_up(bounces, places, normals, triangles, glow, inside):
+    """Radiance of white matt surfaces at places (M, 3) on triangles (M,), negative on the ground, with these normals (M, 3),
+    into glow (M, 3), and the share of it that probes or the lightmap know, into inside (M,).
     """
-    b = np.zeros(ROWS * BLOCK, np.float32)
+    b, own = np.zeros(ROWS * BLOCK, np.float32), np.zeros(BLOCK, np.int32)
     for start in range(0, places.shape[0], BLOCK):
         count = min(BLOCK, places.shape[0] - start)
         for i in range(count):
             for c in range(3):
                 b[PX + c * BLOCK + i] = places[start + i, c]
                 b[NX + c * BLOCK + i] = b[GX + c * BLOCK + i] = normals[start + i, c]
-            b[row.OPEN + i], b[row.BOUNCE + i] = f4(1), f4(1)
-        bounced(count, bounces, False, b)
+            b[row.OPEN + i], b[row.BOUNCE + i], own[i] = f4(1), f4(1), triangles[start + i]
+        bounced(count, bounces, False, own, b)
         for i in range(count):
             for c in range(3):
                 glow[start + i, c] = b[row.GLOW_R + c * BLOCK + i]
-            inside[start + i] = b[row.INSIDE + i]
+            inside[start + i] = max(b[row.INSIDE + i], b[row.MAPPED + i])
 
 
 @njit(fastmath=FAST)
@@ -441,6 +441,41 @@ def screen(met, far, directions, turn, own, normals, cells, shape, buried, scree
             elif cell >= 0:
                 _place_screen(found[octant], 0, FEWEST, bits, cell, screens)
                 _place_screen(found[octant], 1, second, bits, cell, screens)
+
+
+@njit(fastmath=FAST)
+def see_around(ids, first, sky, below, light):
+    """Add to rows first and on of light (N, 3) what comes along rays (K, N) from the sky, (n, K, 3) of n rows, and from the
+    ground far away (3,).
+    """
+    per = f4(1) / f4(ids.shape[0])
+    for i in range(U(sky.shape[0])):
+        at = U(first) + i
+        for k in range(U(ids.shape[0])):
+            for c in range(U(3)):
+                if ids[k, at] == SKY:
+                    light[at, c] += sky[i, k, c] * per
+                elif ids[k, at] < 0:
+                    light[at, c] += below[c] * per
+
+
+@njit(fastmath=FAST)
+def send_around(ids, alone, share, far, sent, glow, inside):
+    """As `look_up`, of patches `alone` (N,), each in as many rows as it has hits, which count `share` (N,): cosine-weighted
+    rays (K, N) from there hit patches `ids` that send `sent` (M, 3); far (N, 3): what else comes to them.
+    """
+    for i in range(U(ids.shape[1])):
+        inside[U(alone[i])] = f4(1)
+        for c in range(U(3)):
+            glow[U(alone[i]), c] = f4(0)
+    for i in range(U(ids.shape[1])):
+        at, per = U(alone[i]), share[i] / f4(ids.shape[0])
+        for c in range(U(3)):
+            value = f4(0)
+            for k in range(U(ids.shape[0])):
+                if ids[k, i] >= 0:
+                    value += sent[U(ids[k, i]), c]
+            glow[at, c] += far[i, c] * share[i] + value * per
 
 
 @njit(fastmath=FAST)

@@ -89,7 +89,7 @@ def _lay(start, count, is_ground, slots, b, p, out):
 
 
 @inner(fastmath=FAST)
-def _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, b):
+def _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, own, b):
     """Add all light that arrives at the samples."""
     occlude(count, occlusion, b)
     for k in range(lights.kind.shape[0]):
@@ -100,7 +100,7 @@ def _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, 
             add_light(count, b)
     is_bounced = bounces.grid[0] > 0
     if is_bounced:
-        bounced(count, bounces, is_ground, b)
+        bounced(count, bounces, is_ground, own, b)
     if is_matte:
         ambient_matte(count, surrounding, is_bounced, b)
     else:
@@ -131,7 +131,7 @@ def split(
             material(count, view, surfaces, textures, b, which)
             weigh(count, surrounding.albedo, b)
         if is_lit:
-            _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, b)
+            _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, own, b)
         if is_matte:
             _part_matte(count, b, p)
         else:
@@ -214,7 +214,7 @@ def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slot
         material(count, view, surfaces, textures, b, which)
         weigh(count, surrounding.albedo, b)
         occlude(count, occlusion, b)
-        bounced(count, bounces, False, b)
+        bounced(count, bounces, False, own, b)
         ambient(count, surrounding, bounces, b)
         _cover(count, b)
         for i in range(U(count)):

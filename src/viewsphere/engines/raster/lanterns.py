@@ -31,7 +31,7 @@ def lanterns_of(which: Int32, surfaces: Surfaces, patches: Patches, emitted: Flo
     """The lanterns among triangles `which` (T,) of these surfaces, whose patches send `emitted` (M, 3) by themselves."""
     looks = surfaces.looks
     glow = looks[:, L_ER : L_EB + 1].astype(np.float64) * (looks[:, L_UNLIT : L_UNLIT + 1] == 0)
-    material = np.where(patches.triangles >= 0, surfaces.material[patches.triangles], len(looks) - 1)
+    material = np.where(patches.triangles >= 0, surfaces.material[which[patches.triangles]], len(looks) - 1)
     for m in np.unique(material[glow[material].sum(axis=1) > 0]).tolist():
         glow[m] = emitted[material == m].mean(axis=0, dtype=np.float64)  # what its textures leave of it
     brightness = glow.sum(axis=1)

@@ -89,14 +89,23 @@ class Patches:
         return total / known[:, None].astype(np.float32)
 
     def lit(
-        self, surfaces: Surfaces, textures: Textures, floor: Float32, albedo: Float32, tree: Tree, lights: Lights, off: float
+        self,
+        which: Int32,
+        surfaces: Surfaces,
+        textures: Textures,
+        floor: Float32,
+        albedo: Float32,
+        tree: Tree,
+        lights: Lights,
+        off: float,
     ) -> Lit:
-        """What they are made of, and the light of lamps and sun; `off`: how far from surfaces shadows begin, `albedo`: see
-        `Surrounding`.
+        """What they are made of, and the light of lamps and sun. which (T,): those of the surfaces' triangles that rays meet;
+        `off`: how far from surfaces shadows begin; `albedo`: see `Surrounding`.
         """
         table = self.table
         rows, columns = np.nonzero(np.arange(kernels.HITS) < table.known[: self.count, None])
         triangle = table.triangle[rows, columns]
+        whole = np.where(triangle >= 0, which[triangle], triangle)
         width = np.float32(np.sqrt(4 * np.pi / len(self.ids[0])) / 2)
         answers, arrived = np.zeros((len(rows), 6), np.float32), np.zeros((len(rows), 3), np.float32)
         for is_ground in (False, True):
@@ -105,7 +114,7 @@ class Patches:
             place, way, pixel = table.place[at], table.way[at], table.far[at] * width
             part = np.zeros((len(own), 6), np.float32), np.zeros((len(own), 3), np.float32)
             kernels.shade_hits(
-                _ANY_VIEW, surfaces, textures, floor, albedo, tree, lights, np.float32(off), triangle[own], place, way, pixel,
+                _ANY_VIEW, surfaces, textures, floor, albedo, tree, lights, np.float32(off), whole[own], place, way, pixel,
                 is_ground, *part,
             )  # fmt: skip
             answers[own], arrived[own] = part
@@ -128,7 +137,7 @@ _ANY_VIEW = PictureRays(
 
 
 def patches_of(bundles: list[Rays], normals: Float32, materials: Int32, box: Float32, cells: float, ground: Float32) -> Patches:
-    """The patches that all these rays hit; arguments as in `kernels_probes.patch`."""
+    """The patches that all these rays hit, in their order; other arguments as in `kernels_probes.patch`."""
     size = ROOM
     while True:
         table, count, ids = _empty(size), 0, list[Int32]()

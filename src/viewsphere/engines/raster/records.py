@@ -64,6 +64,18 @@ class PictureRays(NamedTuple):
     places: Float32 = np.zeros((0, 2), np.float32)
 
 
+class Lightmap(NamedTuple):
+    """Light that arrives at flat, still surfaces.
+
+    nodes (N, 12): see `kernels_lightmap.see`; charts (C, 16): columns named in `kernels_lightmap`; chart (T,) int32: of
+    each of the stage's triangles, -1 for none; empty if none has one.
+    """
+
+    nodes: Float32
+    charts: Float32
+    chart: Int32
+
+
 class Bounces(NamedTuple):
     """Light that things throw at one another: a volume of probes, and a map of level ground below things that stand on it.
 
@@ -74,7 +86,8 @@ class Bounces(NamedTuple):
     and how much it counts where it sees nothing; grid (3,) int64: layers, rows and columns, 0 for no volume; frame (7,): x, y
     and z of the first probe, cells per length, how far from a surface it is read in cells, whether there is a ground, one over
     the number of cells in which its light fades out at the border; floor (n, n, 4): radiance of a white matt ground lit by
-    things alone; floor_frame (4,): its cells per length, its corner's x and y, whether there is a map.
+    things alone; floor_frame (4,): its cells per length, its corner's x and y, whether there is a map; lightmap: where it is
+    known better than by probes.
     """
 
     light: Float32
@@ -84,8 +97,10 @@ class Bounces(NamedTuple):
     frame: Float32
     floor: Float32
     floor_frame: Float32
+    lightmap: Lightmap
 
 
+NO_LIGHTMAP = Lightmap(np.zeros((1, 12), np.float32), np.zeros((0, 16), np.float32), np.zeros(0, np.int32))
 NO_BOUNCES = Bounces(
     np.zeros((1, 28), np.float32),
     np.zeros((1, 4), np.float32),
@@ -94,4 +109,5 @@ NO_BOUNCES = Bounces(
     np.zeros(7, np.float32),
     np.zeros((2, 2, 4), np.float32),
     np.zeros(4, np.float32),
+    NO_LIGHTMAP,
 )
