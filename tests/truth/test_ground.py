@@ -77,6 +77,11 @@ def test_ground_laid_afterwards_is_that_of_all_at_once(name, elevation):
     assert len(bare.triangles) == len(bare.triangle_cutout) == geometry.triangle_start[-1]
     assert len(bare.vertices) == len(bare.normals) == geometry.vertex_start[-1]
     assert without_ground(bare) is bare
+    # Which way all faces is held once for both, and was asked for without the ground first.
+    assert len(bare.triangle_normals) == len(bare.triangle_side) == geometry.triangle_start[-1]
+    np.testing.assert_array_equal(geometry.triangle_normals[geometry.triangle_start[-1] :], [(0, 0, 1)] * 2)
+    np.testing.assert_array_equal(geometry.normals[geometry.vertex_start[-1] :], [(0, 0, 1)] * 4)
+    assert len(geometry.triangle_side) == len(geometry.triangles)
     alone = rasterize(bare, camera)
     assert alone.triangle.max() < geometry.triangle_start[-1]
     before = alone.triangle.copy()

@@ -150,8 +150,9 @@ class Facing:
 
     def of_vertices(self, geometry: Geometry) -> NDArray[np.float32]:
         """Their normals."""
-        if self._vertices is None:
+        if self._vertices is None or len(self._vertices) < len(geometry.coordinates):  # asked for before without the ground
             self._vertices = np.tile(UP, (len(geometry.coordinates), 1))
+            self._shown.pop("vertices", None)
         for i in self._elsewhere("vertices", geometry):
             own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
             _turn(geometry, i, self._vertices[own])
@@ -161,9 +162,10 @@ class Facing:
         """Their normals and sides."""
         from viewsphere.truth import kernels_place as kernels
 
-        if self._triangles is None:
+        if self._triangles is None or len(self._triangles[1]) < len(geometry.triangles):
             count = len(geometry.triangles)
             self._triangles = np.empty((count, 3), np.float32), np.empty(count, np.int8)
+            self._shown.pop("triangles", None)
             if geometry.ground_z is not None:
                 start, base = geometry.triangle_start[-1], geometry.vertex_start[-1]
                 normals, side = (array[start:] for array in self._triangles)

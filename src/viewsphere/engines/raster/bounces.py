@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_probes as kernels
-from viewsphere.engines.raster import patch_rays
 from viewsphere.engines.raster.environment import Surrounding, sky_along
-from viewsphere.engines.raster.gathering import Gathering, Look, around_of, look
+from viewsphere.engines.raster.gathering import Gathering, Look, look
 from viewsphere.engines.raster.kernels_bounce import COLUMNS, terms
 from viewsphere.engines.raster.kernels_environment import LAMPS
 from viewsphere.engines.raster.kernels_lanterns import shine_at, shine_at_probes, shine_near
@@ -26,7 +25,8 @@ from viewsphere.engines.raster.kernels_views import FOLD, NODES, send_views, spr
 from viewsphere.engines.raster.lanterns import Lanterns, lanterns_of
 from viewsphere.engines.raster.lightmaps import has_planes
 from viewsphere.engines.raster.lights import Lights
-from viewsphere.engines.raster.patch_rays import PatchRays
+from viewsphere.engines.raster.patch_rays import RAYS as PATCH_RAYS
+from viewsphere.engines.raster.patch_rays import WAYS, PatchRays, rays_of
 from viewsphere.engines.raster.patches import Patches, Rays, patches_of
 from viewsphere.engines.raster.records import NO_BOUNCES, NO_LIGHTMAP, Bounces, Float32, Int32, Surfaces, Textures
 from viewsphere.engines.raster.tracing import Tree, cast, tree_of, unblocked
@@ -285,7 +285,7 @@ def _look(hall: Hall) -> _Seen:
     )
     patches, around = patches_of(bundles, *made_of), None
     if looked is not None:
-        around = around_of(looked, patches, _dome(patch_rays.RAYS * patch_rays.WAYS), tree, SHADOWS / cells)
+        around = rays_of(patches, looked.alone(patches), _dome(PATCH_RAYS * WAYS), tree, SHADOWS / cells)
         patches = patches_of([*bundles, around.rays], *made_of)
     frame = np.array([*corner, cells, PUSH, hall.ground_z is not None, 1 / fade], np.float32)
     light = np.zeros((len(points), COLUMNS), np.float32)

@@ -11,7 +11,7 @@ from viewsphere.engines.raster.environment import Surrounding, sky_along
 from viewsphere.engines.raster.kernels_probes import send_around
 from viewsphere.engines.raster.lanterns import Lanterns
 from viewsphere.engines.raster.lightmaps import Charts, charts_of
-from viewsphere.engines.raster.patch_rays import PatchRays, rays_of
+from viewsphere.engines.raster.patch_rays import PatchRays
 from viewsphere.engines.raster.patches import Patches, Rays
 from viewsphere.engines.raster.records import Float32, Int32, Lightmap
 from viewsphere.engines.raster.tracing import Tree, cast
@@ -99,8 +99,3 @@ class Gathering(NamedTuple):
     def smooth(self) -> None:
         """Mix what neighbours know."""
         kernels.smooth(self.lightmap.charts, self.lightmap.nodes.copy(), self.lightmap.nodes)
-
-
-def around_of(look: Look, patches: Patches, dome: Float32, tree: Tree, off: float) -> PatchRays:
-    """Rays of the patches that have no part in the lightmap; others as in `patch_rays.rays_of`."""
-    return rays_of(patches, look.alone(patches), dome, tree, off)
