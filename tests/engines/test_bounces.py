@@ -14,6 +14,7 @@ from shots import painted, still_shot
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines import raster
 from viewsphere.engines.raster import bounces as baking
+from viewsphere.engines.raster import volumes
 from viewsphere.engines.raster.kernels_probes import look_up
 from viewsphere.engines.raster.options import parse_options
 from viewsphere.engines.raster.records import Bounces
@@ -31,9 +32,9 @@ OUT = Finish(background=BLACK)
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
     """Fewer rays of fewer probes: what is proved here does not depend on how many there are."""
-    monkeypatch.setattr(baking, "RAYS", 256)
-    monkeypatch.setattr(baking, "ALONG", 14)
-    monkeypatch.setattr(baking, "CELL", 0.3)
+    monkeypatch.setattr(volumes, "RAYS", 256)
+    monkeypatch.setattr(volumes, "ALONG", 14)
+    monkeypatch.setattr(volumes, "CELL", 0.3)
     baking._bake.cache_clear()
     baking._look.cache_clear()
 
@@ -132,7 +133,7 @@ def test_a_closed_box_of_which_one_wall_glows(monkeypatch):
     the form factor of two equal rectangles says (here integrated) before any bounce, and a little more: it is read from probes
     in front of it.
     """
-    monkeypatch.setattr(baking, "ALONG", 24)
+    monkeypatch.setattr(volumes, "ALONG", 24)
     low, high, reflectance = np.array((-1.0, -0.8, -0.6)), np.array((1.0, 0.8, 0.6)), 0.6
     faces = inside_out(box(low, high)).reshape(6, 2, 3, 3)
     glowing = [k for k in range(6) if (faces[k][..., 2] == high[2]).all()]
@@ -177,8 +178,8 @@ def test_the_ground_below_a_glowing_ball():
 
 def test_a_bulb_that_few_rays_hit_lights_all_walls_evenly(monkeypatch):
     """A bulb of 4 cm in a black box: pi L r^2 cos / d^2, though most probes have no ray that meets it."""
-    monkeypatch.setattr(baking, "ALONG", 36)
-    monkeypatch.setattr(baking, "RAYS", 64)
+    monkeypatch.setattr(volumes, "ALONG", 36)
+    monkeypatch.setattr(volumes, "RAYS", 64)
     radius, radiance = 0.02, 3000.0
     bulb = replace(ball(radius, (0, 0, 0), 16), materials=(matt(0.0, radiance),))
     hall = painted_mesh((inside_out(box((-1.5, -1.2, -1), (1.5, 1.2, 1))), matt(0.0)))
@@ -264,7 +265,7 @@ def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():
     small = mesh_of(box((3.0, 1.0, 0.5), (3.2, 1.2, 0.7)), matt(0.5))
     scene, place = Scene(sun=None, sky=DARK), room(0.6, window=False)
     empty = stage_of(small, scene, place).baked(0)
-    first, cell = empty.bounces.frame[:3] * empty.unit + empty.origin, empty.unit / float(empty.bounces.frame[3])
+    first, cell = empty.bounces.frame[0, :3] * empty.unit + empty.origin, empty.unit / float(empty.bounces.frame[0, 3])
     x, y, z = first + cell * np.floor((np.array([1.5, 1.4, 2.4]) - first) / cell)
     shade = box((x - 0.06, y - 0.06, z - 0.02), (x + 0.06, y + 0.06, 2.4))
     lamp = painted_mesh((shade[(shade[..., 2] < z).any(axis=1)], matt(0.5, 30.0)))
@@ -330,7 +331,7 @@ def test_a_wide_place_has_probes_around_its_origin_only(monkeypatch):
     """As far apart as is allowed at most, or little more; at their border a wall that stands in the open has the same light as
     without them: nothing is seen of it.
     """
-    monkeypatch.setattr(baking, "MOST", 4_000)
+    monkeypatch.setattr(volumes, "MOST", 14_000)
     wide = mesh_of(
         np.concatenate([rectangle((-200, -200, 0), (400, 0, 0), (0, 400, 0)), box((-40, 6, 0), (40, 7, 9))]), matt(0.3)
     )
@@ -338,11 +339,34 @@ def test_a_wide_place_has_probes_around_its_origin_only(monkeypatch):
     scene = Scene(sun=None, sky=EVEN, finish=OUT)
     stage = stage_of(small, scene, wide)
     baked = stage.baked(0)
-    assert np.prod(baked.bounces.grid) <= 4_000
-    assert baked.unit / float(baked.bounces.frame[3]) < 1.3 * baking.WIDEST
+    assert np.prod(baked.bounces.grid) <= 14_000
+    assert baked.unit / float(baked.bounces.frame[0, 3]) < 1.3 * volumes.WIDEST
     view = camera(120, 40, 60, 0, 10, 16, (0, 0, 2.0))
     row = painted(stage, view)[18].astype(int)
     assert np.abs(np.diff(row, axis=0)).max() <= 6
+
+
+def canyon(width: float, height: float, reach: float) -> np.ndarray:
+    """Two walls of a street that faces along y, and black ground."""
+    walls = [box((s, -reach, 0), (s + 0.4, reach, height)) for s in (-width / 2 - 0.4, width / 2)]
+    return np.concatenate([rectangle((-reach, -reach, 0), (2 * reach, 0, 0), (0, 2 * reach, 0)), *walls])
+
+
+def test_shade_far_from_the_origin_is_known_from_a_wider_volume(monkeypatch):
+    """In a long street of black walls a wall sees (1 - sin e) / 2 of an even sky, e how high the other wall reaches above it;
+    65 m away, where probes are 5 m apart, and 5 m away.
+    """
+    monkeypatch.setattr(volumes, "MOST", 14_000)
+    black, width, height = matt(0.0), 14.0, 12.0
+    small = mesh_of(box((-0.2, -0.2, 0), (0.2, 0.2, 0.4)), matt(0.5))
+    stage = stage_of(small, Scene(sun=None, sky=EVEN, finish=OUT), painted_mesh((canyon(width, height, 300.0), black)))
+    assert stage.baked(0).bounces.frame[1, 6] > 0
+    up = np.linspace(1.5, 9, 6)
+    for away, near in ((65.0, 0.12), (5.0, 0.06)):
+        wall = np.column_stack([np.full(6, width / 2), np.full(6, away), up])
+        rises = height - up
+        expected = (1 - rises / np.hypot(rises, width)) / 2
+        np.testing.assert_allclose(probed(stage, wall, [(-1, 0, 0)] * 6)[:, 0], expected, atol=near)
 
 
 def test_workers_of_a_place_find_these_kernels_compiled():

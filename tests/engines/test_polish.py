@@ -9,7 +9,7 @@ from test_bounces import both, room, stage_of
 from test_raster import DARK, camera
 
 from viewsphere.assets.mesh import Material
-from viewsphere.engines.raster import bounces as baking
+from viewsphere.engines.raster import volumes
 from viewsphere.engines.raster.painting import paint
 from viewsphere.engines.raster.polish import mirror_in_polish
 from viewsphere.geometry.camera import pixel_rays, project
@@ -22,9 +22,9 @@ VIEW = camera(96, 72, 55, 0, 22, 1.3, (2.0, 1.4, 0.3))
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
-    monkeypatch.setattr(baking, "RAYS", 128)
-    monkeypatch.setattr(baking, "ALONG", 12)
-    monkeypatch.setattr(baking, "CELL", 0.4)
+    monkeypatch.setattr(volumes, "RAYS", 128)
+    monkeypatch.setattr(volumes, "ALONG", 12)
+    monkeypatch.setattr(volumes, "CELL", 0.4)
 
 
 def hall(roughness: float):

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from light_stage import flat, quad
+from test_bounces import EVEN, OUT, both, matt, painted_mesh
+from test_bounces import stage_of as bounced_stage
 from test_physics import camera, stage_of
+from test_raster import box, mesh_of, rectangle
 
 from viewsphere.assets.mesh import Material
-from viewsphere.assets.wetting import DARKEST, UPRIGHT, darkened, wet, wetted
+from viewsphere.assets.wetting import DARKEST, FILM, SMOOTH, UPRIGHT, darkened, wet, wetted
 from viewsphere.engines.raster.painting import paint
 from viewsphere.engines.raster.wet_ground import WATER, mirror_in_water
 from viewsphere.geometry.camera import pixel_rays, project
@@ -111,3 +114,26 @@ def test_what_faces_up_is_wetter_and_plants_have_no_film():
         lawn = wetted(mesh, 1.0, "hedge")
         assert {lawn.materials[i].clearcoat for i in lawn.triangle_material} == {0.0}
         assert wetted(mesh, 1.0, evenly=True).triangle_material is mesh.triangle_material
+
+
+def test_where_light_bounces_a_film_loses_no_light_of_a_sky_that_it_does_not_mirror():
+    """Below a wide black roof the floor's coat mirrors what probes see: the roof. Its mirror image takes nothing away again."""
+    roof = painted_mesh((box((-15, -15, 2), (15, 15, 2.2)), matt(0.0)))
+    view, water = camera(48, 32, 40, 0, 14, 2.5), Wet(amount=1.0, puddles=0.0)
+
+    def radiance_of(coat):
+        floor = replace(matt(0.6), clearcoat=coat, clearcoat_roughness=SMOOTH)
+        place = both(painted_mesh((rectangle((-15, -15, 0), (30, 0, 0), (0, 30, 0)), floor)), roof)
+        small = mesh_of(box((5, 5, 0), (5.2, 5.2, 0.2)), matt(0.5))
+        stage = bounced_stage(small, Scene(sun=None, sky=EVEN, finish=OUT), place)
+        seen, radiance = rasterize(stage.at(0), view), np.empty((view.width * view.height, 4), np.float32)
+
+        def more(light):
+            mirror_in_water(stage.baked(0), view, seen, water, light)
+
+        paint(stage.baked(0), view, seen, False, True, radiance, more=more if coat else None)
+        return radiance[:, 1].reshape(view.height, view.width)
+
+    dry, coated = radiance_of(0.0), radiance_of(FILM)
+    assert dry[16:].min() > 0
+    assert (coated[16:] > 0.5 * dry[16:]).all()

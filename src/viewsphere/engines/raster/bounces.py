@@ -10,12 +10,14 @@ import math
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_probes as kernels
+from viewsphere.engines.raster.directions import TURNS, dome
 from viewsphere.engines.raster.environment import Surrounding, sky_along
 from viewsphere.engines.raster.gathering import Gathering, Look, look
 from viewsphere.engines.raster.kernels_bounce import COLUMNS, terms
@@ -29,40 +31,19 @@ from viewsphere.engines.raster.patch_rays import RAYS as PATCH_RAYS
 from viewsphere.engines.raster.patch_rays import WAYS, PatchRays, rays_of
 from viewsphere.engines.raster.patches import Patches, Rays, patches_of
 from viewsphere.engines.raster.records import NO_BOUNCES, NO_LIGHTMAP, Bounces, Float32, Int32, Surfaces, Textures
-from viewsphere.engines.raster.tracing import Tree, cast, tree_of, unblocked
+from viewsphere.engines.raster.tracing import Tree, cast, tree_of
+from viewsphere.engines.raster.volumes import LAST, Grid, Volume, grids_of, join, rays_of_probes, settle, volume_of
 
 Float = NDArray[np.float64]
-
-CELL = 0.2
-"""Metres between probes, at most, unless there would be more than `MOST`."""
-
-ALONG, MOST = 24, 40_000
-"""Probes along the longest side, at least, and of a volume, at most."""
-
-WIDEST, DEPTH, HEIGHT, FADE = 0.8, 1.0, 12.0, 6.0
-"""Metres between probes at most: of a place that would have too many only the part around its origin has some, from so many
-metres below to so many above, whose light fades out over so many cells.
-"""
-
-RAYS, FEW_RAYS, MANY_PROBES = 384, 256, 24_000
-"""Of a probe, and of one of so many; half of them beside a lightmap."""
-
-TURNS = 8
-"""Ways to turn the rays: two neighbours never look the same way, so that a probe and those around it see as one with all of
-their rays (interleaved sampling, Keller and Heidrich 2001).
-"""
-
-INSIDE_OUT = 0.5
-"""Share of probes within things from which on it is the room that they are in: it is modelled inside out."""
-
-PAD = 2
-"""Cells around all things."""
 
 PUSH = 0.3
 """Cells off its surface at which a sample reads."""
 
 PATCHES = 2.0
 """Patches along a cell."""
+
+SUDDENLY = 1e6
+"""One over the cells within which an inner volume's light ends: it has become that of the volume around it."""
 
 MAP, MAP_RAYS, BEYOND = 96, 128, 0.9
 """Cells of the ground's map each way, rays of each, and heights of all things that it reaches beyond them."""
@@ -100,21 +81,23 @@ class Hall:
 
 
 class _Seen(NamedTuple):
-    """What depends on no light. own (N,): which probe each ray's origin is; opens (3, N): whether nothing lies between a probe
-    and the next one along x, y and z; rank (N,): see `kernels_probes.screen`; below: rays of the ground's map;
-    look, around: of the lightmap and of the patches beside it.
+    """What depends on no light. volumes: finest first; below: rays of the ground's map; look, around: of the lightmap and of
+    the patches beside it.
     """
 
     bounces: Bounces
     tree: Tree
-    rays: Rays
-    own: Int32
-    opens: Float32
-    rank: NDArray[np.uint8]
+    volumes: tuple[Volume, ...]
     patches: Patches
     below: Rays | None
     look: Look | None
     around: PatchRays | None
+
+    def parts(self, values: Float32) -> list[tuple[Volume, Int32, Float32]]:
+        """Of each volume: the patches that its rays hit, and its own rows of values of all probes."""
+        size = len(self.volumes[0].own)
+        cut = (values[k * size : (k + 1) * size] for k in range(len(self.volumes)))
+        return list(zip(self.volumes, self.patches.ids, cut, strict=False))
 
 
 @dataclass(frozen=True)
@@ -150,13 +133,13 @@ def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounce
 def _bake(lighting: _Lighting) -> Bounces:
     hall, surrounding = lighting.hall, lighting.surrounding
     seen = _look.__wrapped__(hall) if hall.key is None else _look(hall)
-    bounces, patches, rays = seen.bounces, seen.patches, seen.rays
+    bounces, patches = seen.bounces, seen.patches
     light, views = np.zeros_like(bounces.light), np.zeros((len(bounces.light), NODES, 4), np.float32)
     bounces = bounces._replace(light=light, views=views.reshape(-1, 4), floor=np.zeros_like(bounces.floor))
-    off = SHADOWS / float(bounces.frame[3])
+    off = SHADOWS / seen.volumes[0].grid.cells
     lit = patches.lit(hall.which, hall.surfaces, hall.textures, hall.floor, surrounding.albedo, seen.tree, lighting.lights, off)
-    sky = sky_along(surrounding, rays.directions)
-    weights = irradiance_weights(rays.directions)
+    directions = seen.volumes[0].rays.directions
+    sky, weights = sky_along(surrounding, directions), irradiance_weights(directions)
     lanterns = lanterns_of(hall.which, hall.surfaces, patches, lit.emitted, TURNS)
     shining, near = _shining(seen, lanterns, lit.emitted, weights, off)
     own = lit.emitted * (lanterns.froms == 0)[:, None] + lit.reflectance * lit.arrived / np.float32(math.pi)
@@ -165,16 +148,20 @@ def _bake(lighting: _Lighting) -> Bounces:
     gathering = _gathering(seen, surrounding, lanterns, lit.emitted, off)
     if gathering is not None:
         bounces = bounces._replace(lightmap=gathering.lightmap)
-    sources = patches.ids[0], rays.turn, seen.own
     facing = (1 + normals[:, 2:]) / 2
     elsewhere = facing * surrounding.up + (1 - facing) * surrounding.below
-    buried = seen.rank == 0
-    for _ in range(ROUNDS):
-        kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
-        bounces.light[:] += shining
-        bounces.light[buried] = 0
+    buried = np.concatenate([volume.buried for volume in seen.volumes])
+
+    def receive() -> None:
+        for volume, ids, part in seen.parts(light):
+            kernels.send(ids, volume.rays.turn, volume.own, weights, sky, surrounding.below, sent, part)
+        light[:] += shining
+        light[buried] = 0
         if gathering is not None:
             gathering.receive(sent)
+
+    for _ in range(ROUNDS):
+        receive()
         kernels.look_up(bounces, places, normals, patches.triangles, glow, inside)
         if gathering is not None:
             gathering.look_around(sent, glow, inside)
@@ -182,25 +169,29 @@ def _bake(lighting: _Lighting) -> Bounces:
         sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * elsewhere)
         if np.abs(sent - before).sum(dtype=np.float64) <= UNCHANGED * sent.sum(dtype=np.float64):
             break
-    kernels.send(*sources, weights, sky, surrounding.below, sent, bounces.light)
-    bounces.light[:] += shining
-    bounces.light[buried] = 0
+    receive()
     if gathering is not None:
-        gathering.receive(sent)
         gathering.smooth()
-    send_views(*sources, rays.directions, patches.is_ground, sent, FOLD, views)
+    for volume, ids, part in seen.parts(views):
+        rays = volume.rays
+        send_views(ids, rays.turn, volume.own, rays.directions, patches.is_ground, sent, FOLD, part)
     views += near
-    spread_views(rays.turn, seen.own, rays.directions, FOLD, views)
+    for volume, _, part in seen.parts(views):
+        spread_views(volume.rays.turn, volume.own, volume.rays.directions, FOLD, part)
     views[buried] = 0
-    for known in (bounces.light, views.reshape(len(views), -1)):
-        _smooth(known, seen.opens, bounces.grid)
-    chosen = np.empty(len(views), np.int32)
-    kernels.choose(seen.rank, bounces.grid, bounces.light, chosen)
-    for known in (bounces.light, views):
-        known[buried] = known[chosen[buried]]
+    _settle(seen, light, views.reshape(len(views), -1))
     if seen.below is not None:
         bounces.floor[:] = _on_ground(seen, seen.below, sent, lanterns, lit.emitted, off).reshape(bounces.floor.shape)
     return bounces
+
+
+def _settle(seen: _Seen, light: Float32, views: Float32) -> None:
+    """Even out what all probes know, (N, C)."""
+    lights, sights = ([part for _, _, part in seen.parts(known)] for known in (light, views))
+    for volume, *known in zip(seen.volumes, lights, sights, strict=True):
+        settle(volume, *known)
+    for inner, outer in pairwise(seen.volumes):
+        join(inner, outer, ((lights[0], lights[1]), (sights[0], sights[1])))
 
 
 def _gathering(seen: _Seen, surrounding: Surrounding, lanterns: Lanterns, emitted: Float32, off: float) -> Gathering | None:
@@ -214,7 +205,7 @@ def _on_ground(
     seen: _Seen, below: Rays, sent: Float32, lanterns: Lanterns, emitted: Float32, off: float
 ) -> NDArray[np.float32]:
     """The ground's map, of MAP * MAP rows: see `Bounces.floor`."""
-    floor, ids = np.empty((MAP * MAP, 4), np.float32), seen.patches.ids[1]
+    floor, ids = np.empty((MAP * MAP, 4), np.float32), seen.patches.ids[len(seen.volumes)]
     kernels.send_down(ids, sent, floor)
     up = np.tile(np.array([0, 0, 1], np.float32), (len(floor), 1))
     near = ids, below.far, lanterns.froms, emitted, np.float32(off)
@@ -224,23 +215,16 @@ def _on_ground(
 
 def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32, off: float) -> tuple[Float32, Float32]:
     """What arrives at the probes from what shines by itself: irradiance, as `Bounces.light`, and sums of what rays see."""
-    light, rays = np.zeros_like(seen.bounces.light), seen.rays
+    light = np.zeros_like(seen.bounces.light)
     views = np.zeros((len(light), NODES, 4), np.float32)
-    if len(lanterns.points):
-        own = rays.turn, seen.own
+    if not len(lanterns.points):
+        return light, views
+    for (volume, ids, own_light), (_, _, own_views) in zip(seen.parts(light), seen.parts(views), strict=True):
+        rays, both = volume.rays, (own_light, own_views)
         points = lanterns.points, TERMS, np.float32(off), np.float32(4 * math.pi / rays.directions.shape[1])
-        shine_at_probes(seen.tree, rays.origins, *own, TURNS, *points, FOLD, light, views)
-        near = lanterns.froms, emitted, FOLD
-        shine_near(seen.patches.ids[0], rays.far, *own, weights, rays.directions, *near, light, views)
+        shine_at_probes(seen.tree, rays.origins, rays.turn, volume.own, TURNS, *points, FOLD, *both)
+        shine_near(ids, rays.far, rays.turn, volume.own, weights, rays.directions, lanterns.froms, emitted, FOLD, *both)
     return light, views
-
-
-def _smooth(light: Float32, opens: Float32, shape: NDArray[np.int64]) -> None:
-    """Mix what neighbours that see each other know: by all three axes each way to turn the rays counts an eighth."""
-    other = np.empty_like(light)
-    for axis, step in enumerate((1, int(shape[2]), int(shape[1] * shape[2]))):
-        kernels.blur(light, opens[axis], step, other)
-        light[:] = other
 
 
 @lru_cache(maxsize=1)
@@ -248,116 +232,47 @@ def _look(hall: Hall) -> _Seen:
     """Cast all rays."""
     corners = hall.surfaces.vertices[hall.surfaces.triangles[hall.which], 11:14]
     tree = tree_of(corners)
-    corner, cells, shape, fade = _grid(hall)
-    points, turn, own = _points(corner, cells, shape)
     normals = hall.surfaces.normals[hall.which]
-    has_charts = fade == 1 and has_planes(corners, hall.unit)
-    directions = _turned(_sphere((FEW_RAYS if len(points) > MANY_PROBES else RAYS) // (2 if has_charts else 1)))
-    met, far = cast(tree, points, directions, turn, np.inf)
-    screens = np.empty((len(points), 72), np.float32)
-    buried = np.empty(len(points), np.uint8)
-    kernels.bury(met, far, directions, turn, own, normals, np.float32(cells), buried)
-    is_inside_out = bool((buried > 0).mean() > INSIDE_OUT)
-    if is_inside_out:
-        buried[buried == 1] = 0
-    rank = np.zeros_like(buried)
-    kernels.screen(met, far, directions, turn, own, normals, np.float32(cells), shape, buried, screens, rank)
-    # What a buried probe sees counts for nothing: the inner sides of things need no patches.
-    met[:, buried[own] > 0] = -1
-    rays = Rays(points, directions, turn, met, far)
-    bundles, below, floor, floor_frame = [rays], None, NO_BOUNCES.floor, NO_BOUNCES.floor_frame
+    grids = grids_of(hall.low, hall.high, hall.unit)
+    has_charts = len(grids) == 1 and has_planes(corners, hall.unit)
+    directions = rays_of_probes(grids, has_charts)
+    volumes = tuple(volume_of(grid, tree, normals, directions, grid is grids[0]) for grid in grids)
+    bundles, below, floor, floor_frame = [volume.rays for volume in volumes], None, NO_BOUNCES.floor, NO_BOUNCES.floor_frame
     if hall.has_map and hall.ground_z is not None:
         places, floor_frame = _map(hall, hall.ground_z)
-        floor, up, same = np.zeros((MAP, MAP, 4), np.float32), _dome(MAP_RAYS)[None], np.zeros(len(places), np.int32)
+        floor, up, same = np.zeros((MAP, MAP, 4), np.float32), dome(MAP_RAYS)[None], np.zeros(len(places), np.int32)
         met, far = cast(tree, places, up, same, np.inf)
         below = Rays(places, up, same, met, far)
         bundles.append(below)
-    looked = look(tree, corners, normals, hall.unit, is_inside_out) if has_charts else None
+    looked = look(tree, corners, normals, hall.unit, volumes[0].is_inside_out) if has_charts else None
     if looked is not None:
         bundles.append(looked.nodes)
-    last = corner + (shape[::-1] - 1) / cells
+    inner = grids[0]
     made_of = (
         normals,
         hall.surfaces.material[hall.which],
-        np.array([*corner, *last], np.float32),
-        cells * PATCHES,
+        np.array([*inner.corner, *inner.last], np.float32),
+        inner.cells * PATCHES,
         _ground(hall),
     )
     patches, around = patches_of(bundles, *made_of), None
     if looked is not None:
-        around = rays_of(patches, looked.alone(patches), _dome(PATCH_RAYS * WAYS), tree, SHADOWS / cells)
+        around = rays_of(patches, looked.alone(patches), dome(PATCH_RAYS * WAYS), tree, SHADOWS / inner.cells)
         patches = patches_of([*bundles, around.rays], *made_of)
-    frame = np.array([*corner, cells, PUSH, hall.ground_z is not None, 1 / fade], np.float32)
-    light = np.zeros((len(points), COLUMNS), np.float32)
-    return _Seen(
-        Bounces(light, NO_BOUNCES.views, screens, shape, frame, floor, floor_frame, NO_LIGHTMAP),
-        tree,
-        rays,
-        own,
-        _opens(tree, points, own, buried, cells, shape),
-        rank,
-        patches,
-        below,
-        looked,
-        around,
+    screens = np.concatenate([volume.screens for volume in volumes])
+    light = np.zeros((len(screens), COLUMNS), np.float32)
+    bounces = Bounces(light, NO_BOUNCES.views, screens, inner.shape, _frame(grids), floor, floor_frame, NO_LIGHTMAP)
+    return _Seen(bounces, tree, volumes, patches, below, looked, around)
+
+
+def _frame(grids: tuple[Grid, ...]) -> Float32:
+    """See `Bounces.frame`."""
+    inner, outer = grids[0], grids[-1]
+    fades, first = ((1, 1), 0) if len(grids) == 1 else ((SUDDENLY, 1 / LAST), int(np.prod(inner.shape)))
+    ends = (fades[0], 0), (fades[1], first)
+    return np.array(
+        [[*grid.corner, grid.cells, PUSH, *end] for grid, end in zip((inner, outer), ends, strict=True)], np.float32
     )
-
-
-def _grid(hall: Hall) -> tuple[Float, float, NDArray[np.int64], float]:
-    """Where the first probe is, cells per length, layers, rows and columns (3,), and within how many cells light from elsewhere
-    fades in at the border.
-    """
-    low, high, cells = hall.low, hall.high, max(hall.unit / CELL, ALONG / float((hall.high - hall.low).max()))
-    fade = 1.0
-    if np.prod(_shape((high - low) * hall.unit / WIDEST)) > MOST:
-        low, high, fade = *_part(hall), FADE
-    size = high - low
-    while np.prod(_shape(size * cells)) > MOST:
-        cells *= 0.97
-    shape = _shape(size * cells)
-    spare = (shape - 1) / cells - size
-    return low - spare / 2, cells, shape[::-1].copy(), fade
-
-
-def _shape(size: Float) -> NDArray[np.int64]:
-    """Columns, rows and layers (3,) around a box of this size in cells; walls of even sizes do not run along probes."""
-    return (np.ceil(size + 0.5) + 2 * PAD + 1).astype(np.int64)
-
-
-def _part(hall: Hall) -> tuple[Float, Float]:
-    """The part of a wide place around its origin, where targets stand, or around its middle, that may have enough probes."""
-    middle = np.zeros(3) if ((hall.low < 0) & (hall.high > 0)).all() else (hall.low + hall.high) / 2
-    below, above, side = DEPTH / hall.unit, HEIGHT / hall.unit, math.sqrt(MOST * WIDEST**3 / (DEPTH + HEIGHT)) / hall.unit
-    low, high = np.array([-side / 2, -side / 2, -below]), np.array([side / 2, side / 2, above])
-    return np.maximum(middle + low, hall.low), np.minimum(middle + high, hall.high)
-
-
-def _points(corner: Float, cells: float, shape: NDArray[np.int64]) -> tuple[Float32, Int32, Int32]:
-    """All probes (N, 3), those of one turn together; each one's turn, of which any two by two by two have all, and its place in
-    the volume.
-    """
-    at = np.indices(tuple(shape.tolist())).reshape(3, -1).T[:, ::-1]
-    turn = at % 2 @ [1, 2, 4]
-    own = np.argsort(turn, kind="stable")
-    return (corner + at[own] / cells).astype(np.float32), turn[own].astype(np.int32), own.astype(np.int32)
-
-
-def _opens(
-    tree: Tree, points: Float32, own: Int32, buried: NDArray[np.uint8], cells: float, shape: NDArray[np.int64]
-) -> Float32:
-    """Whether nothing lies between each probe and the next along x, y and z, and neither is buried: (3, N), by place."""
-    at = np.indices(tuple(shape.tolist())).reshape(3, -1)[::-1]
-    opens = np.empty((3, len(points)), np.float32)
-    for axis in range(3):
-        way = np.zeros_like(points)
-        way[:, axis] = 1 / cells
-        ahead, back = unblocked(tree, points, way), unblocked(tree, points + way, -way)
-        opens[axis, own] = np.minimum(ahead, back)
-        is_last = at[axis] == shape[2 - axis] - 1
-        opens[axis, is_last] = 0
-        step = int(np.prod(shape[3 - axis :]))
-        opens[axis][~is_last] *= (buried[~is_last] == 0) & (buried[np.flatnonzero(~is_last) + step] == 0)
-    return opens
 
 
 def _ground(hall: Hall) -> Float32:
@@ -378,37 +293,6 @@ def _map(hall: Hall, z: float) -> tuple[Float32, Float32]:
     x, y = np.meshgrid(left + (np.arange(MAP) + 0.5) / cells, front + (np.arange(MAP) + 0.5) / cells)
     places = np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3)
     return places.astype(np.float32), np.array([cells, left, front, 1], np.float32)
-
-
-def _sphere(count: int) -> Float32:
-    """Directions that share the sphere evenly, (count, 3): a Fibonacci spiral. None lies along an axis."""
-    z = 1 - (2 * np.arange(count) + 1) / count
-    return _around(z, np.arange(count))
-
-
-def _turned(directions: Float32) -> Float32:
-    """The same (K, 3) turned in `TURNS` ways, (TURNS, K, 3), which share all rotations about evenly (Shoemake 1992)."""
-    i = np.arange(1, TURNS + 1)
-    u, v, w = ((i * step) % 1.0 for step in (0.8191725134, 0.6710436067, 0.5497004779))  # Roberts' sequence in three dimensions
-    a, b = np.sqrt(1 - u), np.sqrt(u)
-    x, y, z, r = a * np.sin(2 * np.pi * v), a * np.cos(2 * np.pi * v), b * np.sin(2 * np.pi * w), b * np.cos(2 * np.pi * w)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * r), 2 * (x * z + y * r)],
-        [2 * (x * y + z * r), 1 - 2 * (x * x + z * z), 2 * (y * z - x * r)],
-        [2 * (x * z - y * r), 2 * (y * z + x * r), 1 - 2 * (x * x + y * y)],
-    ]
-    turned = np.einsum("ijw,kj->wki", np.array(rows), directions.astype(np.float64))
-    return np.ascontiguousarray(turned, np.float32)
-
-
-def _dome(count: int) -> Float32:
-    """Directions up, as dense as their cosine, (count, 3)."""
-    return _around(np.sqrt(1 - (np.arange(count) + 0.5) / count), np.arange(count))
-
-
-def _around(z: Float, turn: NDArray[np.int_]) -> Float32:
-    angle, radius = (turn + 0.5) * math.pi * (3 - math.sqrt(5)), np.sqrt(1 - z * z)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1).astype(np.float32)
 
 
 def irradiance_weights(directions: Float32) -> Float32:

@@ -35,6 +35,7 @@ from viewsphere.engines.raster.kernels_block import (
     PROBES,
     PX,
     PY,
+    PZ,
     T0,
     T1,
     T2,
@@ -53,6 +54,7 @@ f4 = nb.float32
 i4 = nb.int32
 U = nb.uintp
 
+FRAME = 7  # columns of Bounces.frame
 COLUMNS = 28  # of Bounces.light: irradiance / pi in nine terms of red, green and blue; the last is unused
 SCREENS = 2
 BEHIND = 0.02  # least weight of a probe that lies behind the surface
@@ -66,26 +68,34 @@ _blend4, _blend28 = blend(4), blend(COLUMNS)
 WEIGHTS = (T0, T1, T2, T3, T4, T5, T6, T7)
 
 
+def _within(most_of):
+    return (most_of[0] > 0) & (most_of[1] > 0) & (most_of[2] > 0)
+
+
 @lanewise
 def _place(frame, columns, rows, layers, b):
     """PLACE: the first of the eight probes around; T0 to T7: their weights by place and by what is in front of the surface.
 
     FIRST_X to FIRST_Z: where the sample's view of the screens begins, in cells from the first probe; INSIDE: how far inside
-    the volume it reads, 0..1.
+    the volumes it reads, 0..1: of both, the inner one wherever the sample is within.
     """
     # Halfway between both normals: bumps hardly move it, and facets of a round thing do not show.
     normal = tuple((n + g) * 0.5 for n, g in zip(b.get(NX, NY, NZ), b.get(GX, GY, GZ), strict=True))
-    cells, push = frame.one(3), frame.one(4)
-    own = [(b[PX + k * BLOCK] - frame.one(k)) * cells for k in range(3)]
+    position, shape = b.get(PX, PY, PZ), (columns, rows, layers)
+    own, outer = ([(p - frame.one(at + k)) * frame.one(at + 3) for k, p in enumerate(position)] for at in (0, FRAME))
+    place = [at + n * frame.one(4) for at, n in zip(own, normal, strict=True)]
+    is_near = _within([least(at, points - 1 - at) for at, points in zip(place, shape, strict=True)])
+    own = [where(is_near, at, around) for at, around in zip(own, outer, strict=True)]
+    push, fade, start = (where(is_near, frame.one(k), frame.one(FRAME + k)) for k in (4, 5, 6))
     place = [at + n * push for at, n in zip(own, normal, strict=True)]
-    most_of = [least(at, points - 1 - at) for at, points in zip(place, (columns, rows, layers), strict=True)]
-    b[INSIDE] = clamp(least(least(most_of[0], most_of[1]), most_of[2]) * frame.one(6))
-    is_within = (most_of[0] > 0) & (most_of[1] > 0) & (most_of[2] > 0)
+    most_of = [least(at, points - 1 - at) for at, points in zip(place, shape, strict=True)]
+    b[INSIDE] = clamp(least(least(most_of[0], most_of[1]), most_of[2]) * fade)
+    is_within = _within(most_of)
     # NaN is placed at the first point.
     place = [where(is_within, at, 0) for at in place]
     first = [at.whole().real() for at in place]
     part = [at - low for at, low in zip(place, first, strict=True)]
-    b[PLACE] = (first[2] * rows + first[1]) * columns + first[0]
+    b[PLACE] = start + (first[2] * rows + first[1]) * columns + first[0]
     looks = [where(is_within, at - low + n * OFF, 0) for at, low, n in zip(own, first, normal, strict=True)]
     b.put((FIRST_X, FIRST_Y, FIRST_Z), looks)
     off = dot([low - at for low, at in zip(first, own, strict=True)], normal)

@@ -400,6 +400,24 @@ def ambient(count, surrounding, bounces, b):
 
 
 @lanewise
+def _keep_of_coat(b):
+    """T3 to T5 as far as the surface and what is around it do not block them."""
+    for k in range(0, 3 * BLOCK, BLOCK):
+        b[T3 + k] = b[T3 + k] * b[T7]
+
+
+@inner(fastmath=FAST)
+def light_on_coat(count, surrounding, bounces, b):
+    """T3 to T5: the light that clear coats mirror, of a block of which `ambient` could be asked."""
+    _look(count, COATING, b)
+    columns = U(bounces.grid[2])
+    near_light(count, bounces.views, columns, U(bounces.grid[1]) * columns, b)
+    light_around(count, surrounding, b)
+    add_near_light(count, b)
+    _keep_of_coat(count, b)
+
+
+@lanewise
 def _compose(b):
     alpha, unlit, through = clamp(b[ALPHA]), b[UNLIT], b[THROUGH]
     lights = through > 0

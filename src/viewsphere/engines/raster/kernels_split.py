@@ -28,6 +28,7 @@ from viewsphere.engines.raster.kernels_block import (
     ROUGH,
     ROWS,
     SR,
+    T3,
     TAKEN,
     UNLIT,
 )  # fmt: skip
@@ -40,6 +41,7 @@ from viewsphere.engines.raster.kernels_light import (
     ambient,
     ambient_matte,
     compose,
+    light_on_coat,
     weigh,
 )
 from viewsphere.engines.raster.kernels_material import look_up, material
@@ -222,3 +224,25 @@ def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slot
             for c in range(U(3)):
                 out[q, c], out[q, U(3) + c] = b[U(FACE_R) + c * U(BLOCK) + i], b[U(SR) + c * U(BLOCK) + i]
             out[q, U(6)] = b[U(ROUGH) + i]
+
+
+@njit(fastmath=FAST, _nrt=True)
+def film(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
+    """Set rows `slots` of `out` (S, 3) float32 to the light that the clear coat of samples is taken to mirror, where light
+    bounces.
+    """
+    b = np.zeros(ROWS * BLOCK, np.float32)
+    own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    for start in range(0, slots.shape[0], BLOCK):
+        count = min(slots.shape[0] - start, BLOCK)
+        locate(view, start, count, slots, depth, b, own)
+        gather(surfaces, count, triangle, b, own, which)
+        material(count, view, surfaces, textures, b, which)
+        weigh(count, surrounding.albedo, b)
+        occlude(count, occlusion, b)
+        bounced(count, bounces, False, own, b)
+        light_on_coat(count, surrounding, bounces, b)
+        for i in range(U(count)):
+            q = U(slots[U(start) + i])
+            for c in range(U(3)):
+                out[q, c] = b[U(T3) + c * U(BLOCK) + i]

@@ -83,9 +83,10 @@ class Bounces(NamedTuple):
     probe sees in each direction, see `kernels_views`: radiance of things, and the share that they leave of what is far away;
     screens (cells, 72): of the cell whose first corner a probe is, for each of its eight corners, what part of the cell that
     corner sees: the normal's x of all eight, y, z and offset of a plane, in cells from the first corner, those of a second one,
-    and how much it counts where it sees nothing; grid (3,) int64: layers, rows and columns, 0 for no volume; frame (7,): x, y
-    and z of the first probe, cells per length, how far from a surface it is read in cells, whether there is a ground, one over
-    the number of cells in which its light fades out at the border; floor (n, n, 4): radiance of a white matt ground lit by
+    and how much it counts where it sees nothing; grid (3,) int64: layers, rows and columns, 0 for no volume; frame (2, 7), of
+    the volume and of that around it, of as many probes, or of the volume again: x, y and z of the first probe, cells per
+    length, how far from a surface it is read in cells, one over the number of cells in which its light ends at the border, the
+    first probe's row; floor (n, n, 4): radiance of a white matt ground lit by
     things alone; floor_frame (4,): its cells per length, its corner's x and y, whether there is a map; lightmap: where it is
     known better than by probes.
     """
@@ -106,7 +107,7 @@ NO_BOUNCES = Bounces(
     np.zeros((1, 4), np.float32),
     np.zeros((1, 72), np.float32),
     np.zeros(3, np.int64),
-    np.zeros(7, np.float32),
+    np.zeros((2, 7), np.float32),
     np.zeros((2, 2, 4), np.float32),
     np.zeros(4, np.float32),
     NO_LIGHTMAP,

@@ -1,15 +1,18 @@
 """What wet ground mirrors: in puddles sharply, in the film on rough ground drawn out along the picture's columns.
 
-The film's own mirror image of the sky is part of its material; here is what things in front of that sky change.
+What a film is taken to mirror is part of its material: the sky, or where light bounces what probes see, too. Here the scene's
+own mirror image takes its place.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.assets.wetting import FILM
+from viewsphere.engines.raster import kernels_paint, kernels_split
 from viewsphere.engines.raster.mirroring import blurred, looked_at, lying, mirrored
-from viewsphere.engines.raster.painting import Baked
+from viewsphere.engines.raster.painting import Baked, view_of
 from viewsphere.engines.raster.records import Float32
 from viewsphere.model.camera import Camera
 from viewsphere.model.classes import STUFF_IDS
@@ -52,8 +55,21 @@ def mirror_in_water(baked: Baked, camera: Camera, visibility: Visibility, wet: W
     deep = puddles(wet, place[:, 0], place[:, 1])
     radiance[at, :3] *= 1 - (UNDER_WATER * deep)[:, None]
     seen = mirrored(baked, camera, plane, low, at)
-    image = (water[:, None] * (seen.things - seen.hidden * seen.sky)).astype(np.float32)
+    taken = _taken(baked, camera, visibility, at, seen.sky)
+    image = (water[:, None] * (seen.things + (1 - seen.hidden) * seen.sky - taken)).astype(np.float32)
     reach = max(1, camera.height // DRAWN_OUT[0]), max(1, camera.height // DRAWN_OUT[1])
     film = wet.amount * FILM * (1 - deep)[:, None] * blurred(image, at, camera, reach)
-    pool = deep[:, None] * (image + (1 - wet.amount * FILM) * water[:, None] * seen.sky)
+    pool = deep[:, None] * (image + (1 - wet.amount * FILM) * water[:, None] * taken)
     radiance[at, :3] = np.maximum(radiance[at, :3] + film + pool, 0)
+
+
+def _taken(baked: Baked, camera: Camera, visibility: Visibility, at: NDArray[np.intp], sky: Float32) -> Float32:
+    """What the material of pixels (n,) is taken to mirror, (n, 3): `sky`, where light does not bounce, and on the ground."""
+    triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+    taken = np.zeros((len(triangle), 3), np.float32)
+    taken[at] = sky
+    if baked.bounces.grid[0] > 0:
+        own = view_of(baked, camera), baked.surfaces, baked.textures, baked.floor
+        on_things = at[baked.kind[triangle[at]] != kernels_paint.FLOOR].astype(np.int32)
+        kernels_split.film(*own, baked.surrounding, baked.occlusion, baked.bounces, on_things, triangle, depth, taken)
+    return taken[at]

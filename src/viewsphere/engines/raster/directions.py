@@ -1,0 +1,48 @@
+"""Directions of rays that share a sphere or a dome."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.raster.records import Float32
+
+Float = NDArray[np.float64]
+
+TURNS = 8
+"""Ways to turn the rays: two neighbours never look the same way, so that a probe and those around it see as one with all of
+their rays (interleaved sampling, Keller and Heidrich 2001).
+"""
+
+
+def sphere(count: int) -> Float32:
+    """Directions that share the sphere evenly, (count, 3): a Fibonacci spiral. None lies along an axis."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    return _around(z, np.arange(count))
+
+
+def turned(directions: Float32) -> Float32:
+    """The same (K, 3) turned in `TURNS` ways, (TURNS, K, 3), which share all rotations about evenly (Shoemake 1992)."""
+    i = np.arange(1, TURNS + 1)
+    u, v, w = ((i * step) % 1.0 for step in (0.8191725134, 0.6710436067, 0.5497004779))  # Roberts' sequence in three dimensions
+    a, b = np.sqrt(1 - u), np.sqrt(u)
+    x, y, z, r = a * np.sin(2 * np.pi * v), a * np.cos(2 * np.pi * v), b * np.sin(2 * np.pi * w), b * np.cos(2 * np.pi * w)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * r), 2 * (x * z + y * r)],
+        [2 * (x * y + z * r), 1 - 2 * (x * x + z * z), 2 * (y * z - x * r)],
+        [2 * (x * z - y * r), 2 * (y * z + x * r), 1 - 2 * (x * x + y * y)],
+    ]
+    turned = np.einsum("ijw,kj->wki", np.array(rows), directions.astype(np.float64))
+    return np.ascontiguousarray(turned, np.float32)
+
+
+def dome(count: int) -> Float32:
+    """Directions up, as dense as their cosine, (count, 3)."""
+    return _around(np.sqrt(1 - (np.arange(count) + 0.5) / count), np.arange(count))
+
+
+def _around(z: Float, turn: NDArray[np.int_]) -> Float32:
+    angle, radius = (turn + 0.5) * math.pi * (3 - math.sqrt(5)), np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1).astype(np.float32)
