@@ -86,9 +86,9 @@ def recipe(folder, **changes):
 
 @pytest.fixture(scope="module")
 def whole(pictures, tmp_path_factory):
-    """By one worker, in this process' order."""
+    """By this process alone."""
     out = tmp_path_factory.mktemp("whole") / "out"
-    generate(recipe(pictures), out, workers=1)
+    generate(recipe(pictures), out)
     return out
 
 
