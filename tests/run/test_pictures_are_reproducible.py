@@ -81,7 +81,7 @@ def recipe(folder, **changes):
         "distortion": {"model": "brown_conrady", "coefficients": [-0.1, 0.02, 0.001, 0.0]},
     }
     values = {"camera": camera, "channels": ["rgb", *LABELS], "formats": ["native"], "shot_frames": 1}
-    return small_recipe(**{**values, "scene": scene(folder), **changes})
+    return small_recipe(**{**values, "scene": scene(folder), "engine": {"name": "raster"}, **changes})
 
 
 @pytest.fixture(scope="module")
