@@ -32,6 +32,9 @@ SETTLED = """async () => {
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as a shell's jobs in the background have it, and all that they start
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# A process for each model file takes half a second to two of them; tests of the protection itself take this away.
+os.environ.setdefault("VIEWSPHERE_READ_HERE", "1")
+
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None, max_examples=EXAMPLES)
 settings.load_profile("repeatable")
 

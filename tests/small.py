@@ -17,7 +17,9 @@ def still_channels() -> tuple[str, ...]:
 
 
 def small_recipe(**changes):
-    """Two post boxes from six sides on 96 x 72 pixels, with ground and all channels of still pictures."""
+    """Two post boxes from six sides on 96 x 72 pixels, with ground and all channels of still pictures, without occlusion, which
+    would take a fifth of the time.
+    """
     from viewsphere import Recipe
 
     values = {
@@ -26,6 +28,7 @@ def small_recipe(**changes):
         "viewpoints": {"azimuth": [0, 120, 240], "elevation": [15, 50], "distance": 1.0},
         "camera": {"size": [96, 72], "fov_deg": 35},
         "scene": {"ground": True},
+        "engine": {"name": "raster", "ambient_occlusion": "off"},
         "channels": list(still_channels()),
         "formats": ["native", "coco"],
         "shot_frames": 2,

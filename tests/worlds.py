@@ -33,6 +33,7 @@ def stills(**changes):
         "viewpoints": {"azimuth": [30, 200], "elevation": [15], "distance": 3.5},
         "camera": {"size": [160, 120], "fov_deg": 50},
         "scene": {"ground": True},
+        "engine": {"name": "raster", "ambient_occlusion": "off"},
         "channels": CHANNELS,
         "annotations": ANNOTATIONS,
         "splits": {"by": "scene", "train": 0.5, "val": 0.3, "test": 0.2},

@@ -8,12 +8,12 @@ groups `viewsphere.engines`, `viewsphere.formats`, `viewsphere.labels`, `viewsph
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 import sys
 from collections.abc import Iterable
 from functools import lru_cache
 from importlib import metadata
-from pathlib import Path
 from typing import Any, Literal
 
 from viewsphere.errors import UserError
@@ -82,7 +82,8 @@ def _changes(paths: Iterable[str]) -> Changes:
 def _changed(path: str) -> int:
     """When a folder was last changed, ns; 0 where there is none."""
     try:
-        return Path(path).stat().st_mtime_ns
+        # Asked a thousand times a run: making a Path takes longer than the system's answer.
+        return os.stat(path or ".").st_mtime_ns  # noqa: PTH116
     except OSError:
         return 0
 

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from viewsphere.assets.isolated import READ_HERE
-
 CODES = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125, "i1": 5120, "i2": 5122}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
@@ -79,12 +77,6 @@ class Gltf:
         body = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
         self.path.write_bytes(head + body)
         return self.path
-
-
-@pytest.fixture(autouse=True)
-def read_here(monkeypatch):
-    """Models are read in this process: quicker, and open to patches. Tests of isolation take the variable away."""
-    monkeypatch.setenv(READ_HERE, "1")
 
 
 @pytest.fixture

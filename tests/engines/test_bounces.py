@@ -14,7 +14,7 @@ from shots import painted, still_shot
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines import raster
 from viewsphere.engines.raster import bounces as baking
-from viewsphere.engines.raster import volumes
+from viewsphere.engines.raster import gathering, lightmaps, volumes
 from viewsphere.engines.raster.kernels_probes import look_up
 from viewsphere.engines.raster.options import parse_options
 from viewsphere.engines.raster.records import Bounces
@@ -31,10 +31,12 @@ OUT = Finish(background=BLACK)
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
-    """Fewer rays of fewer probes: what is proved here does not depend on how many there are."""
+    """Fewer rays of fewer probes and nodes: what is proved here does not depend on how many there are."""
     monkeypatch.setattr(volumes, "RAYS", 256)
     monkeypatch.setattr(volumes, "ALONG", 14)
     monkeypatch.setattr(volumes, "CELL", 0.3)
+    monkeypatch.setattr(gathering, "NODE_RAYS", 64)
+    monkeypatch.setattr(lightmaps, "CELL", 0.2)
     baking._bake.cache_clear()
     baking._look.cache_clear()
 
@@ -279,8 +281,9 @@ def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():
 
 
 @pytest.mark.parametrize("window", [True, False])
-def test_a_dark_room_beside_a_lit_one_stays_dark(window):
+def test_a_dark_room_beside_a_lit_one_stays_dark(window, monkeypatch):
     """A partition of 10 cm, less than half of what lies between probes; without a window a lamp stands in the first room."""
+    monkeypatch.setattr(lightmaps, "CELL", 0.1)
     lamp = PointLight(position=(-2.6, 0.4, 0.6), strength=1.0)  # from the small thing's middle
     sun = Sun(azimuth_deg=-10, elevation_deg=40, strength=5.0) if window else None
     small = mesh_of(box((3.1, 1.0, 0.5), (3.3, 1.2, 0.7)), matt(0.5))

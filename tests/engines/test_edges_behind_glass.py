@@ -29,6 +29,10 @@ LENSES = {
     "fisheye": Distortion(model="fisheye", coefficients=(0.02, -0.01, 0.0, 0.0)),
 }
 
+NAMES = ("box", "open", "sheet", "hole", "decal")
+PAIRS = [(name, (FILM, PANE)[(i + j) % 2], lens) for i, name in enumerate(NAMES) for j, lens in enumerate(LENSES)]
+"""Each scene with each pane and each lens, each pane with each lens."""
+
 
 def scene_of(*surfaces, **fields):
     """One mesh of several surfaces: of each its triangles (T, 3, 3) and its material."""
@@ -89,9 +93,7 @@ def errors(mesh, lens):
     return tuple(np.abs(light_of(mesh, lens, 1, antialias)[is_edge] - mean) / step for antialias in (4, 1))
 
 
-@pytest.mark.parametrize("name", ["box", "open", "sheet", "hole", "decal"])
-@pytest.mark.parametrize("pane", [FILM, PANE])
-@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize(("name", "pane", "lens"), PAIRS)
 def test_outlines_behind_a_pane_are_smooth(name, pane, lens):
     """Of a straight edge's coverage four samples know 0.09 or so, and at worst 0.25; one sample 0.25 and 0.5."""
     smooth, jagged = errors(behind(pane)[name], LENSES[lens])
@@ -138,7 +140,7 @@ def test_nothing_is_marked_where_all_is_even(has_pane, size):
     assert edge_samples(baked.geometry, view_of(None), visibility, baked.owner, marks) is None
 
 
-@pytest.mark.parametrize("name", ["box", "open", "sheet", "hole", "decal"])
+@pytest.mark.parametrize("name", NAMES)
 def test_an_outline_of_which_nothing_shows_is_not_marked(name):
     """All colours may be the same behind what is nearly opaque; where they differ, both sides of the outline are marked."""
     colors = np.random.default_rng(0).uniform(0, 1, (SIZE**2, 4)).astype(np.float32)

@@ -9,6 +9,7 @@ from test_raster import DARK, box, camera, mesh_of, rectangle
 
 from shots import painted
 from viewsphere.engines.raster import bounces as baking
+from viewsphere.engines.raster import gathering, lightmaps
 from viewsphere.engines.raster import kernels_lightmap as kernels
 from viewsphere.engines.raster.kernels_probes import look_up
 from viewsphere.engines.raster.lightmaps import CELL, charts_of
@@ -19,7 +20,11 @@ LOW, HIGH = np.array((-1.0, -0.8, -0.6)), np.array((1.0, 0.8, 0.6))
 
 
 @pytest.fixture(autouse=True)
-def forgotten():
+def coarse(monkeypatch):
+    """Fewer rays of fewer probes: nothing is read from them here."""
+    monkeypatch.setattr(baking, "RAYS", 256)
+    monkeypatch.setattr(baking, "ALONG", 14)
+    monkeypatch.setattr(baking, "CELL", 0.3)
     baking._bake.cache_clear()
     baking._look.cache_clear()
 
@@ -140,8 +145,10 @@ def test_the_back_of_a_wall_has_no_share_in_its_light():
     assert glow[1].max() < 0.03
 
 
-def test_the_same_bytes_where_a_place_is_lit_anew_beside_another_target():
+def test_the_same_bytes_where_a_place_is_lit_anew_beside_another_target(monkeypatch):
     """Triangles of the place have other numbers then."""
+    monkeypatch.setattr(gathering, "NODE_RAYS", 64)
+    monkeypatch.setattr(lightmaps, "CELL", 0.2)
     view = camera(60, 45, 40, 20, 20, 1.6, (1.5, 1.5, 1.0))
     place = room(0.6)
     few, many = (

@@ -33,7 +33,7 @@ def recipe(file, **changes):
 @pytest.fixture(scope="module")
 def people(tmp_path_factory):
     folder = tmp_path_factory.mktemp("people")
-    vs.generate(recipe(write_gltf(person(), folder / "person.gltf")), folder / "out", workers=1)
+    vs.generate(recipe(write_gltf(person(), folder / "person.gltf")), folder / "out")
     return Dataset(folder / "out")
 
 

@@ -165,7 +165,7 @@ def test_nothing_singles_out_what_is_alike():
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory):
     root = tmp_path_factory.mktemp("captions") / "out"
-    vs.generate(recipe(), root, workers=1)
+    vs.generate(recipe(), root)
     return Dataset(root)
 
 

@@ -90,7 +90,7 @@ def test_the_right_eye_stands_a_baseline_from_the_left(samples):
 
 
 def test_they_are_kept_and_proved(tmp_path):
-    vs.generate(recipe(), tmp_path, workers=1)
+    vs.generate(recipe(), tmp_path)
     dataset = vs.open(tmp_path)
     for kept, again in zip(dataset, vs.render(recipe()), strict=True):
         np.testing.assert_array_equal(kept.objects[0].velocity, again.objects[0].velocity)

@@ -36,7 +36,7 @@ def recipe(**changes):
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("points")
-    vs.generate(recipe(), out, workers=1)
+    vs.generate(recipe(), out)
     return Dataset(out)
 
 

@@ -249,15 +249,23 @@ def test_runs_are_kept_and_have_other_ids_elsewhere():
         _ = replace(sample, channels={}).voxel_grid
 
 
-def test_pictures_are_equal_with_any_number_of_workers_and_check_computes_them_again(tmp_path):
+def grids():
     options = {"size": [30, 20, 30], "cell": 0.03, "distance": 1.0, "bottom": -0.2}
     views = {"azimuth": [0, 120], "elevation": 15, "distance": 1.0}
     kept = ["rgb", "depth", "instances", "voxels"]
-    recipe = small_recipe(channels=kept, formats=[], labels={"voxels": options}, viewpoints=views)
+    return small_recipe(channels=kept, formats=[], labels={"voxels": options}, viewpoints=views)
+
+
+@pytest.mark.slow
+def test_grids_are_equal_with_any_number_of_workers(tmp_path):
     for workers in (0, 2):
-        generate(recipe, tmp_path / str(workers), workers=workers)
+        generate(grids(), tmp_path / str(workers), workers=workers)
     assert tree_hash(tmp_path / "0" / "store" / "shots") == tree_hash(tmp_path / "2" / "store" / "shots")
-    made = Dataset(tmp_path / "0")
+
+
+def test_check_computes_grids_again(tmp_path):
+    generate(grids(), tmp_path)
+    made = Dataset(tmp_path)
     report = check(made)
     assert report.ok and report.checked["voxels"] == len(made)
     grid = made[3].voxel_grid

@@ -55,6 +55,7 @@ def recipe(folder, frames=FRAMES, **fields):
         "viewpoints": {"azimuth": [20, 140], "elevation": 20, "distance": 3},
         "camera": {"size": [72, 54], "fov_deg": 45},
         "channels": ["rgb", *LABELS],
+        "engine": {"name": "raster", "ambient_occlusion": "off"},
         "formats": [],
         "splits": {"train": 1},
     }

@@ -81,14 +81,14 @@ def recipe(folder, **changes):
         "distortion": {"model": "brown_conrady", "coefficients": [-0.1, 0.02, 0.001, 0.0]},
     }
     values = {"camera": camera, "channels": ["rgb", *LABELS], "formats": ["native"], "shot_frames": 1}
-    return small_recipe(**{**values, "scene": scene(folder), **changes})
+    return small_recipe(**{**values, "scene": scene(folder), "engine": {"name": "raster"}, **changes})
 
 
 @pytest.fixture(scope="module")
 def whole(pictures, tmp_path_factory):
-    """By one worker, in this process' order."""
+    """By this process alone."""
     out = tmp_path_factory.mktemp("whole") / "out"
-    generate(recipe(pictures), out, workers=1)
+    generate(recipe(pictures), out)
     return out
 
 

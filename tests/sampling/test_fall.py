@@ -187,7 +187,7 @@ def falling(**changes):
         "orientation": "any",
         "surface": {"size": [0.8, 0.6], "height": 0.4},
     }
-    values = {"scenes": scenes, "channels": ["rgb", "instances"], "formats": [], "splits": {"by": "frame"}, "shot_frames": 1}
+    values = {"scenes": scenes, "channels": ["depth", "instances"], "formats": [], "splits": {"by": "frame"}, "shot_frames": 1}
     return small_recipe(**values, **changes)
 
 

@@ -80,3 +80,43 @@ def test_without_mujoco_it_is_said_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'viewsphere\[physics\]'"):
         World([body_of([ball()], 300.0)], [IDENTITY], (), 0.4)
+
+
+def cube(half=0.2):
+    return half * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+
+
+def on_ice(speed):
+    """A cube without friction that slides as fast as this, metres a second, on the floor."""
+    world = World([body_of([cube()], 300.0, touch=Touch(friction=0.0))], [at(0, 0, 0.2)], (), 0.4)
+    world.step(100)
+    world._data.qvel[0] = speed
+    return world
+
+
+def test_what_creeps_is_held():
+    """A cube on ice goes on for ever; at 5 mm/s it is held, and lies where it is, until it is let go anew."""
+    world = on_ice(0.005)
+    assert world.settle(3.0)
+    assert 0.002 < world.poses[0][0][3] < 0.01
+    before = world.poses[0][0][3]
+    world.step(500)
+    assert abs(world.poses[0][0][3] - before) < 1e-5
+    world.put(0, at(0, 0, 0.2))
+    world._data.qvel[0] = 0.005
+    world.step(500)
+    assert world.poses[0][0][3] == pytest.approx(0.005, rel=0.1)
+
+
+def test_what_is_fast_is_not_held():
+    world = on_ice(0.1)
+    assert not world.settle(1.8)  # before anything is damped
+    assert world.poses[0][0][3] == pytest.approx(0.18, rel=0.05)
+
+
+def test_what_is_held_falls_where_nothing_bears_it():
+    world = on_ice(0.005)
+    assert world.settle(3.0)
+    world._data.qpos[2] += 0.5
+    world.step(100)
+    assert 0.7 - world.poses[0][2][3] == pytest.approx((1 - 0.3) * 9.81 / 2 * 0.2**2, rel=0.05)

@@ -33,6 +33,12 @@ CALM_WAY, CALM_ANGLE = 0.0003, 0.002
 first to the last. The speeds are those of a thing that trembles on the spot, from one corner that touches to the next.
 """
 
+HELD, HELD_ROLLING = 0.3, 10.0
+"""What holds a body that creeps on when all are slow: a friction against going anywhere, of its weight, and how many times more
+than `ROLLING` against turning. Its contacts jump from corner to corner of both hulls and take it along, millimetres a second,
+where a thing would stand.
+"""
+
 DAMPED_S, DAMPING = 2.0, 4.0
 """Seconds after which bodies that settle lose a share of their speed, and how much of it a second: boats rock on otherwise. No
 look that finds them at rest is helped so.
@@ -78,6 +84,7 @@ class World:
     def begin(self, poses: Sequence[Matrix4]) -> None:
         """Let the bodies go from these poses, as in a new world; fences that were taken away stay away."""
         self._data, self._steps = self._mujoco.MjData(self._model), 0
+        self._hold(())
         for number, pose in enumerate(poses):
             self.put(number, pose)
 
@@ -103,8 +110,7 @@ class World:
             at = {"pos": matrix[:3, 3] * self._scale, "quat": quaternion_from_matrix(matrix[:3, :3])}
             self._add(spec, still.add_body(name=f"fixed {number}", **at), f"fixed part {number}", body)
         model = spec.compile()
-        turning = model.dof_frictionloss.reshape(-1, 6)[:, 3:]
-        turning[:] = ROLLING * GRAVITY * model.body_mass[1 : 1 + self._bodies, None]
+        self._weights = GRAVITY * model.body_mass[1 : 1 + self._bodies]
         model.dof_solref[:], model.dof_solimp[:, :2] = (SOFT_S, 1.0), 0.99
         return model
 
@@ -122,6 +128,16 @@ class World:
         matrix = np.array(pose)
         at, speed = self._data.qpos.reshape(-1, 7)[number], self._data.qvel.reshape(-1, 6)[number]
         at[:3], at[3:], speed[:] = matrix[:3, 3] * self._scale, quaternion_from_matrix(matrix[:3, :3]), 0.0
+        self._hold(sorted(self._held - {number}))
+
+    def _hold(self, numbers: Sequence[int] | NDArray[np.int_]) -> None:
+        """Hold these bodies, and no others."""
+        friction = self._model.dof_frictionloss.reshape(-1, 6)
+        friction[:, :3], friction[:, 3:] = 0.0, ROLLING * self._weights[:, None]
+        for number in numbers:
+            friction[number, :3] = HELD * self._weights[number]
+            friction[number, 3:] *= HELD_ROLLING
+        self._held = frozenset(map(int, numbers))
 
     def take_fences_away(self) -> bool:
         """Let bodies go where fences were; whether any leant on one."""
@@ -161,6 +177,7 @@ class World:
         """Let time go by until all bodies are at rest; whether they are before so many simulated seconds are over, and before
         `ends` says that it is of no use. `look` is called every so many steps, and `ends` after it.
         """
+        self._hold(())
         calm: list[Float] = []
         for step in range(each, int(longest_s / STEP_S) + 1, each):
             if calm or self._steps * STEP_S < DAMPED_S:
@@ -173,8 +190,12 @@ class World:
                 return False
             if step % LOOK < each:
                 calm = [*calm, self._data.qpos.reshape(-1, 7).copy()] if self._is_slow else []
-                if len(calm) >= CALM_LOOKS and _is_still(calm[-CALM_LOOKS], calm[-1]):
-                    return True
+                if len(calm) >= CALM_LOOKS:
+                    creeping = _creeping(calm[-CALM_LOOKS], calm[-1])
+                    if not len(creeping):
+                        return True
+                    if len(calm) % CALM_LOOKS == 0:
+                        self._hold(sorted(self._held.union(creeping.tolist())))
         return False
 
     @property
@@ -214,11 +235,11 @@ class World:
         return frozenset((int(min(p)), int(max(p))) for p in owner[pairs])
 
 
-def _is_still(before: Float, now: Float) -> bool:
-    """Whether bodies at rest went no way between two states."""
+def _creeping(before: Float, now: Float) -> NDArray[np.int_]:
+    """Numbers of the bodies that went some way between two states."""
     way = np.linalg.norm(now[:, :3] - before[:, :3], axis=1)
     half = np.abs((now[:, 3:] * before[:, 3:]).sum(axis=1)).clip(0, 1)
-    return bool(way.max() < CALM_WAY and 2 * np.arccos(half).max() < CALM_ANGLE)
+    return np.flatnonzero((way >= CALM_WAY) | (2 * np.arccos(half) >= CALM_ANGLE))
 
 
 def _contact(touch: Touch) -> dict[str, Any]:
