@@ -93,7 +93,7 @@ def paint(
         _lay_sky(view, baked.surrounding, radiance, air)
     if not antialias:
         return
-    behind = differs_behind(visibility, stack, baked.owner, baked.geometry.triangle_normals, radiance)
+    behind = differs_behind(visibility, stack, baked.owner, baked.surfaces.normals, radiance)
     if len(baked.glass.corners) and stack:
         bent = _nearest_glass(baked, stack, len(triangle)) < len(stack)
         kernels_chosen.compare_bent(bent.reshape(visibility.triangle.shape), radiance, behind)
@@ -132,8 +132,8 @@ def _smooth(
     lie in pixels marked in `behind`.
     """
     shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
-    normals = baked.geometry.triangle_normals
-    like, rows = kernels_paint.shared_samples(samples.pixels, *shown, *centres, baked.owner, normals, behind, radiance)
+    surfaces = baked.owner, baked.surfaces.normals
+    like, rows = kernels_paint.shared_samples(samples.pixels, *shown, *centres, *surfaces, behind, radiance)
     at = (4 * rows[:, None] + np.arange(4, dtype=np.int32)).reshape(-1)
     is_own = like[at] == ~np.arange(len(at))
     own = Samples(

@@ -66,7 +66,7 @@ def _mirror(baked: Baked, camera: Camera, visibility: Visibility) -> tuple[NDArr
     polished = (
         baked.surfaces.looks[:, L_ROUGH] + baked.surfaces.looks[:, L_ROUGH_TEXEL] < MATT
     )  # whatever a texture leaves of it
-    is_level = (np.abs(baked.geometry.triangle_normals[:, 2]) > LEVEL) & (baked.kind[:-1] == kernels_paint.SOLID)
+    is_level = (np.abs(baked.surfaces.normals[:, 2]) > LEVEL) & (baked.kind[:-1] == kernels_paint.SOLID)
     is_level &= polished[baked.surfaces.material]
     at = np.flatnonzero((shown >= 0) & is_level[shown])
     if len(at) < LEAST * len(shown):
