@@ -16,7 +16,7 @@ from viewsphere.truth.geometry import Geometry, build_geometry, present
 from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.visibility import rasterize
 
-HELD = [field.name for field in dataclasses.fields(Geometry) if field.name not in ("cutouts", "meshes", "facing")]
+HELD = [field.name for field in dataclasses.fields(Geometry) if field.name not in ("cutouts", "meshes", "facing", "spare")]
 ARRAYS = [*HELD, "vertices", "normals", "triangle_normals", "triangle_side"]
 
 

@@ -17,6 +17,7 @@ from viewsphere.model.classes import GROUND, stuff_of, thing_class
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing
 from viewsphere.truth.cutouts import ENDLESS, NO_CUTOUTS, Cutouts, mesh_cutouts, stack_cutouts
+from viewsphere.truth.sparse import Spare
 
 BACKGROUND = 0
 """Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
@@ -85,6 +86,7 @@ class Geometry:
     object_count: int
     ground_z: float | None
     facing: Facing
+    spare: Spare
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -330,6 +332,7 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         object_count=objects,
         ground_z=None,
         facing=Facing(),
+        spare=Spare(),
     )
     for i in range(len(things)):
         _bound(part, i)
@@ -355,6 +358,7 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
         ground_z=parts[-1].ground_z,
         meshes=tuple(mesh for part in parts for mesh in part.meshes),
         facing=Facing(),
+        spare=Spare(),
     )
 
 
@@ -398,6 +402,7 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         object_count=0,
         ground_z=float(corners[0, 2]),
         facing=Facing(),
+        spare=Spare(),
     )
 
 
