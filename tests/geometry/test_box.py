@@ -8,6 +8,7 @@ from viewsphere.geometry.box import (
     box_size,
     box_vertices,
     clip_to_image,
+    is_behind,
     overlap,
     projected_bounds,
 )
@@ -290,3 +291,19 @@ def test_pose_categories_by_elevation_and_resolution():
     for bad in (0, -45, 50):
         with pytest.raises(ValueError, match="divides 360"):
             pose_category(0, 0, bad)
+
+
+def test_a_box_is_behind_where_none_of_its_corners_is_in_front():
+    """And then nothing of the model has a 2D box; found for as many boxes as there are none for."""
+    rng, found = np.random.default_rng(5), []
+    for _ in range(200):
+        camera = camera_at(rng.uniform(0, 360), rng.uniform(-80, 80), 2.0)
+        low = rng.uniform(-6, 5, 3)
+        corners = box_vertices(low, low + rng.uniform(0.1, 3, 3))
+        depth = corners @ camera.R[2] + camera.t[2]
+        behind = is_behind(camera, np.stack([corners.min(axis=0), corners.max(axis=0)]))
+        assert behind == (depth.max() < 1e-6)
+        if behind:
+            assert bounds_of(camera, corners) == (None, False)
+        found.append(behind)
+    assert 20 < sum(found) < 180

@@ -16,7 +16,7 @@ from viewsphere.truth.geometry import Geometry, build_geometry, present
 from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.visibility import rasterize
 
-HELD = [field.name for field in dataclasses.fields(Geometry) if field.name not in ("cutouts", "meshes", "facing")]
+HELD = [field.name for field in dataclasses.fields(Geometry) if field.name not in ("cutouts", "meshes", "facing", "spare")]
 ARRAYS = [*HELD, "vertices", "normals", "triangle_normals", "triangle_side"]
 
 
@@ -102,6 +102,27 @@ def test_what_deforms_leaves_the_instants_around_it_as_they_are():
         now = [*now, (ring.at(things, meshes), things, meshes)][-ROOMS:]
         for geometry, own, shown in now:
             same(geometry, own, shown, True, None)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_normals_of_some_things_leave_those_of_others_for_later(seed):
+    """Asked for in any order at any instant, of some things or of all: whoever is asked for is as it is then."""
+    rng, ring = np.random.default_rng(seed), Ring(True, 0.3)
+    late = 0
+    for things in [[thing(i, pose(rng)) for i in range(3)] for _ in range(12)]:
+        meshes = [*MESHES, cube(0.3)]
+        geometry, built = ring.at(things, meshes), build_geometry(things, meshes, True, 0.3)
+        asked = rng.permutation(3)[: rng.integers(0, 3)].tolist()
+        for some in ([], asked):
+            found, start = geometry.triangle_normals_of(some), geometry.triangle_start
+            assert len(found) == len(built.triangle_normals)
+            for i in some:
+                assert np.array_equal(found[start[i] : start[i + 1]], built.triangle_normals[start[i] : start[i + 1]])
+            assert np.array_equal(found[start[-1] :], built.triangle_normals[start[-1] :])
+        late += not np.array_equal(geometry.triangle_normals_of(asked), built.triangle_normals)
+        if rng.uniform() < 0.5:
+            same(geometry, things, meshes, True, None)
+    assert late > 3
 
 
 def test_what_is_asked_for_again_is_the_same_object_and_what_moved_is_not():

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewsphere.truth.sparse import LEAST, sparse
+from viewsphere.truth.sparse import LEAST, MOST, Spare, sparse
 
 RESIDENT = Path("/proc/self/statm")
 
@@ -26,6 +26,41 @@ def test_parts_that_are_not_written_take_no_memory():
     array[:: LEAST // 64] = 1.0
     assert resident() - before < LEAST // 4
     assert array[:: LEAST // 64].sum() == 128
+
+
+@pytest.mark.skipif(not hasattr(mmap, "MADV_NOHUGEPAGE"), reason="needs Linux")
+def test_pages_are_used_again_once_nobody_holds_them():
+    spare, count = Spare(), LEAST // 8
+
+    def taken(more=0):
+        return spare.array((count + more, 1), np.float64)
+
+    first = taken()
+    first[3] = 7.0
+    part, other = first[2:5], taken()
+    assert not np.shares_memory(first, other)
+    del first
+    third = taken()
+    assert not np.shares_memory(part, third) and part[1] == 7.0  # a part of it is held
+    place = part.ctypes.data
+    del part
+    again = taken()
+    assert again.ctypes.data == place - 16 and again[3] == 7.0
+    del again
+    larger = taken(1000)
+    larger[:] = 1.0
+    assert len(larger) == count + 1000 and not any(np.shares_memory(larger, each) for each in (other, third))
+
+
+@pytest.mark.skipif(not hasattr(mmap, "MADV_NOHUGEPAGE"), reason="needs Linux")
+def test_what_was_written_long_ago_takes_no_memory():
+    spare, shape = Spare(), (LEAST // 8, 1)
+    for number in range(MOST + 1):
+        array = spare.array(shape, np.float64)
+        if number == 0:
+            array[3] = 7.0
+        assert array[3] == (7.0 if number < MOST else 0.0)
+        del array
 
 
 def resident() -> int:

@@ -47,6 +47,9 @@ EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4),
 NEAR = 1e-6
 """Distance in front of the camera, metres, from which on geometry is projected; nearer parts are cut off."""
 
+ROUNDING = 1e-9
+"""By how much, in metres a metre, a sum of coordinates may miss the depth that it stands for: generously."""
+
 KNOTS = 1024
 """Steps, from its axis to its limit, of the table that says how much the lens bends lines."""
 
@@ -76,6 +79,13 @@ def clip_to_image(bounds: Bounds, width: int, height: int) -> Bounds | None:
 def overlap(a: Bounds, b: Bounds) -> bool:
     """Whether two 2D boxes share more than an edge."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def is_behind(camera: Camera, bounds: Float) -> bool:
+    """Whether nothing in a box in the world, its lowest and its highest corner (2, 3), is in front of a pinhole's z = NEAR."""
+    terms = camera.R[2] * bounds
+    farthest = float(terms.max(axis=0).sum() + camera.t[2])
+    return farthest + ROUNDING * (1 + float(np.abs(terms).max())) < NEAR
 
 
 def projected_bounds(

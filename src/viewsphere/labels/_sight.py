@@ -6,13 +6,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.box import Bounds, overlap, projected_bounds
+from viewsphere.geometry.box import Bounds, is_behind, overlap, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
@@ -205,19 +204,16 @@ class Sight:
     @cached_property
     def projected(self) -> tuple[tuple[Bounds | None, bool], ...]:
         """For each object the 2D box of its projected triangles, and whether the lens shows all of them."""
-        g, count = self.geometry, self.geometry.object_count
-        parts, points = pairwise(g.triangle_start[: count + 1]), pairwise(g.vertex_start[: count + 1])
-        return tuple(
-            projected_bounds(
-                self.camera,
-                g.places(i),
-                g.triangles[first:stop] - np.int32(base),
-                (0, stop - first),
-                (0, end - base),
-                g.is_used[base:end],
-            )
-            for i, ((first, stop), (base, end)) in enumerate(zip(parts, points, strict=True))
-        )
+        return tuple(self._projected(i) for i in range(self.geometry.object_count))
+
+    def _projected(self, i: int) -> tuple[Bounds | None, bool]:
+        g = self.geometry
+        (first, stop), (base, end) = g.triangle_start[i : i + 2], g.vertex_start[i : i + 2]
+        if first < stop and self.camera.distortion is None and is_behind(self.camera, g.bounds[i]):
+            return None, False
+        faces, points = (0, stop - first), (0, end - base)
+        triangles = g.triangles[first:stop] - np.int32(base)
+        return projected_bounds(self.camera, g.places(i), triangles, faces, points, g.is_used[base:end])
 
     def is_unobstructed(self, i: int) -> bool:
         """Whether nothing can hide any part of the object of id i + 1: its 2D box meets no other object's box, there is no

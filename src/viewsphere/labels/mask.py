@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,17 @@ def compute(sight: Sight, i: int) -> Mapping[str, Any]:
     """Run lengths and area of the pixels that show the object."""
     seen, camera = sight.instances, sight.camera
     area = int(seen.area[i + 1])
-    x0, y0, x1, y1 = seen.box[i + 1].tolist() if area else (0, 0, 0, 0)
+    if not area:
+        return {"rle": _nothing(camera.height, camera.width), "area": 0}
+    x0, y0, x1, y1 = seen.box[i + 1].tolist()
     counts = rle_of_part(camera.height, camera.width, seen.ids[y0:y1, x0:x1] == i + 1, x0, y0)
     return {"rle": Rle(camera.height, camera.width, counts), "area": area}
+
+
+@lru_cache(maxsize=16)
+def _nothing(height: int, width: int) -> Rle:
+    """The mask of what is not seen: of most things of a street."""
+    return Rle(height, width, rle_of_part(height, width, np.zeros((0, 0), np.bool_), 0, 0))
 
 
 def restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import accumulate, pairwise
@@ -17,6 +17,7 @@ from viewsphere.model.classes import GROUND, stuff_of, thing_class
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing
 from viewsphere.truth.cutouts import ENDLESS, NO_CUTOUTS, Cutouts, mesh_cutouts, stack_cutouts
+from viewsphere.truth.sparse import Spare
 
 BACKGROUND = 0
 """Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
@@ -85,6 +86,7 @@ class Geometry:
     object_count: int
     ground_z: float | None
     facing: Facing
+    spare: Spare
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -100,6 +102,10 @@ class Geometry:
     def triangle_normals(self) -> NDArray[np.float32]:
         """Of the triangles (T, 3), world, unit, by winding; zero for a degenerate triangle."""
         return self.facing.of_triangles(self)[0][: len(self.triangle_object)]
+
+    def triangle_normals_of(self, things: Iterable[int]) -> NDArray[np.float32]:
+        """`triangle_normals`, of which only those of these things and of the ground are sure to be as they are now."""
+        return self.facing.of_triangles(self, things)[0][: len(self.triangle_object)]
 
     @property
     def triangle_side(self) -> NDArray[np.int8]:
@@ -146,7 +152,7 @@ class Facing:
 
     _vertices: NDArray[np.float32] | None = None
     _triangles: tuple[NDArray[np.float32], NDArray[np.int8]] | None = None
-    _shown: dict[str, tuple[Corner, tuple[Mesh, ...]]] = field(default_factory=dict[str, "tuple[Corner, tuple[Mesh, ...]]"])
+    _shown: dict[str, _Shown] = field(default_factory=dict[str, "_Shown"])
 
     def of_vertices(self, geometry: Geometry) -> NDArray[np.float32]:
         """Their normals."""
@@ -158,8 +164,10 @@ class Facing:
             _turn(geometry, i, self._vertices[own])
         return self._vertices
 
-    def of_triangles(self, geometry: Geometry) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
-        """Their normals and sides."""
+    def of_triangles(
+        self, geometry: Geometry, things: Iterable[int] | None = None
+    ) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
+        """Their normals and sides; only those of these things are sure to be written, where any are given."""
         from viewsphere.truth import kernels_place as kernels
 
         if self._triangles is None or len(self._triangles[1]) < len(geometry.triangles):
@@ -170,7 +178,7 @@ class Facing:
                 start, base = geometry.triangle_start[-1], geometry.vertex_start[-1]
                 normals, side = (array[start:] for array in self._triangles)
                 kernels.face(geometry.ground, np.tile(UP, (4, 1)), geometry.triangles[start:], base, normals, side)
-        for i in self._elsewhere("triangles", geometry):
+        for i in self._elsewhere("triangles", geometry, things):
             first, stop, base = *geometry.triangle_start[i : i + 2], geometry.vertex_start[i]
             normals, side = (array[first:stop] for array in self._triangles)
             turned = np.empty((geometry.vertex_start[i + 1] - base, 3), np.float32)
@@ -178,14 +186,30 @@ class Facing:
             kernels.face(geometry.places(i), turned, geometry.triangles[first:stop], base, normals, side)
         return self._triangles
 
-    def _elsewhere(self, name: str, geometry: Geometry) -> list[int]:
-        """Which things have moved, or deformed, since these arrays were written."""
-        if name in self._shown and self._shown[name][0] is geometry.poses:
+    def _elsewhere(self, name: str, geometry: Geometry, things: Iterable[int] | None = None) -> list[int]:
+        """Which things, of these if any are given, have moved, or deformed, since these arrays were written."""
+        if name not in self._shown:
+            self._shown[name] = _Shown(np.full_like(geometry.poses, np.nan), list(geometry.meshes))
+        shown = self._shown[name]
+        if shown.all_of is geometry.poses:
             return []
-        poses, meshes = self._shown.get(name, (np.full_like(geometry.poses, np.nan), geometry.meshes))
-        self._shown[name] = geometry.poses, geometry.meshes
-        moved = (poses != geometry.poses).any(axis=(1, 2)).tolist()
-        return [i for i, (was, now) in enumerate(zip(meshes, geometry.meshes, strict=True)) if moved[i] or was is not now]
+        moved = (shown.poses != geometry.poses).any(axis=(1, 2)).tolist()
+        every = range(len(moved)) if things is None else things
+        found = [i for i in every if moved[i] or shown.meshes[i] is not geometry.meshes[i]]
+        shown.poses[found] = geometry.poses[found]
+        for i in found:
+            shown.meshes[i] = geometry.meshes[i]
+        shown.all_of = geometry.poses if things is None else None
+        return found
+
+
+@dataclass(eq=False)
+class _Shown:
+    """The poses (N, 4, 4) and meshes that were written of each thing; all_of: the poses of a geometry, if they are these."""
+
+    poses: Corner
+    meshes: list[Mesh]
+    all_of: Corner | None = None
 
 
 def _turn(geometry: Geometry, i: int, turned: NDArray[np.float32]) -> None:
@@ -308,6 +332,7 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         object_count=objects,
         ground_z=None,
         facing=Facing(),
+        spare=Spare(),
     )
     for i in range(len(things)):
         _bound(part, i)
@@ -333,6 +358,7 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
         ground_z=parts[-1].ground_z,
         meshes=tuple(mesh for part in parts for mesh in part.meshes),
         facing=Facing(),
+        spare=Spare(),
     )
 
 
@@ -376,6 +402,7 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         object_count=0,
         ground_z=float(corners[0, 2]),
         facing=Facing(),
+        spare=Spare(),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -87,7 +87,7 @@ class Ring:
 
     def _held(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None) -> _Room | None:
         for number, room in enumerate(self._rooms):
-            if room.floor == floor and not room.changed(things, meshes):
+            if room.floor == floor and next(changes(room.things, room.meshes, things, meshes), None) is None:
                 return self._rooms.pop(number)
         return None
 
@@ -115,10 +115,16 @@ class Ring:
 
 def changed(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
     """Which of the same still things are elsewhere now, or have other meshes."""
+    return list(changes(before, own, now, meshes))
+
+
+def changes(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> Iterator[int]:
+    """`changed`, one after another: whether anything is elsewhere is known by the first."""
     if before is now and own is meshes:
-        return []
-    held = zip(before, own, now, meshes, strict=True)
-    return [i for i, (a, m, b, n) in enumerate(held) if m is not n or (a is not b and a.motion.poses != b.motion.poses)]
+        return
+    for i, (a, m, b, n) in enumerate(zip(before, own, now, meshes, strict=True)):
+        if m is not n or (a is not b and a.motion.poses != b.motion.poses):
+            yield i
 
 
 def differs_in_shape_only(a: Mesh, b: Mesh) -> bool:

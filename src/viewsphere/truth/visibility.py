@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from viewsphere.geometry.camera import Window, has_unit_rays, pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.sparse import sparse
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
 
@@ -153,7 +152,7 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     if base or stop is not None or camera.distortion is not None:
         return projected(geometry, m, base, stop)
     end, without = len(geometry.coordinates), outside(geometry, camera, m)
-    q = sparse((end, 4), np.float64)
+    q = geometry.spare.array((end, 4), np.float64)
     starts = zip(geometry.vertex_start, without.tolist(), strict=False)
     q[[start for start, is_left_out in starts if is_left_out and start < end]] = OUTSIDE
     for first, last in _shown(without, geometry.vertex_start, end).tolist():

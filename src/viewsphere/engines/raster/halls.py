@@ -78,7 +78,8 @@ class Halls:
         key = (own.things, own.meshes), lengths, ground_z, floor.tobytes()
         has_map = ground_z is not None and not arranged.has_scenery
         limits = own.which, own.low, own.high
-        return Hall(key, casters.surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map)
+        surfaces = casters.surfaces._replace(normals=arranged.geometry.triangle_normals_of(_still(arranged)))
+        return Hall(key, surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map)
 
     def _throwing(self, arranged: Arranged, rows: Rows, only_indoors: bool) -> _Throwing:
         still, surfaces, lengths = _still(arranged), rows.surfaces, rows.lengths

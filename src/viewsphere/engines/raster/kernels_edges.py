@@ -142,10 +142,12 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
                         found[n] = row << U(16) | U(x)
                         n += U(before > limit[row, U(x)])
                 else:
-                    for k in range(U(starts[y]), U(starts[y + 1])):
-                        x = pixels[k] - y * width
-                        found[n] = row << U(16) | U(x)
-                        n += U((x >= left) & (x <= right))
+                    k, last = _first_from(pixels, starts[y], starts[y + 1], y * width + left), U(starts[y + 1])
+                    while k < last and pixels[k] <= y * width + right:
+                        x = U(pixels[k] - y * width)
+                        found[n] = row << U(16) | x
+                        n += U(before > limit[row, x])
+                        k += U(1)
             for j in range(n):
                 row, column = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF))
                 k = grid[row, column]
@@ -172,6 +174,18 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
                     count += 1
                 limit[row, column] = put_before(which, inverse, np.int32(t), nearest, seen, u)
     return count
+
+
+@inner
+def _first_from(pixels, first, last, least):
+    """The first of pixels[first:last], which are in order, that is `least` or more; `last` where none is."""
+    while first < last:
+        middle = (first + last) >> 1
+        if pixels[U(middle)] < least:
+            first = middle + 1
+        else:
+            last = middle
+    return U(first)
 
 
 @inner

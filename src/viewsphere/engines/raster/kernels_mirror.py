@@ -1,44 +1,110 @@
-"""Blurs what mirrors show."""
+"""Where mirrors are looked at, what blurs in them, and how it is laid over them."""
 
 from __future__ import annotations
 
+import math
+
+import numba as nb
 import numpy as np
 
 from viewsphere.kernels.jit import njit
 
+f4 = nb.float32
+U = nb.uintp
+COLUMNS = 4  # of what is blurred: light, and how much of it is known
+
+
+@njit
+def meet(at, width, rays, camera_from_pixel, rotation, center, inverse_depth, cosine, place):
+    """Fill cosine (n,), of the rays of pixels `at` (n,) to the vertical, and place (n, 3), which they meet in the world.
+
+    rays (H * W, 3): of a distorted lens, in the camera's axes; empty for a pinhole, whose are those of `camera_from_pixel`.
+    rotation, center: camera from world axes, and where the camera is.
+    """
+    a, b, c = U(0), U(1), U(2)
+    for i in range(U(at.shape[0])):
+        p = U(at[i])
+        if rays.shape[0] != 0:
+            x, y, z = rays[p, a], rays[p, b], rays[p, c]
+        else:
+            u, v, m = at[i] % width + 0.5, at[i] // width + 0.5, camera_from_pixel
+            x, y, z = m[a, a] * u + m[a, b] * v + m[a, c], m[b, b] * v + m[b, c], 1.0
+        far, squared, down = 1.0 / np.float64(inverse_depth[p]), 0.0, 0.0
+        for k in range(U(3)):
+            down = x * rotation[a, k] + y * rotation[b, k] + z * rotation[c, k]
+            place[i, k] = center[k] + down * far
+            squared += down * down
+        cosine[i] = min(max(-down / math.sqrt(squared), 0.0), 1.0)
+
+
+@njit
+def spread_out(own, image, rows):
+    """Put image (n, 3) into rows `own` (n,) of rows (N, COLUMNS), with 1 in the last column."""
+    for i in range(U(own.shape[0])):
+        p = U(own[i])
+        rows[p, U(0)], rows[p, U(1)], rows[p, U(2)], rows[p, U(3)] = image[i, U(0)], image[i, U(1)], image[i, U(2)], f4(1)
+
+
+@njit
+def gather_means(own, rows, means):
+    """The opposite, after sums over neighbours: means (n, 3)."""
+    for i in range(U(own.shape[0])):
+        p = U(own[i])
+        count = max(rows[p, U(3)], f4(1e-6))
+        for c in range(U(3)):
+            means[i, c] = rows[p, c] / count
+
 
 @njit(_nrt=True)
 def box_down(values, reach, out):
-    """Sums over `reach` neighbours above and below of values (H, W, C) float32, into out."""
-    height, width, columns = values.shape
-    total = np.zeros((width, columns), np.float64)
+    """Sums over `reach` neighbours above and below of values (H, N) float32, into out."""
+    height, across = values.shape[0], U(values.shape[1])
+    total = np.zeros(across, np.float64)
     for y in range(-reach, height):
         if y + reach < height:
-            for x in range(width):
-                for c in range(columns):
-                    total[x, c] += values[y + reach, x, c]
+            for x in range(across):
+                total[x] += values[U(y + reach), x]
         if y - reach > 0:
-            for x in range(width):
-                for c in range(columns):
-                    total[x, c] -= values[y - reach - 1, x, c]
+            for x in range(across):
+                total[x] -= values[U(y - reach - 1), x]
         if y >= 0:
-            for x in range(width):
-                for c in range(columns):
-                    out[y, x, c] = total[x, c]
+            for x in range(across):
+                out[U(y), x] = total[x]
 
 
-@njit(_nrt=True)
+@njit
 def box_across(values, reach, out):
-    """Sums over `reach` neighbours on the left and on the right."""
-    height, width, columns = values.shape
-    total = np.zeros(columns, np.float64)
-    for y in range(height):
-        total[:] = 0
+    """Sums over `reach` neighbours on the left and on the right of values (H, W, COLUMNS) float32, into out."""
+    height, width = values.shape[0], values.shape[1]
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    for y in range(U(height)):
+        p, q, r, s = 0.0, 0.0, 0.0, 0.0
         for x in range(-reach, width):
-            for c in range(columns):
-                if x + reach < width:
-                    total[c] += values[y, x + reach, c]
-                if x - reach > 0:
-                    total[c] -= values[y, x - reach - 1, c]
-                if x >= 0:
-                    out[y, x, c] = total[c]
+            if x + reach < width:
+                i = U(x + reach)
+                p, q, r, s = p + values[y, i, a], q + values[y, i, b], r + values[y, i, c], s + values[y, i, d]
+            if x - reach > 0:
+                i = U(x - reach - 1)
+                p, q, r, s = p - values[y, i, a], q - values[y, i, b], r - values[y, i, c], s - values[y, i, d]
+            if x >= 0:
+                i = U(x)
+                out[y, i, a], out[y, i, b], out[y, i, c], out[y, i, d] = p, q, r, s
+
+
+@njit
+def polish(at, gloss, near, soft, nearness, inverse_depth, sharp, matt, radiance):
+    """Put what is mirrored in place of what pixels `at` (n,) of radiance (H * W, 4) were taken to mirror.
+
+    gloss (n, 7): see `kernels_split.gloss`; near, soft (n, 3): the mirror image of what is near and of what is far from the
+    mirror; nearness (n,): one over the depth of its things; sharp, matt: roughness up to which it counts in full, and from
+    which on not at all.
+    """
+    for i in range(U(at.shape[0])):
+        p = U(at[i])
+        far = min(max(f4(1) - nearness[i] / inverse_depth[p], f4(0)), f4(1))
+        blur = min(f4(2) * far, f4(1))
+        share = min(max((matt - gloss[i, U(6)]) / (matt - sharp), f4(0)), f4(1))
+        for c in range(U(3)):
+            shown = near[i, c] + (soft[i, c] - near[i, c]) * blur
+            change = gloss[i, c] * shown - gloss[i, U(3) + c]
+            radiance[p, c] = max(radiance[p, c] + share * change, f4(0))

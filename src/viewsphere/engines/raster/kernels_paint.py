@@ -318,3 +318,34 @@ def average_samples(pixels, like, samples, radiance):
         for c in range(4):
             radiance[U(pixels[i]), c] = means[i, c]
     return glints[:count], whole[:count]
+
+
+@njit(_nrt=True)
+def brighten_lines(pixels, means, width, radiance):
+    """Brighten pixels (G,) of radiance (H * W, 4) whose glints were dimmed towards their true means (G, 3), until they are as
+    bright as the second brightest pixel around: so a bright line keeps its brightness.
+    """
+    height, shares = radiance.shape[0] // width, np.empty(pixels.shape[0], np.float32)
+    for i in range(U(pixels.shape[0])):
+        p = U(pixels[i])
+        for c in range(U(3)):  # pixels around see the true means of one another
+            means[i, c], radiance[p, c] = radiance[p, c], means[i, c]
+    for i in range(U(pixels.shape[0])):
+        y, x, first, second = pixels[i] // width, pixels[i] % width, f4(0), f4(0)
+        for v in range(max(y - 1, 0), min(y + 2, height)):
+            for u in range(max(x - 1, 0), min(x + 2, width)):
+                if v != y or u != x:
+                    level = _brightest(radiance[U(v * width + u)])
+                    first, second = max(first, level), max(second, min(first, level))
+        dim = _brightest(means[i])
+        whole = _brightest(radiance[U(pixels[i])]) - dim
+        shares[i] = min(max((second - dim) / max(whole, f4(1e-6)), f4(0)), f4(1))
+    for i in range(U(pixels.shape[0])):
+        p = U(pixels[i])
+        for c in range(U(3)):
+            radiance[p, c] = means[i, c] + (radiance[p, c] - means[i, c]) * shares[i]
+
+
+@inner
+def _brightest(color):
+    return max(color[U(0)], color[U(1)], color[U(2)])

@@ -55,10 +55,13 @@ def _alpha(surfaces, textures, t, g, h):
 
 
 @njit
-def see_vertices(places, matrix, corners):
-    """(V, 4): a view's matrix times each place (V, 3). Without BLAS, whose threads wait for one another on busy cores."""
-    for i in range(U(places.shape[0])):
-        x, y, z = places[i, U(0)], places[i, U(1)], places[i, U(2)]
+def see_vertices(vertices, base, matrix, corners):
+    """(N, 4): a view's matrix times the places of as many of `Surfaces.vertices`, from `base` on. Without BLAS, whose threads
+    wait for one another on busy cores.
+    """
+    for i in range(U(corners.shape[0])):
+        v = U(base) + i
+        x, y, z = vertices[v, U(11)], vertices[v, U(12)], vertices[v, U(13)]
         for k in range(U(4)):
             corners[i, k] = matrix[k, U(0)] * x + matrix[k, U(1)] * y + matrix[k, U(2)] * z + matrix[k, U(3)]
 
@@ -92,12 +95,12 @@ def _between(a, b, c, low, high):
 
 
 @njit
-def draw_depth(corners, surfaces, textures, begin, tilt, nearest, farthest):  # noqa: PLR0912, PLR0915, one loop
+def draw_depth(corners, base, surfaces, textures, begin, tilt, nearest, farthest):  # noqa: PLR0912, PLR0915, one loop
     """Draw q of all triangles at the texels' centres: the least into nearest (n, n + GAP), the greatest into farthest.
 
-    corners (V, 4) float64: the vertices seen from a view. Only points with w >= begin are drawn, or, where `tilt` is one over
-    the squared texels per length, points at least that far from the eye; and only where a surface's alpha reaches its
-    material's L_CASTS_FROM. farthest may be (0, 0) if it is not needed.
+    corners (N, 4) float64: the vertices from `base` on seen from a view. Only points with w >= begin are drawn, or, where
+    `tilt` is one over the squared texels per length, points at least that far from the eye; and only where a surface's alpha
+    reaches its material's L_CASTS_FROM. farthest may be (0, 0) if it is not needed.
     """
     size = nearest.shape[0]
     half, last = 0.5 * size, size - 1.0
@@ -108,7 +111,7 @@ def draw_depth(corners, surfaces, textures, begin, tilt, nearest, farthest):  # 
         threshold = looks[own[t], L_CASTS_FROM]
         if threshold > f4(1):
             continue
-        i, j, k = U(triangles[t, 0]), U(triangles[t, 1]), U(triangles[t, 2])
+        i, j, k = U(triangles[t, 0]) - U(base), U(triangles[t, 1]) - U(base), U(triangles[t, 2]) - U(base)
         ax, ay, aw = corners[i, 0], corners[i, 1], corners[i, 3]
         bx, by, bw = corners[j, 0], corners[j, 1], corners[j, 3]
         cx, cy, cw = corners[k, 0], corners[k, 1], corners[k, 3]

@@ -204,8 +204,8 @@ def _cover(b):
 
 @njit(fastmath=FAST, _nrt=True)
 def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
-    """Set rows `slots` of `out` (S, 7) float32 to what samples mirror of their surroundings: its shares of red, green and blue,
-    the light that they are taken to mirror, and the roughness.
+    """Set `out` (N, 7) float32 to what the samples in `slots` (N,) mirror of their surroundings: its shares of red, green and
+    blue, the light that they are taken to mirror, and the roughness.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -220,7 +220,7 @@ def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slot
         ambient(count, surrounding, bounces, b)
         _cover(count, b)
         for i in range(U(count)):
-            q = U(slots[U(start) + i])
+            q = U(start) + i
             for c in range(U(3)):
                 out[q, c], out[q, U(3) + c] = b[U(FACE_R) + c * U(BLOCK) + i], b[U(SR) + c * U(BLOCK) + i]
             out[q, U(6)] = b[U(ROUGH) + i]

@@ -405,10 +405,10 @@ def _draw(
     if not len(surfaces.triangles):
         return
     first, stop = int(surfaces.triangles.min()), int(surfaces.triangles.max()) + 1
-    corners = np.empty((stop, 4))  # those before the first are not looked at
-    kernels.see_vertices(np.ascontiguousarray(surfaces.vertices[first:stop, 11:14]), view.matrix, corners[first:])
+    corners = np.empty((stop - first, 4))
+    kernels.see_vertices(surfaces.vertices, first, view.matrix, corners)
     other = np.empty((0, 0), np.float32) if farthest is None else farthest
-    kernels.draw_depth(corners, surfaces, textures, view.near, tilt, nearest, other)
+    kernels.draw_depth(corners, first, surfaces, textures, view.near, tilt, nearest, other)
 
 
 def _begin(view: ShadowView, tilt: float, casters: Casters, nearest: Float32) -> tuple[Part, ...]:

@@ -12,10 +12,11 @@ from viewsphere.engines.raster import kernels_mirror as kernels
 from viewsphere.engines.raster.environment import sky_behind
 from viewsphere.engines.raster.painting import NO_SPLIT, Baked, shade_all, view_of
 from viewsphere.engines.raster.records import Float32
-from viewsphere.geometry.camera import pixel_rays
+from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.model.camera import Camera
+from viewsphere.truth.cutouts import NEVER
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility, rasterize
+from viewsphere.truth.visibility import Visibility, lens_rays, rasterize
 
 Float = NDArray[np.float64]
 
@@ -36,24 +37,33 @@ class Mirrored(NamedTuple):
 
 def lying(geometry: Geometry, height: float) -> NDArray[np.bool_]:
     """Which triangles (T,) lie below a height altogether."""
-    below = np.concatenate([*(geometry.places(i)[:, 2] for i in range(len(geometry.poses))), geometry.ground[:, 2]]) < height
-    return np.all(below[geometry.triangles], axis=1)
+    found = np.zeros(len(geometry.triangles), np.bool_)
+    low, high = geometry.bounds[..., 2].T
+    found[geometry.triangle_start[-1] :] = geometry.ground_z is not None and geometry.ground_z < height
+    for i in np.flatnonzero(low < height).tolist():
+        first, stop = geometry.triangle_start[i : i + 2]
+        is_below = geometry.places(i)[:, 2] < height if high[i] >= height else None
+        own = geometry.triangles[first:stop] - np.int32(geometry.vertex_start[i])
+        found[first:stop] = True if is_below is None else is_below[own].all(axis=1)
+    return found
 
 
 def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> tuple[Float, Float]:
     """Cosines (n,) of these pixels' rays to the vertical, and the places (n, 3) of the world that they meet."""
-    ray = pixel_rays(camera.intrinsics).reshape(-1, 3)[at] @ camera.R
-    cosine = np.clip(-ray[:, 2] / np.linalg.norm(ray, axis=1), 0, 1)
-    return cosine, camera.center + ray / visibility.inverse_depth.reshape(-1)[at][:, None]
+    rays, camera_from_pixel = lens_rays(camera), inverse_camera_matrix(camera.intrinsics)
+    table = np.zeros((0, 3)) if rays is None else rays.reshape(-1, 3)
+    table.setflags(write=False)  # as those of a lens are: the kernel is compiled once
+    cosine, place = np.empty(len(at)), np.empty((len(at), 3))
+    pose, depth = (camera.R, camera.center), visibility.inverse_depth.reshape(-1)
+    kernels.meet(at, camera.width, table, camera_from_pixel, *pose, depth, cosine, place)
+    return cosine, place
 
 
 def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bool_], at: NDArray[np.intp]) -> Mirrored:
     """What a mirror at the height `plane` shows in the pixels `at` (n,), without the triangles `left_out` (T,)."""
     below = _below(camera, plane)
-    corner = baked.geometry.triangles[:, :1]
-    kept = np.where(left_out[:, None], corner, baked.geometry.triangles)
-    geometry = replace(baked.geometry, triangles=kept)
-    own = replace(baked, geometry=geometry, blended=replace(baked.blended, triangles=kept))
+    geometry, blended = (_without(geometry, left_out) for geometry in (baked.geometry, baked.blended))
+    own = replace(baked, geometry=geometry, blended=blended)
     found, view = rasterize(geometry, below), view_of(baked, below)
     baked.rows.write_seen(below, found, geometry)
     triangle, depth = np.full(found.triangle.size, -1, np.int32), np.zeros(found.triangle.size, np.float32)
@@ -68,6 +78,11 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
     return Mirrored(np.minimum(light[at, :3], BRIGHTEST), light[at, 3:], sky[at, :3], depth[at])
 
 
+def _without(geometry: Geometry, left_out: NDArray[np.bool_]) -> Geometry:
+    """The same, but these triangles (T,) are never seen."""
+    return replace(geometry, triangle_cutout=np.where(left_out, np.int32(NEVER), geometry.triangle_cutout))
+
+
 def _below(camera: Camera, plane: float) -> Camera:
     """The mirror image of a camera in a level plane: it sees things where their mirror images are."""
     turned = camera.R * np.array([1.0, 1.0, -1.0])
@@ -78,11 +93,13 @@ def _below(camera: Camera, plane: float) -> Camera:
 def blurred(image: Float32, at: NDArray[np.intp], camera: Camera, reach: tuple[int, int]) -> Float32:
     """The mean (n, 3) of mirror images (n, 3) around each pixel of `at` (n,), so many pixels down and across."""
     first, last = int(at.min()) // camera.width, int(at.max()) // camera.width
-    rows = np.zeros((last - first + 1, camera.width, 4), np.float32)
-    flat, own = rows.reshape(-1, 4), at - first * camera.width
-    flat[own, :3], flat[own, 3] = image, 1
+    rows = np.zeros((last - first + 1, camera.width, kernels.COLUMNS), np.float32)
+    own = at - first * camera.width
+    kernels.spread_out(own, image, rows.reshape(-1, kernels.COLUMNS))
     other = np.empty_like(rows)
     for _ in range(2):  # two boxes are nearly a bell
-        kernels.box_down(rows, reach[0], other)
+        kernels.box_down(rows.reshape(len(rows), -1), reach[0], other.reshape(len(rows), -1))
         kernels.box_across(other, reach[1], rows)
-    return np.divide(flat[own, :3], np.maximum(flat[own, 3:], 1e-6), dtype=np.float32)
+    means = np.empty((len(at), 3), np.float32)
+    kernels.gather_means(own, rows.reshape(-1, kernels.COLUMNS), means)
+    return means

@@ -20,7 +20,7 @@ from viewsphere.engines.raster.kernels_arrive import DISTANT
 from viewsphere.engines.raster.kernels_block import BLOCK, ROWS
 from viewsphere.engines.raster.lights import Casters, Lights, Views, draw_views, parallel_view
 from viewsphere.engines.raster.records import Float32
-from viewsphere.geometry.rotation import transform
+from viewsphere.geometry.rotation import product, transform
 
 Float = NDArray[np.float64]
 Quality = Literal["off", "fast", "fine"]
@@ -163,8 +163,7 @@ def with_ground_light(occlusion: Occlusion, lights: Lights, ambient: float) -> O
     if not occlusion.floor_frame[:, 5].any():
         return occlusion
     floor = occlusion.floor.copy()
-    for k in range(len(floor)):
-        floor[k, ..., 1] = _all_light(occlusion, k, lights, ambient)
+    floor[..., 1] = _all_light(occlusion, lights, ambient)
     return occlusion._replace(floor=floor)
 
 
@@ -176,25 +175,26 @@ def of_ground_alone(occlusion: Occlusion) -> Occlusion:
     return occlusion._replace(frame=frame, floor=floor)
 
 
-def _all_light(occlusion: Occlusion, k: int, lights: Lights, ambient: float) -> Float:
-    """Share of all light that reaches the cells of map k, (n, n)."""
-    cells, left, front, z, height = (float(v) for v in occlusion.floor_frame[k, :5])
-    sky = occlusion.floor[k, ..., 0]
-    at = (np.arange(len(sky)) + 0.5) / cells
-    x, y = np.meshgrid(left + at, front + at)
-    pose = occlusion.pose[k].reshape(3, 4).astype(np.float64)
+def _all_light(occlusion: Occlusion, lights: Lights, ambient: float) -> Float:
+    """Share of all light that reaches the cells of the maps, (N, n, n)."""
+    sky = occlusion.floor[..., 0]
+    cells, left, front, z, height = (v[:, None, None] for v in occlusion.floor_frame.T[:5].astype(np.float64))
+    at = (np.arange(sky.shape[1]) + 0.5) / cells
+    pose = occlusion.pose.reshape(-1, 3, 4).astype(np.float64)
     arrived, whole = ambient * sky, np.full(sky.shape, ambient)
     for which, kind in enumerate(lights.kind.tolist()):
         # What lamps give the ground around has their shadows taken off already; what lies on it keeps their light in.
         is_lamp = kind != DISTANT
-        depth = 0.02 * height if is_lamp and occlusion.frame[k, 6] else 0.0  # scenery may be the ground
-        places = np.stack([x, y, np.full_like(x, z - depth)], axis=-1).reshape(-1, 3)
-        irradiance, share = arriving(lights, which, transform(pose[:, :3].T, places - pose[:, 3]), 2 / cells)
-        got = irradiance.sum(axis=1)
-        arrived = arrived + (got * share).reshape(x.shape)
-        whole = whole + (got * share if is_lamp else got).reshape(x.shape)
+        depth = 0.02 * height * (occlusion.frame[:, 6, None, None] != 0) if is_lamp else 0.0  # scenery may be the ground
+        places = np.stack(np.broadcast_arrays(left + at, (front + at).transpose(0, 2, 1), z - depth), axis=1)
+        turned = product(pose[..., :3].transpose(0, 2, 1), places.reshape(len(sky), 3, -1) - pose[..., 3:])
+        width = np.repeat(2 / cells, sky[0].size)
+        irradiance, share = arriving(lights, which, turned.transpose(0, 2, 1).reshape(-1, 3), width)
+        got, share = irradiance.sum(axis=1).reshape(sky.shape), share.reshape(sky.shape)
+        arrived = arrived + got * share
+        whole = whole + (got * share if is_lamp else got)
     reaching = np.minimum(arrived / np.maximum(whole, 1e-30), 1)
-    return 1 - np.where(whole > 0, 1 - reaching, 0) * _window(len(sky))
+    return 1 - np.where(whole > 0, 1 - reaching, 0) * _window(sky.shape[1])
 
 
 def sky_directions(axes: int) -> Float32:

@@ -27,7 +27,6 @@ from viewsphere.truth.visibility import Visibility, lens_rays
 _NO_RAYS = np.zeros((0, 3), np.float32)
 _NO_PLACES = np.zeros((0, 2), np.float32)
 NO_SPLIT = np.zeros((0, 0), np.float32)
-_AROUND = np.array([[-1, -1, -1, 0, 0, 1, 1, 1], [-1, 0, 1, -1, 1, -1, 0, 1]], np.int32)[..., None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +92,7 @@ def paint(
         _lay_sky(view, baked.surrounding, radiance, air)
     if not antialias:
         return
-    behind = differs_behind(visibility, stack, baked.owner, baked.geometry.triangle_normals, radiance)
+    behind = differs_behind(visibility, stack, baked.owner, baked.surfaces.normals, radiance)
     if len(baked.glass.corners) and stack:
         bent = _nearest_glass(baked, stack, len(triangle)) < len(stack)
         kernels_chosen.compare_bent(bent.reshape(visibility.triangle.shape), radiance, behind)
@@ -132,8 +131,8 @@ def _smooth(
     lie in pixels marked in `behind`.
     """
     shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
-    normals = baked.geometry.triangle_normals
-    like, rows = kernels_paint.shared_samples(samples.pixels, *shown, *centres, baked.owner, normals, behind, radiance)
+    surfaces = baked.owner, baked.surfaces.normals
+    like, rows = kernels_paint.shared_samples(samples.pixels, *shown, *centres, *surfaces, behind, radiance)
     at = (4 * rows[:, None] + np.arange(4, dtype=np.int32)).reshape(-1)
     is_own = like[at] == ~np.arange(len(at))
     own = Samples(
@@ -153,27 +152,7 @@ def _smooth(
     if len(split):
         kernels_split.average_split(samples.pixels, like, colors, radiance, parts, split)
     glints, means = kernels_paint.average_samples(samples.pixels, like, colors, radiance)
-    brighten_lines(samples.pixels[glints], means, camera.width, radiance)
-
-
-def brighten_lines(pixels: Int32, means: Float32, width: int, radiance: Float32) -> None:
-    """Brighten pixels (G,) whose glints were dimmed towards their true means (G, 3), until they are as bright as the second
-    brightest pixel around: so a bright line keeps its brightness.
-    """
-    y, x = np.divmod(pixels, np.int32(width))
-    rows, columns = _AROUND[0] + y, _AROUND[1] + x
-    is_outside = (rows < 0) | (rows >= len(radiance) // width) | (columns < 0) | (columns >= width)
-    dimmed = radiance[pixels, :3]
-    radiance[pixels, :3] = means
-    around = radiance.take(rows * width + columns, axis=0, mode="clip")
-    levels = np.maximum(np.maximum(around[..., 0], around[..., 1]), around[..., 2])
-    levels[is_outside] = 0
-    first = second = np.zeros(len(pixels), np.float32)
-    for level in levels:
-        first, second = np.maximum(first, level), np.maximum(second, np.minimum(first, level))
-    bright, dim = means.max(axis=1), dimmed.max(axis=1)
-    share = np.clip((second - dim) / np.maximum(bright - dim, np.float32(1e-6)), 0, 1)
-    radiance[pixels, :3] = dimmed + (means - dimmed) * share[:, None]
+    kernels_paint.brighten_lines(samples.pixels[glints], means, camera.width, radiance)
 
 
 def shade_all(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.raster import kernels_paint, kernels_split
+from viewsphere.engines.raster import kernels_mirror, kernels_paint, kernels_split
 from viewsphere.engines.raster.kernels_material import L_ROUGH, L_ROUGH_TEXEL
 from viewsphere.engines.raster.mirroring import blurred, looked_at, lying, mirrored
 from viewsphere.engines.raster.painting import Baked, view_of
@@ -40,24 +40,23 @@ def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radia
     at, plane = _mirror(baked, camera, visibility)
     if not len(at):
         return
-    gloss = np.zeros((visibility.triangle.size, 7), np.float32)
+    gloss = np.empty((len(at), 7), np.float32)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     light = baked.surrounding, baked.occlusion, baked.bounces
     own = view_of(baked, camera), baked.surfaces, baked.textures, baked.floor
     kernels_split.gloss(*own, *light, at.astype(np.int32), triangle, depth, gloss)
-    at = at[gloss[at, 6] < MATT]
+    shines = gloss[:, 6] < MATT
+    if not shines.all():
+        at, gloss = at[shines], gloss[shines]
     if len(at) < LEAST * visibility.triangle.size:
         return
-    shares, found, rough = gloss[at, :3], gloss[at, 3:6], gloss[at, 6]
     seen = mirrored(baked, camera, plane, lying(baked.geometry, plane + THICK), at)
     image = (seen.things + (1 - seen.hidden) * seen.sky).astype(np.float32)
-    reach = SPREAD * float(np.mean(rough)) ** 2 * camera.height / 2
+    reach = SPREAD * float(np.mean(gloss[:, 6])) ** 2 * camera.height / 2
     soft = blurred(image, at, camera, (max(1, round(reach)), max(1, round(reach / 3))))
-    away = np.clip(1 - seen.nearness / depth[at], 0, 1)[:, None]
     near = blurred(image, at, camera, (1, 1))
-    shown = near + (soft - near) * np.minimum(2 * away, 1)
-    polish = np.clip((MATT - rough) / (MATT - SHARP), 0, 1)[:, None]
-    radiance[at, :3] = np.maximum(radiance[at, :3] + polish * (shares * shown - found), 0)
+    borders = np.float32(SHARP), np.float32(MATT)
+    kernels_mirror.polish(at, gloss, near, soft, seen.nearness, depth, *borders, radiance)
 
 
 def _mirror(baked: Baked, camera: Camera, visibility: Visibility) -> tuple[NDArray[np.intp], float]:
@@ -66,7 +65,7 @@ def _mirror(baked: Baked, camera: Camera, visibility: Visibility) -> tuple[NDArr
     polished = (
         baked.surfaces.looks[:, L_ROUGH] + baked.surfaces.looks[:, L_ROUGH_TEXEL] < MATT
     )  # whatever a texture leaves of it
-    is_level = (np.abs(baked.geometry.triangle_normals[:, 2]) > LEVEL) & (baked.kind[:-1] == kernels_paint.SOLID)
+    is_level = (np.abs(baked.surfaces.normals[:, 2]) > LEVEL) & (baked.kind[:-1] == kernels_paint.SOLID)
     is_level &= polished[baked.surfaces.material]
     at = np.flatnonzero((shown >= 0) & is_level[shown])
     if len(at) < LEAST * len(shown):

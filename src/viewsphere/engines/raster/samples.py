@@ -15,7 +15,7 @@ from viewsphere.engines.raster import kernels_samples as kernels
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import RayTable, Runs, Visibility, homogeneous, in_picture, index_rays, lens_table
+from viewsphere.truth.visibility import RayTable, Runs, Visibility, homogeneous, in_picture, index_rays, left_out, lens_table
 
 OFFSETS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
 """Places of the four samples in a pixel: a rotated grid, in which each row and each column of quarters holds one sample."""
@@ -75,12 +75,13 @@ def edge_samples(
     no corner in such a pixel is left out (`kernels_edges`), and the surface behind it, or the one at the centre, is shown
     instead.
     """
-    look = visibility.triangle, visibility.inverse_depth, owner, geometry.triangle_normals
+    q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
+    normals = geometry.triangle_normals_of(np.flatnonzero(~left_out(geometry, q)).tolist())
+    look = visibility.triangle, visibility.inverse_depth, owner, normals
     marks = _differs_from_neighbour(*look)
     marks[: len(behind)] |= behind
-    q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
     if camera.distortion is None:
-        pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner, behind)
+        pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner, normals, behind)
         samples = Samples(pixels, position, np.zeros((0, 3), np.float32), triangle, inverse)
     else:
         points = _Points.of(camera, marks[: visibility.triangle.size].reshape(visibility.triangle.shape), 4, 1)
@@ -284,7 +285,13 @@ def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, norma
 
 
 def _pinhole_edges(
-    geometry: Geometry, visibility: Visibility, marks: Marks, q: NDArray[np.float64], owner: Int32, behind: Marks
+    geometry: Geometry,
+    visibility: Visibility,
+    marks: Marks,
+    q: NDArray[np.float64],
+    owner: Int32,
+    normals: Float32,
+    behind: Marks,
 ) -> tuple[Int32, Float32, Int32, Float32]:
     """The arrays pixels, position, triangle and inverse_depth of `Samples`, for a pinhole."""
     shown, (height, width) = (visibility.triangle, visibility.inverse_depth), visibility.triangle.shape
@@ -309,7 +316,7 @@ def _pinhole_edges(
     kernels_edges.spread(pixels, count, limit, around)
     kernels_edges.with_corners_before(q, geometry.triangles, runs, wanted, around, np.empty(len(q), np.uint8), chosen)
     count = kernels_edges.draw(_within(runs[1], are_chosen), *surfaces, *canvas, count, nearest, seen)
-    return _differing(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, geometry.triangle_normals, behind)
+    return _differing(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, normals, behind)
 
 
 def _within(runs: Runs, marks: Bool) -> NDArray[np.int64]:

@@ -116,15 +116,18 @@ class Rows:
                 self._written[i] = True
 
     def write_seen(self, camera: Camera, visibility: Visibility, geometry: Geometry) -> None:
-        """Write what may be in a picture of these triangles."""
-        if not self._written.all():
-            q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
-            self.write(np.flatnonzero(~left_out(geometry, q)).tolist())
+        """Write what may be in a picture of these triangles, and which way it faces."""
+        q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
+        seen = np.flatnonzero(~left_out(geometry, q)).tolist()
+        self.write(seen)
+        self.geometry.triangle_normals_of(seen)
 
     def move(self, geometry: Geometry, meshes: Sequence[Mesh], things: Iterable[int]) -> None:
-        """These things, and the ground, are elsewhere, or deformed: their rows are written in place."""
+        """These things, and the ground, are elsewhere, or deformed: their rows are written in place. Which way they face is
+        written where they are looked at: most of what drives through a town is in no picture.
+        """
         self.geometry, self.meshes = geometry, meshes
-        self.surfaces = self.surfaces._replace(normals=geometry.triangle_normals)
+        self.surfaces = self.surfaces._replace(normals=geometry.triangle_normals_of(()))
         for i in things:
             if self._written[i]:
                 self._place(i, self.surfaces.vertices[self._own(i)])

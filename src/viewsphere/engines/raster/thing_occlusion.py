@@ -28,7 +28,7 @@ from viewsphere.engines.raster.occlusion import (
     joined_volumes,
 )
 from viewsphere.engines.raster.records import Float32
-from viewsphere.geometry.rotation import transform
+from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Repaint
 
@@ -64,7 +64,7 @@ class TargetShades:
             return NO_OCCLUSION
         fineness = _fineness(arranged, quality)
         hidden: list[Hidden] = []
-        poses, reach = list[Float](), list[Float]()
+        poses = list[Float]()
         for i in _casting(arranged):
             own = self._hidden(arranged, i, casters, unit, has_ground, fineness)
             pose = _levelled(arranged.things[i].world_from_object, unit)
@@ -72,8 +72,7 @@ class TargetShades:
             own = own if height is None else _hovering(own, pose, height)
             hidden.append(own)
             poses.append(pose)
-            reach.append(_reach(own, pose))
-        return joined(hidden, poses, np.array(reach), self._volume(hidden)) if hidden else NO_OCCLUSION
+        return joined(hidden, poses, _reach(hidden, np.array(poses)), self._volume(hidden)) if hidden else NO_OCCLUSION
 
     def _volume(self, hidden: Sequence[Hidden]) -> Float32:
         """That of all of them, which are the same at most instants."""
@@ -162,15 +161,21 @@ def _hovering(hidden: Hidden, pose: Float, ground: float) -> Hidden:
     return hidden._replace(floor=1 - (1 - hidden.floor) * np.float32(share))
 
 
-def _reach(hidden: Hidden, pose: Float) -> Float:
-    """Lowest and highest x, y, z in the stage of all that is hidden."""
-    corner, cells = hidden.frame[:3].astype(np.float64), float(hidden.frame[3])
-    boxes = [corner, corner + (np.array(hidden.volume.shape[2::-1]) - 1) / cells]
+def _reach(hidden: Sequence[Hidden], poses: Float) -> Float:
+    """Lowest and highest x, y, z in the stage of all that each of these hides in its pose, (N, 6)."""
+    which = np.indices((2, 2, 2)).reshape(3, 8).T
+    corners = np.array([_span(own) for own in hidden])[:, which, np.arange(3)]
+    placed = product(poses[:, :3, :3], corners.transpose(0, 2, 1)) + poses[:, :3, 3:]
+    return np.stack([placed.min(axis=2), placed.max(axis=2)], axis=2).reshape(-1, 6)
+
+
+def _span(hidden: Hidden) -> tuple[list[float], list[float]]:
+    """Lowest and highest x, y, z of all that is hidden, in the axes of baking."""
+    *low, cells = (float(v) for v in hidden.frame[:4])
+    high = [at + (points - 1) / cells for at, points in zip(low, hidden.volume.shape[2::-1], strict=True)]
     per, left, front, z, height, stands = (float(v) for v in hidden.floor_frame[:6])
     if stands:
         size, slack = len(hidden.floor) / per, 0.35 * height
-        boxes += [np.array([left, front, z - slack]), np.array([left + size, front + size, z + (CLEAR + 1) * slack])]
-    low, high = np.min(boxes, axis=0), np.max(boxes, axis=0)
-    which = np.indices((2, 2, 2)).reshape(3, 8).T
-    corners = transform(pose, np.where(which == 1, high, low))
-    return np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1).reshape(6)
+        low = list(map(min, low, (left, front, z - slack)))
+        high = list(map(max, high, (left + size, front + size, z + (CLEAR + 1) * slack)))
+    return low, high

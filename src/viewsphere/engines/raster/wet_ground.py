@@ -46,7 +46,7 @@ def mirror_in_water(baked: Baked, camera: Camera, visibility: Visibility, wet: W
     if camera.center[2] <= plane + LOW:
         return
     low = lying(geometry, plane + LOW)
-    is_mirror = low & (geometry.triangle_normals[:, 2] > LEVEL) & np.isin(geometry.triangle_class, PAVED)
+    is_mirror = low & (baked.surfaces.normals[:, 2] > LEVEL) & np.isin(geometry.triangle_class, PAVED)
     at = np.flatnonzero((shown >= 0) & is_mirror[shown])
     if not len(at):
         return
