@@ -9,7 +9,7 @@ from test_raster import DARK, box, camera, mesh_of, rectangle
 
 from shots import painted
 from viewsphere.engines.raster import bounces as baking
-from viewsphere.engines.raster import gathering, lightmaps
+from viewsphere.engines.raster import gathering, lightmaps, volumes
 from viewsphere.engines.raster import kernels_lightmap as kernels
 from viewsphere.engines.raster.kernels_probes import look_up
 from viewsphere.engines.raster.lightmaps import CELL, charts_of
@@ -22,9 +22,9 @@ LOW, HIGH = np.array((-1.0, -0.8, -0.6)), np.array((1.0, 0.8, 0.6))
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
     """Fewer rays of fewer probes: nothing is read from them here."""
-    monkeypatch.setattr(baking, "RAYS", 256)
-    monkeypatch.setattr(baking, "ALONG", 14)
-    monkeypatch.setattr(baking, "CELL", 0.3)
+    monkeypatch.setattr(volumes, "RAYS", 256)
+    monkeypatch.setattr(volumes, "ALONG", 14)
+    monkeypatch.setattr(volumes, "CELL", 0.3)
     baking._bake.cache_clear()
     baking._look.cache_clear()
 
