@@ -186,8 +186,7 @@ def _bake(lighting: _Lighting) -> Bounces:
     bounces.light[:] += shining
     bounces.light[buried] = 0
     if gathering is not None:
-        gathering.receive(sent)
-        gathering.smooth()
+        gathering.finish(sent)
     send_views(*sources, rays.directions, patches.is_ground, sent, FOLD, views)
     views += near
     spread_views(rays.turn, seen.own, rays.directions, FOLD, views)
@@ -272,9 +271,10 @@ def _look(hall: Hall) -> _Seen:
         met, far = cast(tree, places, up, same, np.inf)
         below = Rays(places, up, same, met, far)
         bundles.append(below)
-    looked = look(tree, corners, normals, hall.unit, is_inside_out) if has_charts else None
+    made = hall.surfaces.vertices, hall.surfaces.triangles[hall.which]
+    looked = look(tree, *made, normals, hall.unit, is_inside_out) if has_charts else None
     if looked is not None:
-        bundles.append(looked.nodes)
+        bundles.extend(looked.rays)
     last = corner + (shape[::-1] - 1) / cells
     made_of = (
         normals,
