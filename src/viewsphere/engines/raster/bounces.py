@@ -171,7 +171,7 @@ def _bake(lighting: _Lighting) -> Bounces:
             break
     receive()
     if gathering is not None:
-        gathering.smooth()
+        gathering.finish(sent)
     for volume, ids, part in seen.parts(views):
         rays = volume.rays
         send_views(ids, rays.turn, volume.own, rays.directions, patches.is_ground, sent, FOLD, part)
@@ -244,9 +244,10 @@ def _look(hall: Hall) -> _Seen:
         met, far = cast(tree, places, up, same, np.inf)
         below = Rays(places, up, same, met, far)
         bundles.append(below)
-    looked = look(tree, corners, normals, hall.unit, volumes[0].is_inside_out) if has_charts else None
+    made = hall.surfaces.vertices, hall.surfaces.triangles[hall.which]
+    looked = look(tree, *made, normals, hall.unit, volumes[0].is_inside_out) if has_charts else None
     if looked is not None:
-        bundles.append(looked.nodes)
+        bundles.extend(looked.rays)
     inner = grids[0]
     made_of = (
         normals,

@@ -14,7 +14,7 @@ import math
 import numba as nb
 
 from viewsphere.engines.raster.kernels_block import (
-    BARY1, BLOCK, GX, GY, GZ, IB, IG, IR, LX, LY, LZ, NX, NY, NZ, PIXEL, PX, PY, PZ, SHARE, T0, U0, U1, V0, V1, WIDTH,
+    BLOCK, GX, GY, GZ, IB, IG, IR, LX, LY, LZ, NX, NY, NZ, PIXEL, PROBES, PX, PY, PZ, SHARE, T0, U0, U1, V0, V1, WIDTH,
 )  # fmt: skip
 from viewsphere.kernels.lanes import clamp, cross, dot, lanewise, least, most, root, size, where
 from viewsphere.engines.raster.kernels_penumbra import (
@@ -30,7 +30,7 @@ f4 = nb.float32
 U = nb.uintp
 DISTANT, POINT, SPOT, AREA = 0, 1, 2, 3
 # Rows in use while a view is looked at, in addition to those of `kernels_penumbra`.
-CELL, OFF_U, OFF_V, DOWN_, OWN = U0, V0, U1, V1, BARY1
+CELL, OFF_U, OFF_V, DOWN_, OWN = U0, V0, U1, V1, PROBES
 LOW_, HIGH_, ACROSS_ = CELL, OFF_U, OFF_V
 BLUNTEST = 16.0  # texels: half width of a filter that a pixel's size asks for, at most
 GRAZING = 0.02  # a plane's slope in a map is limited to that seen by a light this far above the plane (sine)

@@ -46,6 +46,7 @@ from viewsphere.engines.raster.kernels_block import (
     T7,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_lightmap import forget_map, read_map
+from viewsphere.engines.raster.kernels_vertex_light import read_vertices
 from viewsphere.engines.raster.kernels_views import CORNERS
 from viewsphere.kernels.jit import inner
 from viewsphere.kernels.lanes import FAST, clamp, dot, lanewise, least, load, most, scatter, spread, where
@@ -233,5 +234,6 @@ def bounced(count, bounces, is_ground, own, b):
         forget_map(count, b)
     else:
         read_map(count, bounces.lightmap, own, b)
+        read_vertices(count, bounces.lightmap, own, b)
     _read(count, bounces.light, columns, rows * columns, b)
     _shine(count, b)

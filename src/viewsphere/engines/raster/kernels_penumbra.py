@@ -22,7 +22,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from viewsphere.engines.raster.kernels_block import (
-    BARY2, IB, IG, IR, OPENX, OPENY, OPENZ, T1, T2, T3, T4, T5, T6, T7, U0, U1, V0, V1,
+    BLOCK, IB, IG, IR, OPENX, OPENY, OPENZ, PROBES, T1, T2, T3, T4, T5, T6, T7, U0, U1, V0, V1,
 )  # fmt: skip
 from viewsphere.kernels.lanes import (
     LANES, REAL, WHOLE, Lanes, Rows, clamp, lanewise, least, load, most, root, size, spread, where,
@@ -35,9 +35,10 @@ from viewsphere.kernels.jit import inner
 
 f4 = nb.float32
 U = nb.uintp
-# Rows while a view is looked at. They reuse rows of irradiance, filled later, and of texture coordinates, read before.
+# Rows while a view is looked at. They reuse rows of irradiance and of probes, filled later, and of texture coordinates, read
+# before.
 U_, V_, Q_, DU, DV, NEAR, SOFT, RADIUS, STATE, FACING = T1, T2, T3, T4, T5, T6, T7, IR, IG, IB
-LEFT, TOP, TEXEL, TALL, REACH = U0, V0, U1, V1, BARY2
+LEFT, TOP, TEXEL, TALL, REACH = U0, V0, U1, V1, PROBES + BLOCK
 MEAN, SUM, COUNT = OPENX, OPENY, OPENZ
 # Between the search and the filter: how the blockers' distance grows per texel. The rows' other contents are not needed then.
 SLOPE_U, SLOPE_V = SUM, RADIUS

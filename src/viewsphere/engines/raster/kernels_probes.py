@@ -35,6 +35,7 @@ from viewsphere.engines.raster.kernels_bounce import BURIED, HIDDEN, OUTDOORS, S
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground
 from viewsphere.engines.raster.kernels_light import UNEXPOSED, light_around, weigh
 from viewsphere.engines.raster.kernels_material import material
+from viewsphere.engines.raster.kernels_table import found
 from viewsphere.engines.raster.kernels_trace import DEEP, nearest
 from viewsphere.engines.raster.kernels_views import CORNERS
 from viewsphere.kernels.jit import inner, njit
@@ -46,7 +47,6 @@ SKY, FAR_GROUND, GROUND = -1, -2, -3
 NO_MATERIAL = -1
 AWAY = 24  # patches outside of the probes' box from which on they are twice as wide
 HITS = 4  # of a patch that are shaded, at most
-GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 CLUSTERS = 6
 ALIKE = 0.9  # cosine between normals of one screen
 FEWEST = 2  # rays of a screen
@@ -76,16 +76,6 @@ def _key(p, normal, cells, box, m):
         at = nb.int64(np.floor((p[k] - box[k]) * cells + f4(0.25)))
         key = key * np.uint64(1 << 16) + np.uint64((at + 32768) & 65535)
     return key
-
-
-@inner
-def _found(key, keys, patches):
-    """The place of a key in an open table, whose size is a power of two: its own, or the empty one where it belongs."""
-    last = np.uint64(len(keys) - 1)
-    at = (key * GOLDEN) >> np.uint64(20) & last
-    while patches[at] >= 0 and keys[at] != key:
-        at = (at + np.uint64(1)) & last
-    return at
 
 
 @njit
@@ -120,7 +110,7 @@ def patch(met, far, origins, directions, turn, normals, materials, box, cells, g
                 side = f4(-1) if x * d[0] + y * d[1] + z * d[2] > f4(0) else f4(1)
                 normal = x * side, y * side, z * side
             key = _key(p, normal, cells, box, m)
-            at = _found(key, table.keys, table.patch)
+            at = found(key, table.keys, table.patch)
             if table.patch[at] < 0:
                 if 2 * count >= len(table.keys):
                     return -1

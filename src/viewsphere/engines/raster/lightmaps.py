@@ -182,7 +182,7 @@ def _settled(
     origins = (flat_places[:, None, :] @ own_axes[own])[:, 0]
     at = np.arange(total) - firsts[own]
     turn = at % wide[own, 0] % TURNS + TURNS * (at // wide[own, 0] % TURNS)
-    local = _domes(rays)
+    local = domes(rays)
     directions = np.einsum("rkc,wcd->wrkd", local, axes).reshape(-1, rays, 3)
     return Charts(
         charts.astype(np.float32),
@@ -197,7 +197,7 @@ def _settled(
     )
 
 
-def _domes(count: int) -> Float:
+def domes(count: int) -> Float:
     """Directions around the third axis, as dense as their cosine, turned in `TURNS` squared ways, (TURNS ** 2, count, 3)."""
     i, turn = np.arange(count), np.arange(TURNS * TURNS)[:, None] * 0.6180339887 % 1.0
     z = np.sqrt(1 - (i + turn) / count)

@@ -61,12 +61,12 @@ def rays_of(patches: Patches, which: Int32, dome: Float32, tree: Tree, off: floa
     origins = (table.place[own, columns] + normals * np.float32(off)).astype(np.float32)
     turn = np.arange(len(own), dtype=np.int32)
     turned = dome.reshape(RAYS, WAYS, 3).transpose(1, 0, 2)[turn % WAYS]
-    directions = np.matmul(turned, _axes(normals), dtype=np.float32)
+    directions = np.matmul(turned, axes_along(normals), dtype=np.float32)
     rays = Rays(origins, directions, turn, *cast(tree, origins, directions, turn, np.inf))
     return PatchRays(own, (1 / table.known[own]).astype(np.float32), normals, rays)
 
 
-def _axes(normals: NDArray[np.float32]) -> NDArray[np.float32]:
+def axes_along(normals: NDArray[np.float32]) -> NDArray[np.float32]:
     """Axes (N, 3, 3) whose last is the normal (Duff et al., Building an Orthonormal Basis, Revisited, 2017)."""
     x, y, z = normals.T
     sign = np.where(z < 0, np.float32(-1), np.float32(1))

@@ -65,15 +65,20 @@ class PictureRays(NamedTuple):
 
 
 class Lightmap(NamedTuple):
-    """Light that arrives at flat, still surfaces.
+    """Light that arrives at still surfaces: at flat ones, which have charts, and at facets of others.
 
     nodes (N, 12): see `kernels_lightmap.see`; charts (C, 16): columns named in `kernels_lightmap`; chart (T,) int32: of
-    each of the stage's triangles, -1 for none; empty if none has one.
+    each of the stage's triangles, -1 for none, -2 - k for facet k; empty if there are no charts; facets (F, 5): columns named
+    in `kernels_vertex_light`; knots (I,) int32: the points of each facet, row by row; points (P, 12): how much each counts;
+    times that: light along x, y and z.
     """
 
     nodes: Float32
     charts: Float32
     chart: Int32
+    facets: Float32
+    knots: Int32
+    points: Float32
 
 
 class Bounces(NamedTuple):
@@ -101,7 +106,14 @@ class Bounces(NamedTuple):
     lightmap: Lightmap
 
 
-NO_LIGHTMAP = Lightmap(np.zeros((1, 12), np.float32), np.zeros((0, 16), np.float32), np.zeros(0, np.int32))
+NO_LIGHTMAP = Lightmap(
+    np.zeros((1, 12), np.float32),
+    np.zeros((0, 16), np.float32),
+    np.zeros(0, np.int32),
+    np.zeros((0, 5), np.float32),
+    np.zeros(0, np.int32),
+    np.zeros((1, 12), np.float32),
+)
 NO_BOUNCES = Bounces(
     np.zeros((1, 28), np.float32),
     np.zeros((1, 4), np.float32),

@@ -1,0 +1,149 @@
+"""Light of still surfaces that are not flat, at points of their triangles: their vertices, and more on large ones.
+
+Mesh colours (Yuksel, Keyser and House 2010), with fewer rays: light is gathered at sites, of which there is one in each cell
+for each of six directions that its surfaces face, and points have the mean of the sites around them that face alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.raster import kernels_sites as kernels
+from viewsphere.engines.raster.kernels_lightmap import ALONG, COLUMNS, WEIGHT
+from viewsphere.engines.raster.kernels_vertex_light import FACET, NONE
+from viewsphere.engines.raster.lightmaps import domes
+from viewsphere.engines.raster.patch_rays import axes_along
+from viewsphere.engines.raster.records import Float32, Int32
+
+CELL, MOST = 0.06, 16_000
+"""Metres along a cell at least, and how many sites there are at most."""
+
+ROOM = 1 << 16
+"""Places in the table of sites."""
+
+LONG, MOST_PARTS = 1.25, 32
+"""Cells between points along the edges of triangles, at most, and how many parts of an edge there are at most."""
+
+OFF = 5e-4
+"""Metres off the surface from where sites look."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """What depends on no light. low (3,): where the cells begin; keys, sites: their table; places, normals (N, 3): see
+    `kernels_sites.settle`; origins (N, 3), and directions (N, K, 3) of their rays, which are `local` (R, K, 3), site by site,
+    in axes (N, 3, 3).
+    """
+
+    low: Float32
+    cell: float
+    keys: NDArray[np.uint64]
+    sites: Int32
+    places: Float32
+    normals: Float32
+    origins: Float32
+    directions: Float32
+    local: Float32
+    axes: Float32
+
+    def light_at(self, places: Float32, normals: Float32, nodes: Float32) -> Float32:
+        """The mean of the sites' light, (P, 12), at places (P, 3) that face along these normals. nodes (N, 12): as
+        `kernels_lightmap.see` has them; light of the result is along x, y and z instead.
+        """
+        along = nodes[:, ALONG : ALONG + 9].reshape(-1, 3, 3)[:, [1, 2, 0]]  # along both axes, and along the normal
+        turned = np.zeros_like(nodes)
+        turned[:, WEIGHT] = nodes[:, WEIGHT]
+        turned[:, ALONG : ALONG + 9] = np.matmul(self.axes.transpose(0, 2, 1), along).reshape(-1, 9)
+        light = np.empty((len(places), COLUMNS), np.float32)
+        table = self.keys, self.sites, self.places, self.normals
+        kernels.spread(places, normals, self.low, np.float32(1 / self.cell), *table, turned, light)
+        return light
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """Triangles whose light is known at points. facets (F, 5), knots (I,): see `Lightmap`; which (F,): of the hall's triangles;
+    places, normals (P, 3): of the points.
+    """
+
+    facets: Float32
+    knots: Int32
+    which: NDArray[np.intp]
+    places: Float32
+    normals: Float32
+
+
+def vertex_light_of(
+    vertices: Float32, triangles: NDArray[np.uint32], which: NDArray[np.intp], normals: Float32, unit: float, rays: int
+) -> tuple[Sites, Facets] | None:
+    """Of some of the triangles (T, 3), `which` (N,), in a stage of `unit` metres; None if none of them has an area. vertices:
+    see `Surfaces`; normals (T, 3).
+    """
+    corners = vertices[triangles[which], 11:14]
+    edges = np.roll(corners, -1, axis=1) - corners
+    longest = np.sqrt((edges * edges).sum(axis=2).max(axis=1))
+    across = np.cross(edges[:, 0], edges[:, 1])
+    area = np.sqrt((across * across).sum(axis=1, dtype=np.float64)) / 2
+    with np.errstate(invalid="ignore"):
+        own = np.flatnonzero((area > 0) & np.isfinite(area) & np.isfinite(normals[which]).all(axis=1))
+    if not len(own):
+        return None
+    which, corners, longest = which[own], corners[own], longest[own]
+    facing = np.ascontiguousarray(normals[which])
+    size = max(CELL / unit, float(np.sqrt(2 * area[own].sum() / MOST)), float(np.ptp(corners, axis=(0, 1)).max()) / 500_000)
+    sites, parts = _sites(corners, facing, longest, size, unit, rays)
+    return sites, _facets(vertices, triangles, which, corners, facing, parts)
+
+
+def _sites(
+    corners: Float32, normals: Float32, longest: Float32, cell: float, unit: float, rays: int
+) -> tuple[Sites, NDArray[np.int64]]:
+    """Sites in the smallest cells, of this size at least, of which there are few enough, and in the square of how many parts
+    each triangle is cut for them.
+    """
+    low = corners.min(axis=(0, 1)).astype(np.float32)
+    while True:
+        parts = np.clip(np.ceil(longest / (LONG * cell)), 1, MOST_PARTS).astype(np.int64)
+        keys, sites, sums = np.zeros(ROOM, np.uint64), np.full(ROOM, -1, np.int32), np.zeros((MOST, 7))
+        cells = np.float32(1 / cell)
+        count = kernels.group(corners, normals, parts, low, cells, keys, sites, sums)
+        if count >= 0:
+            break
+        cell *= 1.1
+    best, places, facing = np.full(count, np.inf), np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+    kernels.settle(corners, normals, parts, low, cells, keys, sites, sums, best, places, facing)
+    axes, local = axes_along(facing), domes(rays).astype(np.float32)
+    directions = np.matmul(local[np.arange(count) % len(local)], axes)
+    origins = (places + facing * np.float32(OFF / unit)).astype(np.float32)
+    return Sites(low, cell, keys, sites, places, facing, origins, directions, local, axes), parts
+
+
+def _facets(
+    vertices: Float32,
+    triangles: NDArray[np.uint32],
+    which: NDArray[np.intp],
+    corners: Float32,
+    normals: Float32,
+    parts: NDArray[np.int64],
+) -> Facets:
+    own = triangles[which].astype(np.int64)
+    first = int(own.min())
+    counts = (parts + 1) * (parts + 2) // 2
+    total = int(counts.sum())
+    numbers, index = np.full(int(own.max()) - first + 1, -1, np.int32), np.empty(total, np.int32)
+    places, facing = np.empty((total, 3), np.float32), np.empty((total, 3), np.float32)
+    smooth = vertices[own, :3]
+    points = kernels.lay(own - first, corners, smooth, normals, parts, numbers, index, places, facing)
+    facets = np.empty((len(which), FACET), np.float32)
+    facets[:, :3], facets[:, 3], facets[:, 4] = normals, parts, np.cumsum(counts) - counts
+    return Facets(facets, index, which, places[:points].copy(), facing[:points].copy())
+
+
+def numbered(chart: Int32, facets: Facets) -> Int32:
+    """The charts of a hall's triangles, with the numbers of facets where there are any: see `Lightmap`."""
+    chart = chart.copy()
+    chart[facets.which] = NONE - 1 - np.arange(len(facets.which), dtype=np.int32)
+    return chart
