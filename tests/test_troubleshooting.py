@@ -247,6 +247,7 @@ def texts():
 
 def test_reading_takes_too_long(said, monkeypatch, tmp_path):
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    monkeypatch.delenv("VIEWSPHERE_READ_HERE")
     monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", "0.01")
     assert_shown("limit MAX_READ_SECONDS", said("inspect here/ok.obj"))
 
@@ -266,6 +267,7 @@ def test_reading_takes_too_much(said, monkeypatch, tmp_path):
 
 @pytest.mark.parametrize(("how", "words"), [("SEGV", "reading it crashed"), ("KILL", "it was killed")])
 def test_reading_crashes_or_is_killed(said, monkeypatch, tmp_path, how, words):
+    monkeypatch.delenv("VIEWSPHERE_READ_HERE")
     program = tmp_path / "crash"
     program.write_text(f"#!/bin/sh\nkill -{how} $$\n")
     program.chmod(0o755)

@@ -21,7 +21,7 @@ HALF_TURN = [[-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 
 
 @pytest.fixture(autouse=True)
-def cache_of_its_own(read_here, monkeypatch, tmp_path):
+def cache_of_its_own(monkeypatch, tmp_path):
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
 
 
