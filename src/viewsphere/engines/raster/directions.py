@@ -43,6 +43,15 @@ def dome(count: int) -> Float32:
     return _around(np.sqrt(1 - (np.arange(count) + 0.5) / count), np.arange(count))
 
 
+def domes(count: int, ways: int) -> Float:
+    """Directions around the third axis, as dense as their cosine, turned in so many ways, (ways, count, 3)."""
+    i, turn = np.arange(count), np.arange(ways)[:, None] * 0.6180339887 % 1.0
+    z = np.sqrt(1 - (i + turn) / count)
+    angle = (i + turn) * (math.pi * (3 - math.sqrt(5))) + 2 * math.pi * turn
+    radius = np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=-1)
+
+
 def _around(z: Float, turn: NDArray[np.int_]) -> Float32:
     angle, radius = (turn + 0.5) * math.pi * (3 - math.sqrt(5)), np.sqrt(1 - z * z)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1).astype(np.float32)

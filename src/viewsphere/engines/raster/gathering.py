@@ -175,8 +175,7 @@ class Gathering(NamedTuple):
         send_around(self.ids[-1], self.around.which, self.around.share, self.afar[-1], sent, glow, inside)
 
     def finish(self, sent: Float32) -> None:
-        """Gather at all nodes and sites what patches send, (M, 3), and mix what neighbours know."""
-        self.receive(sent)
+        """Mix what neighbouring nodes know, which have received what patches send, (M, 3), and gather it at all sites."""
         kernels.smooth(self.lightmap.charts, self.lightmap.nodes.copy(), self.lightmap.nodes)
         if self.look.round:
             sites, facets, spots = self.look.round

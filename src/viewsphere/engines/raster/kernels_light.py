@@ -374,6 +374,17 @@ def _take(count, layer, is_bounced, b):
 
 
 @inner(fastmath=FAST)
+def _see(count, surrounding, bounces, is_near, b):
+    """T3 to T5: the light that comes from the direction T0 to T2, from things that light bounces off as well if `is_near`."""
+    if is_near:
+        columns = U(bounces.grid[2])
+        near_light(count, bounces.views, columns, U(bounces.grid[1]) * columns, b)
+    light_around(count, surrounding, b)
+    if is_near:
+        add_near_light(count, b)
+
+
+@inner(fastmath=FAST)
 def ambient(count, surrounding, bounces, b):
     """Add the light of the surroundings to DR to SB; the block must be weighed before. Reads OPEN and BOUNCE, and where light
     bounces what `kernels_bounce.bounced` fills.
@@ -383,19 +394,12 @@ def ambient(count, surrounding, bounces, b):
     """
     has_coat, has_glass, is_bounced = _any(count, COAT, b), _any(count, THROUGH, b), bounces.grid[0] > 0
     is_bent = _any(count, BENT, b)
-    columns = U(bounces.grid[2])
-    across = U(bounces.grid[1]) * columns
     # One loop around one call, so that the call is compiled once.
     for layer in range(BEHIND + 1):
         if (layer == COATING and not has_coat) or (layer == BENDING and not is_bent) or (layer == BEHIND and not has_glass):
             continue
         _look(count, layer, b)
-        is_near = is_bounced and layer > 0
-        if is_near:
-            near_light(count, bounces.views, columns, across, b)
-        light_around(count, surrounding, b)
-        if is_near:
-            add_near_light(count, b)
+        _see(count, surrounding, bounces, is_bounced and layer > 0, b)
         _take(count, layer, is_bounced, b)
 
 
@@ -410,10 +414,7 @@ def _keep_of_coat(b):
 def light_on_coat(count, surrounding, bounces, b):
     """T3 to T5: the light that clear coats mirror, of a block of which `ambient` could be asked."""
     _look(count, COATING, b)
-    columns = U(bounces.grid[2])
-    near_light(count, bounces.views, columns, U(bounces.grid[1]) * columns, b)
-    light_around(count, surrounding, b)
-    add_near_light(count, b)
+    _see(count, surrounding, bounces, True, b)
     _keep_of_coat(count, b)
 
 

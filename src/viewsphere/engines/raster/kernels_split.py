@@ -202,6 +202,15 @@ def _cover(b):
         b[FACE_R + k] = b[FACE_R + k] * b[LOBE] + b[EDGE_R + k] * b[RIM] + b[TAKEN]
 
 
+@inner(fastmath=FAST)
+def _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bounces, own, which, b):
+    """All that `ambient` reads of a block of things that has been gathered."""
+    material(count, view, surfaces, textures, b, which)
+    weigh(count, surrounding.albedo, b)
+    occlude(count, occlusion, b)
+    bounced(count, bounces, False, own, b)
+
+
 @njit(fastmath=FAST, _nrt=True)
 def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
     """Set `out` (N, 7) float32 to what the samples in `slots` (N,) mirror of their surroundings: its shares of red, green and
@@ -213,10 +222,7 @@ def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slot
         count = min(slots.shape[0] - start, BLOCK)
         locate(view, start, count, slots, depth, b, own)
         gather(surfaces, count, triangle, b, own, which)
-        material(count, view, surfaces, textures, b, which)
-        weigh(count, surrounding.albedo, b)
-        occlude(count, occlusion, b)
-        bounced(count, bounces, False, own, b)
+        _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bounces, own, which, b)
         ambient(count, surrounding, bounces, b)
         _cover(count, b)
         for i in range(U(count)):
@@ -228,7 +234,7 @@ def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slot
 
 @njit(fastmath=FAST, _nrt=True)
 def film(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
-    """Set rows `slots` of `out` (S, 3) float32 to the light that the clear coat of samples is taken to mirror, where light
+    """Set `out` (N, 3) float32 to the light that the clear coat of the samples in `slots` (N,) is taken to mirror, where light
     bounces.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
@@ -237,12 +243,8 @@ def film(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots
         count = min(slots.shape[0] - start, BLOCK)
         locate(view, start, count, slots, depth, b, own)
         gather(surfaces, count, triangle, b, own, which)
-        material(count, view, surfaces, textures, b, which)
-        weigh(count, surrounding.albedo, b)
-        occlude(count, occlusion, b)
-        bounced(count, bounces, False, own, b)
+        _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bounces, own, which, b)
         light_on_coat(count, surrounding, bounces, b)
         for i in range(U(count)):
-            q = U(slots[U(start) + i])
             for c in range(U(3)):
-                out[q, c] = b[U(T3) + c * U(BLOCK) + i]
+                out[U(start) + i, c] = b[U(T3) + c * U(BLOCK) + i]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_lightmap as kernels
+from viewsphere.engines.raster.directions import domes
 from viewsphere.engines.raster.records import Float32, Int32
 
 Float = NDArray[np.float64]
@@ -182,7 +183,7 @@ def _settled(
     origins = (flat_places[:, None, :] @ own_axes[own])[:, 0]
     at = np.arange(total) - firsts[own]
     turn = at % wide[own, 0] % TURNS + TURNS * (at // wide[own, 0] % TURNS)
-    local = domes(rays)
+    local = domes(rays, TURNS * TURNS)
     directions = np.einsum("rkc,wcd->wrkd", local, axes).reshape(-1, rays, 3)
     return Charts(
         charts.astype(np.float32),
@@ -195,12 +196,3 @@ def _settled(
         distances < NEAR,
         1 / cells,
     )
-
-
-def domes(count: int) -> Float:
-    """Directions around the third axis, as dense as their cosine, turned in `TURNS` squared ways, (TURNS ** 2, count, 3)."""
-    i, turn = np.arange(count), np.arange(TURNS * TURNS)[:, None] * 0.6180339887 % 1.0
-    z = np.sqrt(1 - (i + turn) / count)
-    angle = (i + turn) * (math.pi * (3 - math.sqrt(5))) + 2 * math.pi * turn
-    radius = np.sqrt(1 - z * z)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=-1)

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_sites as kernels
+from viewsphere.engines.raster.directions import domes
 from viewsphere.engines.raster.kernels_lightmap import ALONG, COLUMNS, WEIGHT
 from viewsphere.engines.raster.kernels_vertex_light import FACET, NONE
-from viewsphere.engines.raster.lightmaps import domes
 from viewsphere.engines.raster.patch_rays import axes_along
 from viewsphere.engines.raster.records import Float32, Int32
 
@@ -23,6 +23,9 @@ CELL, MOST = 0.06, 16_000
 
 ROOM = 1 << 16
 """Places in the table of sites."""
+
+WAYS = 16
+"""In which rays of sites are turned."""
 
 LONG, MOST_PARTS = 1.25, 32
 """Cells between points along the edges of triangles, at most, and how many parts of an edge there are at most."""
@@ -115,7 +118,7 @@ def _sites(
         cell *= 1.1
     best, places, facing = np.full(count, np.inf), np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     kernels.settle(corners, normals, parts, low, cells, keys, sites, sums, best, places, facing)
-    axes, local = axes_along(facing), domes(rays).astype(np.float32)
+    axes, local = axes_along(facing), domes(rays, WAYS).astype(np.float32)
     directions = np.matmul(local[np.arange(count) % len(local)], axes)
     origins = (places + facing * np.float32(OFF / unit)).astype(np.float32)
     return Sites(low, cell, keys, sites, places, facing, origins, directions, local, axes), parts

@@ -65,11 +65,12 @@ def mirror_in_water(baked: Baked, camera: Camera, visibility: Visibility, wet: W
 
 def _taken(baked: Baked, camera: Camera, visibility: Visibility, at: NDArray[np.intp], sky: Float32) -> Float32:
     """What the material of pixels (n,) is taken to mirror, (n, 3): `sky`, where light does not bounce, and on the ground."""
+    if baked.bounces.grid[0] == 0:
+        return sky
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    taken = np.zeros((len(triangle), 3), np.float32)
-    taken[at] = sky
-    if baked.bounces.grid[0] > 0:
-        own = view_of(baked, camera), baked.surfaces, baked.textures, baked.floor
-        on_things = at[baked.kind[triangle[at]] != kernels_paint.FLOOR].astype(np.int32)
-        kernels_split.film(*own, baked.surrounding, baked.occlusion, baked.bounces, on_things, triangle, depth, taken)
-    return taken[at]
+    is_thing, taken = baked.kind[triangle[at]] != kernels_paint.FLOOR, sky.copy()
+    slots = at[is_thing].astype(np.int32)
+    own, light = np.empty((len(slots), 3), np.float32), (baked.surrounding, baked.occlusion, baked.bounces)
+    kernels_split.film(view_of(baked, camera), baked.surfaces, baked.textures, baked.floor, *light, slots, triangle, depth, own)
+    taken[is_thing] = own
+    return taken

@@ -33,10 +33,10 @@ CALM_WAY, CALM_ANGLE = 0.0003, 0.002
 first to the last. The speeds are those of a thing that trembles on the spot, from one corner that touches to the next.
 """
 
-HELD, HELD_ROLLING = 0.3, 10.0
-"""What holds a body that creeps on when all are slow: a friction against going anywhere, of its weight, and how many times more
-than `ROLLING` against turning. Its contacts jump from corner to corner of both hulls and take it along, millimetres a second,
-where a thing would stand.
+CREEP, HELD, HELD_ROLLING = 1.7, 0.3, 10.0
+"""What holds a body that creeps on when all are slow, this many times farther than one at rest at most, so that it goes less
+than a millimetre and half a degree a second when it is let go: a friction against going anywhere, of its weight, and how many
+times more than `ROLLING` against turning. Its contacts jump from corner to corner of both hulls and take it along.
 """
 
 DAMPED_S, DAMPING = 2.0, 4.0
@@ -191,10 +191,11 @@ class World:
             if step % LOOK < each:
                 calm = [*calm, self._data.qpos.reshape(-1, 7).copy()] if self._is_slow else []
                 if len(calm) >= CALM_LOOKS:
-                    creeping = _creeping(calm[-CALM_LOOKS], calm[-1])
+                    window = calm[-CALM_LOOKS], calm[-1]
+                    creeping = _moving(*window)
                     if not len(creeping):
                         return True
-                    if len(calm) % CALM_LOOKS == 0:
+                    if len(calm) % CALM_LOOKS == 0 and not len(_moving(*window, CREEP)):
                         self._hold(sorted(self._held.union(creeping.tolist())))
         return False
 
@@ -235,11 +236,11 @@ class World:
         return frozenset((int(min(p)), int(max(p))) for p in owner[pairs])
 
 
-def _creeping(before: Float, now: Float) -> NDArray[np.int_]:
-    """Numbers of the bodies that went some way between two states."""
+def _moving(before: Float, now: Float, times: float = 1.0) -> NDArray[np.int_]:
+    """Numbers of the bodies that went farther between two states than `times` what is rest."""
     way = np.linalg.norm(now[:, :3] - before[:, :3], axis=1)
     half = np.abs((now[:, 3:] * before[:, 3:]).sum(axis=1)).clip(0, 1)
-    return np.flatnonzero((way >= CALM_WAY) | (2 * np.arccos(half) >= CALM_ANGLE))
+    return np.flatnonzero((way >= times * CALM_WAY) | (2 * np.arccos(half) >= times * CALM_ANGLE))
 
 
 def _contact(touch: Touch) -> dict[str, Any]:
