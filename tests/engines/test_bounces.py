@@ -18,7 +18,6 @@ from viewsphere.engines.raster import gathering, lightmaps, volumes
 from viewsphere.engines.raster.kernels_probes import look_up
 from viewsphere.engines.raster.options import parse_options
 from viewsphere.engines.raster.records import Bounces
-from viewsphere.engines.raster.tracing import cast, tree_of, unblocked
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, PointLight, Scene, Sky, Sun
@@ -95,29 +94,6 @@ def walls(low, high, count: int = 12) -> tuple[np.ndarray, np.ndarray]:
             places.append(place)
             normals.append(normal)
     return np.array(places), np.array(normals)
-
-
-def test_rays_meet_what_brute_force_finds():
-    rng = np.random.default_rng(5)
-    corners = (rng.uniform(-1, 1, (300, 1, 3)) + rng.normal(0, 0.15, (300, 3, 3))).astype(np.float32)
-    origins, ways = rng.uniform(-1.2, 1.2, (40, 3)).astype(np.float32), rng.normal(size=(25, 3)).astype(np.float32)
-    met, far = cast(tree_of(corners), origins, ways[None], np.zeros(40, np.int32), np.inf)
-    a, b, c = corners.astype(float).transpose(1, 0, 2)
-    for k, d in enumerate(ways.astype(float)):
-        p = np.cross(d, c - a)
-        det = (p * (b - a)).sum(axis=1)
-        s = origins[:, None].astype(float) - a
-        q = np.cross(s, b - a)
-        u, v, t = (s * p).sum(axis=2) / det, (q @ d) / det, (q * (c - a)).sum(axis=2) / det
-        t = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, np.inf)
-        np.testing.assert_array_equal(met[k], np.where(np.isfinite(t.min(axis=1)), t.argmin(axis=1), -1))
-        np.testing.assert_allclose(far[k], t.min(axis=1), rtol=2e-4)
-    assert 0.2 < (met >= 0).mean() < 0.98
-    ends = origins + ways[0] * np.where(np.isfinite(far[0]), far[0], 1)[:, None]
-    seen = unblocked(tree_of(corners), origins, ((ends - origins) * np.float32(0.9)).astype(np.float32))
-    assert seen.all()
-    beyond = unblocked(tree_of(corners), origins, ((ends - origins) * np.float32(1.1)).astype(np.float32))
-    np.testing.assert_array_equal(beyond[met[0] >= 0], 0)
 
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.5, 0.8])

@@ -12,7 +12,7 @@ from viewsphere.engines.raster import bounces as baking
 from viewsphere.engines.raster import gathering, lightmaps, volumes
 from viewsphere.engines.raster import kernels_lightmap as kernels
 from viewsphere.engines.raster.kernels_probes import look_up
-from viewsphere.engines.raster.lightmaps import CELL, charts_of
+from viewsphere.engines.raster.lightmaps import CELL, MOST, charts_of
 from viewsphere.engines.raster.tracing import cast, tree_of
 from viewsphere.model.scene import Scene, Sun
 
@@ -126,7 +126,7 @@ def test_no_more_nodes_than_are_allowed():
     wide = np.concatenate([rectangle((0, 0, k), (30, 0, 0), (0, 20, 0)) for k in range(4)]).astype(np.float32)
     charts = charts_of(wide, 1.0, 4)
     assert charts is not None
-    assert 15_000 < len(charts.origins) <= 24_000
+    assert MOST * 0.6 < len(charts.origins) <= MOST
     assert charts.cell > CELL
 
 

@@ -27,6 +27,8 @@ _FLAGS = tuple(sorted(FAST))
 class Lanes:
     """Numbers side by side: float32, int32, or the flags of a comparison. The other operand may be one number for all lanes."""
 
+    flags = _FLAGS
+
     def __init__(self, builder: ir.IRBuilder, value: Any) -> None:
         self.builder = builder
         self.value = value
@@ -45,14 +47,14 @@ class Lanes:
 
     def all(self, number: float) -> Lanes:
         """A float32 in all lanes."""
-        return Lanes(self.builder, ir.Constant(self._as(REAL), [number] * self.value.type.count))
+        return type(self)(self.builder, ir.Constant(self._as(REAL), [number] * self.value.type.count))
 
     def _do(self, real: str, whole: str, other: Any, *, swap: bool = False) -> Lanes:
         values = self.value, self.like(other)
         values = values[::-1] if swap else values
         if self.is_real:
-            return Lanes(self.builder, getattr(self.builder, real)(*values, flags=_FLAGS))
-        return Lanes(self.builder, getattr(self.builder, whole)(*values))
+            return type(self)(self.builder, getattr(self.builder, real)(*values, flags=self.flags))
+        return type(self)(self.builder, getattr(self.builder, whole)(*values))
 
     def __add__(self, other: Any) -> Lanes:
         return self._do("fadd", "add", other)
@@ -96,7 +98,7 @@ class Lanes:
     def _compare(self, operator: str, other: Any) -> Lanes:
         # Ordered comparisons without fast-math flags: NaN is neither less nor equal nor greater.
         compare = self.builder.fcmp_ordered if self.is_real else self.builder.icmp_signed
-        return Lanes(self.builder, compare(operator, self.value, self.like(other)))
+        return type(self)(self.builder, compare(operator, self.value, self.like(other)))
 
     def __lt__(self, other: Any) -> Lanes:
         return self._compare("<", other)
@@ -119,36 +121,42 @@ class Lanes:
 
     def whole(self) -> Lanes:
         """Truncated to int32, towards zero."""
-        return Lanes(self.builder, self.builder.fptosi(self.value, self._as(WHOLE)))
+        return type(self)(self.builder, self.builder.fptosi(self.value, self._as(WHOLE)))
 
     def real(self) -> Lanes:
         """Converted to float32."""
-        return Lanes(self.builder, self.builder.sitofp(self.value, self._as(REAL)))
+        return type(self)(self.builder, self.builder.sitofp(self.value, self._as(REAL)))
 
     def widened(self) -> Lanes:
         """uint16 converted to int32."""
-        return Lanes(self.builder, self.builder.zext(self.value, self._as(WHOLE)))
+        return type(self)(self.builder, self.builder.zext(self.value, self._as(WHOLE)))
 
     def bits(self) -> Lanes:
         """The bits of float32 as int32."""
-        return Lanes(self.builder, self.builder.bitcast(self.value, self._as(WHOLE)))
+        return type(self)(self.builder, self.builder.bitcast(self.value, self._as(WHOLE)))
 
     def exponent(self) -> Lanes:
         """Two to the power (int32 - 127), as float32: the integers become its exponents."""
-        return Lanes(self.builder, self.builder.bitcast((self * (1 << 23)).value, self._as(REAL)))
+        return type(self)(self.builder, self.builder.bitcast((self * (1 << 23)).value, self._as(REAL)))
 
     def call(self, name: str) -> Lanes:
         """LLVM's intrinsic function of one float32, lane by lane."""
         suffix = f"v{self.value.type.count}f32"
         kind = ir.FunctionType(self.value.type, [self.value.type])
         function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.{name}.{suffix}")
-        return Lanes(self.builder, self.builder.call(function, [self.value], fastmath=_FLAGS))
+        return type(self)(self.builder, self.builder.call(function, [self.value], fastmath=self.flags))
+
+
+class Exact(Lanes):
+    """Lanes whose results are rounded one by one, as those of single numbers are."""
+
+    flags = ()
 
 
 def where(flags: Lanes, yes: Any, no: Any) -> Lanes:
     """`yes` where the flag is set, else `no`; float32 if both are numbers."""
     model = next((a for a in (yes, no) if isinstance(a, Lanes)), None) or flags.all(1.0)
-    return Lanes(flags.builder, flags.builder.select(flags.value, model.like(yes), model.like(no)))
+    return type(model)(flags.builder, flags.builder.select(flags.value, model.like(yes), model.like(no)))
 
 
 def least(a: Lanes, b: Any) -> Lanes:

@@ -259,11 +259,11 @@ def _look(hall: Hall) -> _Seen:
     patches, around = patches_of(bundles, *made_of), None
     if looked is not None:
         around = rays_of(patches, looked.alone(patches), dome(PATCH_RAYS * WAYS), tree, SHADOWS / inner.cells)
-        patches = patches_of([*bundles, around.rays], *made_of)
+        patches = patches_of([*bundles, around.rays], *made_of, patches)
     screens = np.concatenate([volume.screens for volume in volumes])
     light = np.zeros((len(screens), COLUMNS), np.float32)
     bounces = Bounces(light, NO_BOUNCES.views, screens, inner.shape, _frame(grids), floor, floor_frame, NO_LIGHTMAP)
-    return _Seen(bounces, tree, volumes, patches, below, looked, around)
+    return _Seen(bounces, tree, volumes, patches.trimmed(), below, looked, around)
 
 
 def _frame(grids: tuple[Grid, ...]) -> Float32:

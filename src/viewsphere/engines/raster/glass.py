@@ -13,8 +13,8 @@ from viewsphere.engines.raster.tracing import tree_of
 
 
 class Glass(NamedTuple):
-    """The tree of its T triangles, as `tracing.Tree` has it; normals (T, 9) float32: of their three corners; material (T,)
-    int32: rows of `Surfaces.looks`. Empty where nothing bends light.
+    """The tree of its triangles, as `tracing.Tree` has it; for each place in its leaves normals (L * 8, 9) float32: of three
+    corners; material (L * 8,) int32: rows of `Surfaces.looks`. Empty where nothing bends light.
     """
 
     bounds: Float32
@@ -25,9 +25,9 @@ class Glass(NamedTuple):
 
 
 NO_GLASS = Glass(
-    np.zeros((0, 6), np.float32),
-    np.zeros((0, 2), np.int32),
-    np.zeros((0, 9), np.float32),
+    np.zeros((0, 48), np.float32),
+    np.zeros((0, 8), np.int32),
+    np.zeros((0, 72), np.float32),
     np.zeros((0, 9), np.float32),
     np.zeros(0, np.int32),
 )

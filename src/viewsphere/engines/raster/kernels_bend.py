@@ -33,7 +33,7 @@ from viewsphere.engines.raster.kernels_block import (
     VZ,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_material import L_BENDS, L_BLUE, L_GREEN, L_RED, L_TRANSMISSION
-from viewsphere.engines.raster.kernels_trace import DEEP, nearest
+from viewsphere.engines.raster.kernels_trace import DEEP, nearest, triangle
 from viewsphere.kernels.jit import inner
 
 f4 = nb.float32
@@ -68,10 +68,10 @@ def _turned(d, n, ratio):
 
 
 @inner
-def _normal(corner, normals, o):
+def _normal(glass, found, o):
     """Of a point of a triangle: the flat normal, of any length, and the smooth unit normal on the same side."""
-    one, two = (corner[U(3)], corner[U(4)], corner[U(5)]), (corner[U(6)], corner[U(7)], corner[U(8)])
-    at = o[0] - corner[U(0)], o[1] - corner[U(1)], o[2] - corner[U(2)]
+    corner, one, two = triangle(glass, found)
+    normals, at = glass.normals[U(found)], (o[0] - corner[0], o[1] - corner[1], o[2] - corner[2])
     aa, ac, cc, qa, qc = _dot(one, one), _dot(one, two), _dot(two, two), _dot(at, one), _dot(at, two)
     scale = f4(1) / max(aa * cc - ac * ac, f4(1e-30))
     g, h = (cc * qa - ac * qc) * scale, (aa * qc - ac * qa) * scale
@@ -96,7 +96,7 @@ def _follow(glass, looks, o, d, apart, stack):
         if found < 0:
             return d, (red, green, blue), f4(0) if is_within else clear
         o = _along(o, f4(1), d, t)
-        flat, n = _normal(glass.corners[U(found)], glass.normals[U(found)], o)
+        flat, n = _normal(glass, found, o)
         look = looks[U(glass.material[U(found)])]
         leaves = _dot(flat, d) > f4(0)
         if leaves:

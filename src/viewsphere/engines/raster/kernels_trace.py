@@ -1,5 +1,6 @@
 """What rays meet first: a tree of boxes around triangles (a bounding volume hierarchy, the surface area heuristic in bins; Wald
-2007), for light that is baked once and needs no other package.
+2007), eight of which are looked at in one go (Wald, Benthin and Boulos 2008), for light that is baked once and needs no other
+package.
 
 Both sides of a triangle are met. All is computed in one order: the same triangles and rays give the same bits.
 """
@@ -8,14 +9,19 @@ from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from llvmlite import ir
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.lanes import Exact, cross, dot, least, load, most, spread, store
 
 f4 = nb.float32
 U = nb.uintp
 BINS = 16
-LEAF = 4  # triangles in a leaf, at most, unless all have one middle
-DEEP = 96
+WIDE = 8  # children of a node, triangles of a leaf, at most: one vector
+STEEP = 32  # down to here, parts are cut where that costs least
+DEEP = 2 * STEEP * WIDE
 NOTHING = -1
 
 
@@ -92,6 +98,27 @@ def _best_cut(boxes, order, first, stop, middles, counts, bins, right):
     return axis, best, scale
 
 
+@inner
+def _halves(boxes, order, first, stop, level, middles, counts, bins, right):
+    """Sort the triangles from `first` to `stop` into two parts, cut where that costs least; returns where the second begins.
+
+    Deep down, parts are halves, so that no tree is deeper than 2 * STEEP.
+    """
+    axis, cut, scale = 0, -1, f4(0)
+    if level < STEEP:
+        axis, cut, scale = _best_cut(boxes, order, first, stop, middles, counts, bins, right)
+    if cut < 0:
+        return (first + stop) // 2
+    i, j = first, stop - 1
+    while i <= j:
+        if _bin(boxes[order[i]], axis, middles[axis], scale) < cut:
+            i += 1
+        else:
+            order[i], order[j] = order[j], order[i]
+            j -= 1
+    return i
+
+
 @njit(_nrt=True)
 def build(boxes, order, bounds, links):
     """Fill bounds (2 T, 6) float32 and links (2 T, 2) int32 for T boxes (T, 6) of triangles; returns how many nodes there are.
@@ -99,101 +126,204 @@ def build(boxes, order, bounds, links):
     order (T,) int32, first 0 to T - 1, is sorted by leaves. Of a leaf, links hold its first place in `order` and its count; of
     another node, that of the first of its two children, which lie side by side, and 0.
     """
-    waiting, depth, nodes = np.empty((DEEP, 3), np.int64), 1, 1
+    waiting, depth, nodes = np.empty((2 * STEEP + 1, 4), np.int64), 1, 1
     counts, bins, right = np.empty(BINS, np.int32), np.empty((BINS + 1, 6), np.float32), np.empty(BINS, np.float32)
     middles = np.empty(6, np.float32)
-    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 0, len(order)
+    waiting[0, 0], waiting[0, 1], waiting[0, 2], waiting[0, 3] = 0, 0, len(order), 0
     while depth > 0:
         depth -= 1
-        node, first, stop = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
+        node, first, stop, level = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2], waiting[depth, 3]
         _bound(boxes, order, first, stop, bounds[node], middles)
-        axis, cut, scale = 0, -1, f4(0)
-        if stop - first > LEAF and depth + 2 < DEEP:
-            axis, cut, scale = _best_cut(boxes, order, first, stop, middles, counts, bins, right)
-        if cut < 0:
+        if stop - first <= WIDE:
             links[node, 0], links[node, 1] = first, stop - first
             continue
-        i, j = first, stop - 1
-        while i <= j:
-            if _bin(boxes[order[i]], axis, middles[axis], scale) < cut:
-                i += 1
-            else:
-                order[i], order[j] = order[j], order[i]
-                j -= 1
+        cut = _halves(boxes, order, first, stop, level, middles, counts, bins, right)
         links[node, 0], links[node, 1] = nodes, 0
-        waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = nodes + 1, i, stop
-        waiting[depth + 1, 0], waiting[depth + 1, 1], waiting[depth + 1, 2] = nodes, first, i
+        for k in range(2):
+            own = waiting[depth + k]
+            own[0], own[1], own[2], own[3] = nodes + 1 - k, first if k else cut, cut if k else stop, level + 1
         depth += 2
         nodes += 2
     return nodes
 
 
 @inner
-def _enters(box, o, inverse, limit):
-    """How far along a ray the box begins, infinity where it is missed."""
-    near, far = f4(0), limit
-    for k in range(3):
-        a, b = (box[U(k)] - o[k]) * inverse[k], (box[U(k + 3)] - o[k]) * inverse[k]
-        near, far = max(near, min(a, b)), min(far, max(a, b))
-    return near if near <= far else f4(np.inf)
+def _gather(bounds, links, node, group):
+    """Fill group (WIDE,) with the nodes that stand for `node`: the widest of them gives way to its children as long as there is
+    room. Returns how many there are.
+    """
+    group[0], count = node, 1
+    while count < WIDE:
+        widest, largest = -1, f4(-1)
+        for k in range(count):
+            if links[group[k], 1] == 0 and _area(bounds[group[k]]) > largest:
+                widest, largest = k, _area(bounds[group[k]])
+        if widest < 0:
+            break
+        first = links[group[widest], 0]
+        group[widest], group[count] = first, first + 1
+        count += 1
+    return count
+
+
+@njit(_nrt=True)
+def widen(bounds, links, order, corners, tree):
+    """Fill a `tracing.Tree` with what `build` has found; corners (T, 9): of all triangles. Returns how many nodes there are."""
+    waiting, depth, nodes, leaves = np.empty((2 * STEEP * WIDE, 2), np.int64), 1, 1, 0
+    group = np.empty(WIDE, np.int64)
+    waiting[0, 0], waiting[0, 1] = 0, 0
+    while depth > 0:
+        depth -= 1
+        node = waiting[depth, 1]
+        count = _gather(bounds, links, waiting[depth, 0], group)
+        for k in range(WIDE):
+            tree.links[node, k] = 0
+            for row in range(6):
+                tree.bounds[node, row * WIDE + k] = bounds[group[k], row] if k < count else f4(np.inf)
+            if k >= count:
+                continue
+            first, within = links[group[k], 0], links[group[k], 1]
+            if within == 0:
+                tree.links[node, k] = nodes
+                waiting[depth, 0], waiting[depth, 1] = group[k], nodes
+                depth += 1
+                nodes += 1
+                continue
+            tree.links[node, k] = -1 - leaves
+            for i in range(WIDE):
+                triangle = order[first + min(i, within - 1)]
+                tree.order[leaves * WIDE + i] = triangle
+                for row in range(9):
+                    tree.corners[leaves, row * WIDE + i] = corners[triangle, row] if i < within else f4(0)
+            leaves += 1
+    return nodes
+
+
+def _mask(flags):
+    """Flags of lanes as the bits of an unsigned number."""
+    builder = flags.builder
+    return builder.zext(builder.bitcast(flags.value, ir.IntType(WIDE)), ir.IntType(64))
+
+
+def _rows(context, builder, signature, arguments, count):
+    """Of the first argument, an array, the item that the second one counts: so many rows of WIDE numbers."""
+    data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+    first = builder.mul(arguments[1], arguments[1].type(count * WIDE))
+    return [_exact(load(builder, data, builder.add(first, first.type(row * WIDE)), WIDE)) for row in range(count)]
+
+
+def _exact(lanes):
+    """Rays that pass between two triangles of a closed surface by some rounding would bring light from behind it."""
+    return Exact(lanes.builder, lanes.value)
+
+
+def _spread(builder, numbers):
+    return [_exact(spread(builder, number, WIDE)) for number in cgutils.unpack_tuple(builder, numbers)]
+
+
+@intrinsic
+def _enters(typing, bounds, node, o, inverse, limit, stack):
+    """Which children of a node a ray enters before `limit`, as bits; how far along it, into the first places of the stack."""
+
+    def code(context, builder, signature, arguments):
+        box = _rows(context, builder, signature, arguments, 6)
+        start, turned = _spread(builder, arguments[2]), _spread(builder, arguments[3])
+        far = _exact(spread(builder, arguments[4], WIDE))
+        near = far.all(0.0)
+        for k in range(3):
+            a, b = (box[k] - start[k]) * turned[k], (box[k + 3] - start[k]) * turned[k]
+            near, far = most(least(a, b), near), least(most(a, b), far)
+        store(context.make_array(signature.args[5])(context, builder, arguments[5]).data, arguments[1].type(0), near)
+        return _mask((near <= far) & (near < np.inf))
+
+    return nb.uint64(bounds, nb.uintp, o, inverse, nb.float32, stack), code
+
+
+@intrinsic
+def _meets(typing, corners, leaf, o, d, limit, stack):
+    """Which triangles of a leaf (first corner, two edges) a ray meets before `limit`, as bits (Moeller and Trumbore); how far
+    along it, into the first places of the stack.
+    """
+
+    def code(context, builder, signature, arguments):
+        rows = _rows(context, builder, signature, arguments, 9)
+        start, way = _spread(builder, arguments[2]), _spread(builder, arguments[3])
+        corner, a, b = rows[:3], rows[3:6], rows[6:]
+        p = cross(way, b)
+        scale = 1 / dot(a, p)
+        s = [start[k] - corner[k] for k in range(3)]
+        q = cross(s, a)
+        # Numbers without bounds, where the ray lies in the triangle's plane, pass no comparison.
+        u, v, t = dot(s, p) * scale, dot(way, q) * scale, dot(b, q) * scale
+        store(context.make_array(signature.args[5])(context, builder, arguments[5]).data, arguments[1].type(0), t)
+        return _mask((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < spread(builder, arguments[4], WIDE)))
+
+    return nb.uint64(corners, nb.uintp, o, d, nb.float32, stack), code
+
+
+@intrinsic
+def _first(typing, bits):
+    """The place of the lowest bit that is set."""
+
+    def code(context, builder, signature, arguments):
+        return builder.cttz(arguments[0], ir.IntType(1)(1))
+
+    return nb.uintp(nb.uint64), code
 
 
 @inner
-def _meets(corner, o, d, limit):
-    """How far along a ray it meets a triangle (first corner, two edges); `limit` where it does not (Moeller and Trumbore)."""
-    ax, ay, az, bx, by, bz = corner[U(3)], corner[U(4)], corner[U(5)], corner[U(6)], corner[U(7)], corner[U(8)]
-    px, py, pz = d[1] * bz - d[2] * by, d[2] * bx - d[0] * bz, d[0] * by - d[1] * bx
-    det = ax * px + ay * py + az * pz
-    if det == f4(0):
-        return limit
-    scale = f4(1) / det
-    x, y, z = o[0] - corner[U(0)], o[1] - corner[U(1)], o[2] - corner[U(2)]
-    u = (x * px + y * py + z * pz) * scale
-    if u < f4(0) or u > f4(1):
-        return limit
-    qx, qy, qz = y * az - z * ay, z * ax - x * az, x * ay - y * ax
-    v = (d[0] * qx + d[1] * qy + d[2] * qz) * scale
-    t = (bx * qx + by * qy + bz * qz) * scale
-    return t if v >= f4(0) and u + v <= f4(1) and t > f4(0) and t < limit else limit
+def _over(d):
+    """1 / d, or a large number: infinity times nothing is no place."""
+    return f4(1) / d if abs(d) > f4(1e-30) else f4(1e30)
 
 
 @inner
 def nearest(tree, o, d, limit, is_any, stack):
-    """The place in the tree of the first triangle that a ray meets before `limit`, -1 for none, and how far along it.
+    """The place in the tree's leaves of the first triangle that a ray meets before `limit`, -1 for none, and how far along it.
 
     o, d: tuples; stack (DEEP, 2) float32: scratch; is_any: any triangle will do.
     """
-    least, found = limit, NOTHING
-    inverse = (f4(1) / d[0], f4(1) / d[1], f4(1) / d[2])
-    depth = U(0)
-    begin = _enters(tree.bounds[U(0)], o, inverse, least)
-    if begin < f4(np.inf):
-        stack[0, 0], stack[0, 1], depth = f4(0), begin, U(1)
-    while depth > U(0):
+    shortest, found = limit, NOTHING
+    inverse = _over(d[0]), _over(d[1]), _over(d[2])
+    bottom = U(WIDE // 2)
+    stack[bottom, U(0)], stack[bottom, U(1)], depth = f4(0), f4(0), bottom + U(1)
+    while depth > bottom:
         depth -= U(1)
-        if stack[depth, U(1)] > least:
+        if stack[depth, U(1)] >= shortest:
             continue
-        node = U(nb.int32(stack[depth, U(0)]))
-        first, count = tree.links[node, U(0)], tree.links[node, U(1)]
-        if count > 0:
-            for i in range(U(first), U(first + count)):
-                t = _meets(tree.corners[i], o, d, least)
-                if t < least:
-                    least, found = t, nb.int64(i)
+        link = nb.int32(stack[depth, U(0)])
+        if link < 0:
+            leaf = U(-1 - link)
+            bits = _meets(tree.corners, leaf, o, d, shortest, stack)
+            while bits:
+                k = _first(bits)
+                t = stack[k >> U(1), k & U(1)]
+                if t < shortest:
+                    shortest, found = t, nb.int64(leaf * U(WIDE) + k)
+                bits &= bits - nb.uint64(1)
             if is_any and found >= 0:
-                return found, least
+                return found, shortest
             continue
-        a, b = U(first), U(first + 1)
-        near, far = _enters(tree.bounds[a], o, inverse, least), _enters(tree.bounds[b], o, inverse, least)
-        if far < near:
-            a, b, near, far = b, a, far, near
-        if far < f4(np.inf):
-            stack[depth, U(0)], stack[depth, U(1)] = f4(b), far
+        bits = _enters(tree.bounds, U(link), o, inverse, shortest, stack)
+        top = depth
+        while bits:
+            k = _first(bits)
+            t, i = stack[k >> U(1), k & U(1)], depth
+            while i > top and stack[i - U(1), U(1)] < t:
+                stack[i, U(0)], stack[i, U(1)] = stack[i - U(1), U(0)], stack[i - U(1), U(1)]
+                i -= U(1)
+            stack[i, U(0)], stack[i, U(1)] = f4(tree.links[U(link), k]), t
             depth += U(1)
-        if near < f4(np.inf):
-            stack[depth, U(0)], stack[depth, U(1)] = f4(a), near
-            depth += U(1)
-    return found, least
+            bits &= bits - nb.uint64(1)
+    return found, shortest
+
+
+@inner
+def triangle(tree, place):
+    """The first corner and both edges of the triangle at a place in the tree's leaves."""
+    row, k = tree.corners[U(place) // U(WIDE)], U(place) % U(WIDE)
+    a, b, c, w = k + U(3 * WIDE), k + U(6 * WIDE), U(WIDE), U(2 * WIDE)
+    return (row[k], row[k + c], row[k + w]), (row[a], row[a + c], row[a + w]), (row[b], row[b + c], row[b + w])
 
 
 @njit(_nrt=True)

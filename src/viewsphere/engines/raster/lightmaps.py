@@ -18,7 +18,7 @@ from viewsphere.engines.raster.records import Float32, Int32
 
 Float = NDArray[np.float64]
 
-CELL, MOST = 0.1, 24_000
+CELL, MOST = 0.1, 64_000
 """Metres between nodes at least, and how many there are at most."""
 
 LEAST, NARROW = 0.05, 0.05

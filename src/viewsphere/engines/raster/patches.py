@@ -61,6 +61,13 @@ class Patches:
     count: int
     ids: tuple[Int32, ...]
 
+    def trimmed(self) -> Patches:
+        """Without places for further ones."""
+        table = self.table._replace(keys=self.table.keys[:0].copy(), patch=self.table.patch[:0].copy())
+        for name in ("known", "triangle", "far", "place", "way", "normal"):
+            table = table._replace(**{name: getattr(table, name)[: self.count].copy()})
+        return Patches(table, self.count, self.ids)
+
     @property
     def is_ground(self) -> NDArray[np.bool_]:
         """Which patches lie on the ground, (M,)."""
@@ -136,20 +143,30 @@ _ANY_VIEW = PictureRays(
 """A view whose rays have no grid: footprints are taken across each ray, see `kernels_material`."""
 
 
-def patches_of(bundles: list[Rays], normals: Float32, materials: Int32, box: Float32, cells: float, ground: Float32) -> Patches:
-    """The patches that all these rays hit, in their order; other arguments as in `kernels_probes.patch`."""
-    size = ROOM
+def patches_of(
+    bundles: list[Rays],
+    normals: Float32,
+    materials: Int32,
+    box: Float32,
+    cells: float,
+    ground: Float32,
+    begun: Patches | None = None,
+) -> Patches:
+    """The patches that all these rays hit, in their order; `begun`: those of the first bundles, whose table is gone on with;
+    other arguments as in `kernels_probes.patch`.
+    """
+    done = begun or Patches(_empty(ROOM), 0, ())
     while True:
-        table, count, ids = _empty(size), 0, list[Int32]()
-        for rays in bundles:
+        table, count, ids = done.table, done.count, list(done.ids)
+        for rays in bundles[len(ids) :]:
             own = np.empty(rays.met.shape, np.int32)
             if count >= 0:
                 met = rays.met, rays.far, rays.origins, rays.directions, rays.turn
                 count = kernels.patch(*met, normals, materials, box, np.float32(cells), ground, table, count, own)
             ids.append(own)
         if count >= 0:
-            return Patches(_cut(table, count), count, tuple(ids))
-        size *= 2
+            return Patches(table, count, tuple(ids))
+        done = Patches(_empty(2 * len(table.keys)), 0, ())
 
 
 def _empty(size: int) -> Table:
@@ -163,11 +180,3 @@ def _empty(size: int) -> Table:
         np.zeros((half, kernels.HITS), np.float32),
         *vectors,
     )
-
-
-def _cut(table: Table, count: int) -> Table:
-    """Without the table itself, and what has no patch."""
-    kept = table._replace(keys=np.zeros(0, np.uint64), patch=np.zeros(0, np.int32), known=table.known[:count].copy())
-    kept = kept._replace(triangle=table.triangle[:count].copy(), far=table.far[:count].copy())
-    place, way, normal = (values[:count].copy() for values in (table.place, table.way, table.normal))
-    return kept._replace(place=place, way=way, normal=normal)

@@ -12,8 +12,11 @@ from viewsphere.engines.raster.records import Float32, Int32
 
 
 class Tree(NamedTuple):
-    """Boxes around T triangles, in leaves' order. bounds (N, 6) float32: lowest and highest x, y, z of each node; links (N, 2)
-    int32: see `kernels_trace.build`; corners (T, 9) float32: first corner and both edges; order (T,) int32: which triangles.
+    """Boxes around triangles: eight to a node, eight triangles to a leaf, as the processor's vectors take them.
+
+    bounds (N, 6 * 8) float32: of a node's children the lowest x of all, then y, z and the highest; links (N, 8) int32: each
+    child's node, or -1 - k where it is leaf k, 0 for none; corners (L, 9 * 8) float32: of a leaf's triangles the first corner's
+    x, y, z and both edges; order (L * 8,) int32: which triangles, some places twice.
     """
 
     bounds: Float32
@@ -28,9 +31,18 @@ def tree_of(corners: Float32) -> Tree:
     boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
     order = np.arange(len(corners), dtype=np.int32)
     bounds, links = np.empty((2 * len(corners), 6), np.float32), np.empty((2 * len(corners), 2), np.int32)
-    nodes = kernels.build(boxes, order, bounds, links)
-    a, b, c = corners[order].transpose(1, 0, 2)
-    return Tree(bounds[:nodes].copy(), links[:nodes].copy(), np.concatenate([a, b - a, c - a], axis=1), order)
+    count = kernels.build(boxes, order, bounds, links)
+    leaves = int(np.count_nonzero(links[:count, 1]))
+    a, b, c = corners.transpose(1, 0, 2)
+    wide = kernels.WIDE
+    tree = Tree(
+        np.empty((leaves, 6 * wide), np.float32),
+        np.empty((leaves, wide), np.int32),
+        np.empty((leaves, 9 * wide), np.float32),
+        np.empty(leaves * wide, np.int32),
+    )
+    nodes = kernels.widen(bounds, links, order, np.concatenate([a, b - a, c - a], axis=1), tree)
+    return tree._replace(bounds=tree.bounds[:nodes].copy(), links=tree.links[:nodes].copy())
 
 
 def cast(tree: Tree, origins: Float32, directions: Float32, turn: Int32, limit: float) -> tuple[Int32, Float32]:
