@@ -19,7 +19,7 @@ from viewsphere.assets.cache import load_normalised
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.sampling.physics import World
+from viewsphere.sampling.physics import STEP_S, World
 from viewsphere.sampling.samplers._random import scene_laid
 from viewsphere.zoo import build_zoo_model
 
@@ -52,13 +52,11 @@ def main() -> None:
     def watched(self: World, *args: Any, **more: Any) -> bool:
         calm = settled(self, *args, **more)
         before, overlap = np.array(self.poses), 1000 * self.deepest
-        kept, held = (self._data.qpos.copy(), self._data.qvel.copy(), self._steps), sorted(self._held)
+        kept = self._data.qpos.copy(), self._data.qvel.copy(), self._steps
         begun = time.process_time()
-        self._hold(())
-        self.step(500)
+        self.step(round(self._scale**0.5 / STEP_S))
         way = 1000 * np.linalg.norm(np.array(self.poses)[:, :3, 3] - before[:, :3, 3], axis=1).max()
         self._data.qpos[:], self._data.qvel[:], self._steps = kept
-        self._hold(held)
         ends.append((overlap, float(way)))
         lost[0] += time.process_time() - begun
         return calm

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from resting import deepest, one_more_second, placed, solids, spec
+from resting import deepest, one_more_second, placed, shape_of, solids, spec
 from small import small_recipe, tree_hash
 from viewsphere import plugins
 from viewsphere.errors import RecipeError, StoreError
@@ -60,6 +60,15 @@ def test_things_lie_on_a_table_and_none_beside_it():
     board = Board((0.0, 0.0, -0.015), (0.4, 0.3, 0.015))
     way, turn, sunk = one_more_second(shapes, poses, [board], -0.7)
     assert way < 0.001 and turn < 0.5 and sunk < 0.002 and deepest(placed(shapes, poses)) < 0.002
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3, 4])
+def test_an_open_laptop_that_is_wider_than_a_shelf_lies_on_it(seed):
+    """And is not caught above the shelf by what keeps things there while they fall."""
+    base = [[x, y, z] for x in (-0.2, 0.2) for y in (-0.14, 0.14) for z in (0.0, 0.02)]
+    laptop = shape_of(np.array([*base, [-0.2, 0.24, 0.1], [0.2, 0.24, 0.1]]))
+    (pose,) = fallen([laptop], seed=seed, free=rectangle(0.7, 0.3), below=0.7)
+    assert np.abs(np.sort(placed([laptop], [pose])[0][:, 2])[:4]).max() < 0.002
 
 
 def test_things_lie_in_a_box():

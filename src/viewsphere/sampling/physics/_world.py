@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -29,14 +30,14 @@ LOOK = 25
 CALM_LOOKS = 12
 CALM_SPEED, CALM_TURN = 0.03, 0.3
 CALM_WAY, CALM_ANGLE = 0.0003, 0.002
-"""A body is at rest when so many looks found it slower than this, metres and radians a second, and it went no farther from the
-first to the last. The speeds are those of a thing that trembles on the spot, from one corner that touches to the next.
+"""Bodies seem to be at rest when so many looks found them slower than this, metres and radians a second, and they went no
+farther from the first to the last. The speeds are those of a thing that trembles on the spot, from one corner that touches to
+the next.
 """
 
-CREEP, HELD, HELD_ROLLING = 1.7, 0.3, 10.0
-"""What holds a body that creeps on when all are slow, this many times farther than one at rest at most, so that it goes less
-than a millimetre and half a degree a second when it is let go: a friction against going anywhere, of its weight, and how many
-times more than `ROLLING` against turning. Its contacts jump from corner to corner of both hulls and take it along.
+REST_S, REST_WAY, REST_ANGLE = 1.0, 0.0009, math.radians(0.45)
+"""They are at rest when they are let go there and stay so near, metres and radians, for so many seconds: what stands on an edge
+falls a moment later.
 """
 
 DAMPED_S, DAMPING = 2.0, 4.0
@@ -84,7 +85,6 @@ class World:
     def begin(self, poses: Sequence[Matrix4]) -> None:
         """Let the bodies go from these poses, as in a new world; fences that were taken away stay away."""
         self._data, self._steps = self._mujoco.MjData(self._model), 0
-        self._hold(())
         for number, pose in enumerate(poses):
             self.put(number, pose)
 
@@ -110,7 +110,8 @@ class World:
             at = {"pos": matrix[:3, 3] * self._scale, "quat": quaternion_from_matrix(matrix[:3, :3])}
             self._add(spec, still.add_body(name=f"fixed {number}", **at), f"fixed part {number}", body)
         model = spec.compile()
-        self._weights = GRAVITY * model.body_mass[1 : 1 + self._bodies]
+        weights = GRAVITY * model.body_mass[1 : 1 + self._bodies]
+        model.dof_frictionloss.reshape(-1, 6)[:, 3:] = ROLLING * weights[:, None]
         model.dof_solref[:], model.dof_solimp[:, :2] = (SOFT_S, 1.0), 0.99
         return model
 
@@ -128,29 +129,12 @@ class World:
         matrix = np.array(pose)
         at, speed = self._data.qpos.reshape(-1, 7)[number], self._data.qvel.reshape(-1, 6)[number]
         at[:3], at[3:], speed[:] = matrix[:3, 3] * self._scale, quaternion_from_matrix(matrix[:3, :3]), 0.0
-        self._hold(sorted(self._held - {number}))
 
-    def _hold(self, numbers: Sequence[int] | NDArray[np.int_]) -> None:
-        """Hold these bodies, and no others."""
-        friction = self._model.dof_frictionloss.reshape(-1, 6)
-        friction[:, :3], friction[:, 3:] = 0.0, ROLLING * self._weights[:, None]
-        for number in numbers:
-            friction[number, :3] = HELD * self._weights[number]
-            friction[number, 3:] *= HELD_ROLLING
-        self._held = frozenset(map(int, numbers))
-
-    def take_fences_away(self) -> bool:
-        """Let bodies go where fences were; whether any leant on one."""
-        leant = bool(np.isin(self._data.contact.geom[: self._data.ncon], self._fences).any())
+    def take_fences_away(self) -> None:
+        """Let bodies go where fences were."""
         for number in self._fences:
             self._model.geom_contype[number] = self._model.geom_conaffinity[number] = 0
         self._fences = []
-        return leant
-
-    @property
-    def has_fences(self) -> bool:
-        """Whether fences are there."""
-        return bool(self._fences)
 
     @property
     def seconds(self) -> float:
@@ -170,17 +154,19 @@ class World:
     def settle(
         self,
         longest_s: float = LONGEST_S,
+        rest_s: float = REST_S,
         each: int = LOOK,
         look: Callable[[], None] | None = None,
         ends: Callable[[], bool] | None = None,
     ) -> bool:
-        """Let time go by until all bodies are at rest; whether they are before so many simulated seconds are over, and before
-        `ends` says that it is of no use. `look` is called every so many steps, and `ends` after it.
+        """Let time go by until all bodies stay where they are for `rest_s`, and go back to when that began; whether it begins
+        before so many simulated seconds are over, and before `ends` says that all is of no use. `look` is called every so many
+        steps, and `ends` after it.
         """
-        self._hold(())
-        calm: list[Float] = []
-        for step in range(each, int(longest_s / STEP_S) + 1, each):
-            if calm or self._steps * STEP_S < DAMPED_S:
+        calm, tried, begun, step = list[Float](), None, 0, 0
+        while tried is not None or (step + each) * STEP_S <= longest_s:
+            step += each
+            if calm or tried is not None or self._steps * STEP_S < DAMPED_S:
                 self.step(each)
             else:
                 self._damped(each)
@@ -188,16 +174,26 @@ class World:
                 look()
             if ends is not None and ends():
                 return False
-            if step % LOOK < each:
-                calm = [*calm, self._data.qpos.reshape(-1, 7).copy()] if self._is_slow else []
-                if len(calm) >= CALM_LOOKS:
-                    window = calm[-CALM_LOOKS], calm[-1]
-                    creeping = _moving(*window)
-                    if not len(creeping):
-                        return True
-                    if len(calm) % CALM_LOOKS == 0 and not len(_moving(*window, CREEP)):
-                        self._hold(sorted(self._held.union(creeping.tolist())))
+            if step % LOOK >= each:
+                continue
+            now = self._data.qpos.reshape(-1, 7).copy()
+            if tried is not None and _are_near(tried, now, REST_WAY * self._scale, REST_ANGLE):
+                if (self._steps - begun) * STEP_S >= rest_s * self._scale**0.5:
+                    self._let_go(tried, begun)
+                    return True
+                continue
+            tried, calm = None, [*calm, now] if self._is_slow else []
+            if len(calm) >= CALM_LOOKS and _are_near(calm[-CALM_LOOKS], now, CALM_WAY, CALM_ANGLE):
+                tried, begun, calm = now, self._steps, []
+                self._let_go(now, begun)
+                if not rest_s:
+                    return True
         return False
+
+    def _let_go(self, state: Float, steps: int) -> None:
+        """Put all bodies at rest in a state (N, 7), which was after so many steps."""
+        self._data.qpos[:], self._data.qvel[:], self._steps = state.ravel(), 0.0, steps
+        self._mujoco.mj_forward(self._model, self._data)
 
     @property
     def _is_slow(self) -> bool:
@@ -236,11 +232,11 @@ class World:
         return frozenset((int(min(p)), int(max(p))) for p in owner[pairs])
 
 
-def _moving(before: Float, now: Float, times: float = 1.0) -> NDArray[np.int_]:
-    """Numbers of the bodies that went farther between two states than `times` what is rest."""
-    way = np.linalg.norm(now[:, :3] - before[:, :3], axis=1)
+def _are_near(before: Float, now: Float, way: float, angle: float) -> bool:
+    """Whether all bodies went less far, and turned less, between two states (N, 7)."""
+    gone = np.linalg.norm(now[:, :3] - before[:, :3], axis=1)
     half = np.abs((now[:, 3:] * before[:, 3:]).sum(axis=1)).clip(0, 1)
-    return np.flatnonzero((way >= times * CALM_WAY) | (2 * np.arccos(half) >= times * CALM_ANGLE))
+    return bool(gone.max() < way and 2 * np.arccos(half.min()) < angle)
 
 
 def _contact(touch: Touch) -> dict[str, Any]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -120,18 +121,26 @@ class Drop:
         """What comes of one draw, and, where it is not good, how bad that is, and in words."""
         places = [self._spheres(i) for i in range(len(self.cast))]
         starts = self._starts(number, range(len(self.cast)), places, [])
-        fences = tuple(_fences(self.ground.within, FENCE * max(s.length for s in self.shapes))) if self.ground.within else ()
+        fences = self._fences(self.ground.within, starts) if self.ground.within else ()
         fixed = [(body_of(self._parts(shape), 1.0), pose) for shape, pose in self.room.taken]
         world = World(self._bodies, starts, (*self.ground.boards, *fences), self.typical, -self.room.below, fixed)
         if moment == "mid":
             return self._flying(world, number), None
         film = _Film(world) if self.room.moves else None
-        settle = partial(world.settle, longest_s, RECORDED, film.shoot) if film else partial(world.settle, longest_s)
-        calm = settle()
-        if fences and calm and (world.take_fences_away() or self._beside(world, self.ground.height)):
+        settle = partial(world.settle, longest_s, each=RECORDED, look=film.shoot) if film else partial(world.settle, longest_s)
+        calm = settle(rest_s=0.0) if fences else settle()
+        if fences and calm:
+            world.take_fences_away()
             calm = settle() if film else self._kept(world, number, places, longest_s)
         made: dict[str, Any] = {"poses": world.poses}
         return made | ({"ways": film.ways} if film else {}), self._problem(world, calm, bool(film))
+
+    def _fences(self, within: Footprint, starts: Sequence[Matrix4]) -> tuple[Board, ...]:
+        """Around where things have to stay, and around all that is let go: what is as wide would be caught between them."""
+        corners = [transform(np.array(pose), body.corners)[:, :2] for body, pose in zip(self._bodies, starts, strict=True)]
+        reach = np.abs((np.concatenate(corners) - within.center) @ within.axes.T).max(axis=0)
+        around = replace(within, half=np.maximum(within.half, reach + CLEAR))
+        return tuple(_fences(around, FENCE * max(s.length for s in self.shapes)))
 
     def _kept(self, world: World, number: str, places: Sequence[tuple[Float, float]], longest_s: float) -> bool:
         """Let time go by until all are at rest where they have to stay; whether they are at rest. What leaves is let go
@@ -250,8 +259,10 @@ class _Film:
 
     @property
     def ways(self) -> dict[str, Any]:
-        states = np.round(np.array(self._states), 6) + 0.0
-        return {"seconds": np.round(self._seconds, 6).tolist(), "states": states.transpose(1, 0, 2).tolist()}
+        """Until all is at rest."""
+        count = bisect_right(self._seconds, self._world.seconds)
+        states = np.round(np.array(self._states[:count]), 6) + 0.0
+        return {"seconds": np.round(self._seconds[:count], 6).tolist(), "states": states.transpose(1, 0, 2).tolist()}
 
 
 def ways_of(made: dict[str, Any]) -> list[Way]:
