@@ -3,8 +3,9 @@
 import pytest
 
 from small import ROOT
-from viewsphere import Recipe, generate
+from viewsphere import Recipe, generate, plan
 from viewsphere.check import check
+from viewsphere.run.stages import Stages
 from viewsphere.store import Dataset
 
 SCENES = {"tabletop_fall": 6, "bin_picking": 10, "flying_things": 6}
@@ -53,6 +54,15 @@ def test_the_recipe_of_a_town_makes_a_data_set_that_passes(tmp_path):
     dataset = Dataset(tmp_path)
     assert len(dataset) == 2
     assert check(dataset, sample=1).ok
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "apart"), [*((name, 1) for name in SCENES), ("rooms", 28)])
+def test_what_a_recipe_draws_has_room_and_comes_to_rest(name, apart):
+    """One scene that does not would end a whole run."""
+    planned, stages = plan(changed(name)), Stages()
+    for number in range(0, planned.shot_count, apart):
+        assert planned.shot(number, stages.box).things
 
 
 @pytest.mark.parametrize("name", [*SCENES, "occluded", "rooms", "town"])
