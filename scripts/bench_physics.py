@@ -2,8 +2,8 @@
 
     scripts/bench --physics
 
-Overlap is the deepest contact at rest; drift what one more second of gravity does to the farthest, when nothing holds what
-creeps. Meshes and hulls are made before.
+Overlap is the deepest contact at rest; drift what one more second of gravity does to the farthest. Meshes and
+hulls are made before.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from viewsphere.assets.load import load_model
-from viewsphere.assets.mesh import Texture
+from viewsphere.assets.mesh import HIGHEST_IOR, Texture
 from viewsphere.errors import ModelError
 
 
@@ -214,6 +214,13 @@ def full_material():
             "KHR_materials_unlit": {},
         },
     }
+
+
+@pytest.mark.parametrize(("told", "read"), [(0, 0.0), (2.4, 2.4), (1e20, HIGHEST_IOR)])
+def test_no_material_refracts_more_than_any_there_is(gltf, told, read):
+    gltf.root["materials"] = [{"extensions": {"KHR_materials_ior": {"ior": told}}}]
+    gltf.node(mesh=gltf.mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32), None, material=0))
+    assert load(gltf).materials[0].ior == read
 
 
 def test_every_material_field_is_read(gltf):

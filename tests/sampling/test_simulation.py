@@ -1,5 +1,6 @@
 """Bodies fall as they do, bounce as they should, come to rest, and lie beside one another."""
 
+import itertools
 import math
 import sys
 
@@ -114,8 +115,41 @@ def test_what_stands_still_for_a_moment_is_not_at_rest():
     assert world.poses[0][0][3] > 0.1
 
 
-def test_bodies_are_left_where_they_began_to_rest():
-    world, seen = World([body_of([cube()], 300.0)], [at(0, 0, 0.3)], (), 0.4), []
-    assert world.settle(look=lambda: seen.append(world.seconds))
-    assert seen[-1] - world.seconds == pytest.approx(1.0, abs=0.06)
-    assert world.speed == 0 and world.deepest < 0.002
+def test_what_turns_a_degree_a_second_is_not_at_rest():
+    world, angles = on_ice(0.0), itertools.count(0.0, 0.0005)
+
+    def look():
+        half = next(angles)
+        world._data.qpos[3:] = math.cos(half), 0.0, 0.0, math.sin(half)
+
+    assert not world.settle(1.8, look=look)
+
+
+@pytest.mark.parametrize("typical", [0.02, 0.4, 20.0])
+def test_bodies_are_left_where_they_began_to_rest(typical):
+    """A second of the world's passes after that, whatever the scale, and for it bodies are let go without any speed."""
+    body, seen = body_of([cube(typical / 2)], 300.0, touch=Touch(friction=0.0)), []
+    world = World([body], [at(0, 0, 0.6 * typical)], (), typical)
+
+    def look():
+        seen.append((world.seconds, world.poses[0][0][3]))
+        if len(seen) == 12:
+            world._data.qvel[0] = 0.0003
+
+    assert world.settle(look=look)
+    assert world.speed == 0 and world.deepest < 0.005 * typical
+    between = seen[1][0] - seen[0][0]
+    assert -1e-9 <= seen[-1][0] - world.seconds - 1.0 < 0.01 + between
+    rested = [x for seconds, x in seen if seconds >= world.seconds - between / 2]
+    assert max(rested) - min(rested) < 2e-5 * typical
+
+
+def test_a_large_thing_that_goes_two_millimetres_a_second_is_not_at_rest():
+    world = World([body_of([cube(10.0)], 300.0, touch=Touch(friction=0.0))], [at(0, 0, 10.0)], (), 20.0)
+    world.step(100)
+    world._data.qvel[0] = 0.002 * world._scale**0.5
+
+    def look():
+        world._data.qvel[0] = 0.002 * world._scale**0.5
+
+    assert not world.settle(1.8, look=look)

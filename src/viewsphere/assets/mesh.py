@@ -47,6 +47,10 @@ class Texture:
         return np.array([[c * u, s * v, x], [-s * u, c * v, y]])
 
 
+HIGHEST_IOR = 4.0
+"""Index of refraction that a file's material has at most: germanium's; diamond's is 2.4."""
+
+
 @dataclass(frozen=True)
 class Material:
     """glTF 2.0 metallic-roughness and its common extensions; colours linear.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder
-from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.assets.mesh import HIGHEST_IOR, Image, Material, Texture
 from viewsphere.assets.srgb import encoded, linear
 
 Float = NDArray[Any]
@@ -80,7 +80,7 @@ class _Work:
             thickness=WALL if told["transmission"] != 0 else 0.0,
             **self._scalar("specular", told["specular"]),
             specular_color=self._mean_color(told["specular_color"]),
-            ior=min(max(self._mean(told["ior"]), 1.0), 4.0),
+            ior=min(max(self._mean(told["ior"]), 1.0), HIGHEST_IOR),
         )
 
     def _base(self) -> Material:

@@ -27,7 +27,7 @@ _FLAGS = tuple(sorted(FAST))
 class Lanes:
     """Numbers side by side: float32, int32, or the flags of a comparison. The other operand may be one number for all lanes."""
 
-    flags = _FLAGS
+    fast = _FLAGS
 
     def __init__(self, builder: ir.IRBuilder, value: Any) -> None:
         self.builder = builder
@@ -52,9 +52,10 @@ class Lanes:
     def _do(self, real: str, whole: str, other: Any, *, swap: bool = False) -> Lanes:
         values = self.value, self.like(other)
         values = values[::-1] if swap else values
+        kind = Strict if isinstance(other, Strict) else type(self)
         if self.is_real:
-            return type(self)(self.builder, getattr(self.builder, real)(*values, flags=self.flags))
-        return type(self)(self.builder, getattr(self.builder, whole)(*values))
+            return kind(self.builder, getattr(self.builder, real)(*values, flags=kind.fast))
+        return kind(self.builder, getattr(self.builder, whole)(*values))
 
     def __add__(self, other: Any) -> Lanes:
         return self._do("fadd", "add", other)
@@ -144,13 +145,13 @@ class Lanes:
         suffix = f"v{self.value.type.count}f32"
         kind = ir.FunctionType(self.value.type, [self.value.type])
         function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.{name}.{suffix}")
-        return type(self)(self.builder, self.builder.call(function, [self.value], fastmath=self.flags))
+        return type(self)(self.builder, self.builder.call(function, [self.value], fastmath=self.fast))
 
 
-class Exact(Lanes):
-    """Lanes whose results are rounded one by one, as those of single numbers are."""
+class Strict(Lanes):
+    """Lanes whose results, also those with other lanes, are rounded one by one, as those of single numbers are."""
 
-    flags = ()
+    fast = ()
 
 
 def where(flags: Lanes, yes: Any, no: Any) -> Lanes:

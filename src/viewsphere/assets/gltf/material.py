@@ -11,7 +11,7 @@ import numpy as np
 
 from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.field import Field
-from viewsphere.assets.mesh import Material, Texture, Wrap
+from viewsphere.assets.mesh import HIGHEST_IOR, Material, Texture, Wrap
 
 WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 NEAREST = 9728
@@ -86,7 +86,7 @@ class _Reader:
             found["thickness"] = volume.number("thicknessFactor", 0.0)
         refraction = entry.extension("KHR_materials_ior")
         if refraction is not None:
-            found["ior"] = refraction.number("ior", 1.5)
+            found["ior"] = min(refraction.number("ior", 1.5), HIGHEST_IOR)
         specular = entry.extension("KHR_materials_specular")
         if specular is not None:
             found["specular"] = specular.number("specularFactor", 1.0)

@@ -14,7 +14,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from viewsphere.kernels.jit import inner, njit
-from viewsphere.kernels.lanes import Exact, cross, dot, least, load, most, spread, store
+from viewsphere.kernels.lanes import Strict, cross, dot, least, load, most, spread, store
 
 f4 = nb.float32
 U = nb.uintp
@@ -22,6 +22,7 @@ BINS = 16
 WIDE = 8  # children of a node, triangles of a leaf, at most: one vector
 STEEP = 32  # down to here, parts are cut where that costs least
 DEEP = 2 * STEEP * WIDE
+ROUNDED = 1.0000005  # farther than the end of a box may be by rounding: a box that is missed so would let rays through a wall
 NOTHING = -1
 
 
@@ -70,7 +71,7 @@ def _best_cut(boxes, order, first, stop, middles, counts, bins, right):
         if middles[k + 3] - middles[k] > middles[axis + 3] - middles[axis]:
             axis = k
     low, span = middles[axis], middles[axis + 3] - middles[axis]
-    if not span > f4(0):
+    if not span > f4(1e-30):
         return axis, -1, f4(0)
     scale = f4(BINS) / span
     for k in range(BINS):
@@ -169,7 +170,7 @@ def _gather(bounds, links, node, group):
 @njit(_nrt=True)
 def widen(bounds, links, order, corners, tree):
     """Fill a `tracing.Tree` with what `build` has found; corners (T, 9): of all triangles. Returns how many nodes there are."""
-    waiting, depth, nodes, leaves = np.empty((2 * STEEP * WIDE, 2), np.int64), 1, 1, 0
+    waiting, depth, nodes, leaves = np.empty((DEEP, 2), np.int64), 1, 1, 0
     group = np.empty(WIDE, np.int64)
     waiting[0, 0], waiting[0, 1] = 0, 0
     while depth > 0:
@@ -177,7 +178,7 @@ def widen(bounds, links, order, corners, tree):
         node = waiting[depth, 1]
         count = _gather(bounds, links, waiting[depth, 0], group)
         for k in range(WIDE):
-            tree.links[node, k] = 0
+            tree.links[node, k] = -1
             for row in range(6):
                 tree.bounds[node, row * WIDE + k] = bounds[group[k], row] if k < count else f4(np.inf)
             if k >= count:
@@ -209,16 +210,16 @@ def _rows(context, builder, signature, arguments, count):
     """Of the first argument, an array, the item that the second one counts: so many rows of WIDE numbers."""
     data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
     first = builder.mul(arguments[1], arguments[1].type(count * WIDE))
-    return [_exact(load(builder, data, builder.add(first, first.type(row * WIDE)), WIDE)) for row in range(count)]
+    return [_strict(load(builder, data, builder.add(first, first.type(row * WIDE)), WIDE)) for row in range(count)]
 
 
-def _exact(lanes):
+def _strict(lanes):
     """Rays that pass between two triangles of a closed surface by some rounding would bring light from behind it."""
-    return Exact(lanes.builder, lanes.value)
+    return Strict(lanes.builder, lanes.value)
 
 
 def _spread(builder, numbers):
-    return [_exact(spread(builder, number, WIDE)) for number in cgutils.unpack_tuple(builder, numbers)]
+    return [_strict(spread(builder, number, WIDE)) for number in cgutils.unpack_tuple(builder, numbers)]
 
 
 @intrinsic
@@ -228,13 +229,13 @@ def _enters(typing, bounds, node, o, inverse, limit, stack):
     def code(context, builder, signature, arguments):
         box = _rows(context, builder, signature, arguments, 6)
         start, turned = _spread(builder, arguments[2]), _spread(builder, arguments[3])
-        far = _exact(spread(builder, arguments[4], WIDE))
+        far = _strict(spread(builder, arguments[4], WIDE))
         near = far.all(0.0)
         for k in range(3):
             a, b = (box[k] - start[k]) * turned[k], (box[k + 3] - start[k]) * turned[k]
-            near, far = most(least(a, b), near), least(most(a, b), far)
+            near, far = most(least(b, a), near), least(most(a, b), far)  # passes over NaN: where a ray is in a plane
         store(context.make_array(signature.args[5])(context, builder, arguments[5]).data, arguments[1].type(0), near)
-        return _mask((near <= far) & (near < np.inf))
+        return _mask((near <= far * ROUNDED) & (near < np.inf))
 
     return nb.uint64(bounds, nb.uintp, o, inverse, nb.float32, stack), code
 
@@ -273,8 +274,8 @@ def _first(typing, bits):
 
 @inner
 def _over(d):
-    """1 / d, or a large number: infinity times nothing is no place."""
-    return f4(1) / d if abs(d) > f4(1e-30) else f4(1e30)
+    """1 / d, infinity where that would be none."""
+    return f4(1) / d if abs(d) > f4(1.2e-38) else f4(np.inf)
 
 
 @inner

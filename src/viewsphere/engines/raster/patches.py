@@ -152,8 +152,8 @@ def patches_of(
     ground: Float32,
     begun: Patches | None = None,
 ) -> Patches:
-    """The patches that all these rays hit, in their order; `begun`: those of the first bundles, whose table is gone on with;
-    other arguments as in `kernels_probes.patch`.
+    """The patches that all these rays hit, in their order; `begun`: those of the first bundles, whose table is gone on with
+    and not theirs any more;    other arguments as in `kernels_probes.patch`.
     """
     done = begun or Patches(_empty(ROOM), 0, ())
     while True:

@@ -14,9 +14,9 @@ from viewsphere.engines.raster.records import Float32, Int32
 class Tree(NamedTuple):
     """Boxes around triangles: eight to a node, eight triangles to a leaf, as the processor's vectors take them.
 
-    bounds (N, 6 * 8) float32: of a node's children the lowest x of all, then y, z and the highest; links (N, 8) int32: each
-    child's node, or -1 - k where it is leaf k, 0 for none; corners (L, 9 * 8) float32: of a leaf's triangles the first corner's
-    x, y, z and both edges; order (L * 8,) int32: which triangles, some places twice.
+    bounds (N, 6 * 8) float32: of a node's children the lowest x of all, then y, z and the highest, infinite where there are
+    fewer; links (N, 8) int32: each child's node, or -1 - k where it is leaf k; corners (L, 9 * 8) float32: of a leaf's
+    triangles the first corner's x, y, z and both edges; order (L * 8,) int32: which triangles, some places twice.
     """
 
     bounds: Float32

@@ -36,8 +36,8 @@ the next.
 """
 
 REST_S, REST_WAY, REST_ANGLE = 1.0, 0.0009, math.radians(0.45)
-"""They are at rest when they are let go there and stay so near, metres and radians, for so many seconds: what stands on an edge
-falls a moment later.
+"""They are at rest when they are let go there and stay so near, metres and radians, for so many seconds, all of them the
+world's and not those that are simulated: what stands on an edge falls a moment later.
 """
 
 DAMPED_S, DAMPING = 2.0, 4.0
@@ -159,9 +159,9 @@ class World:
         look: Callable[[], None] | None = None,
         ends: Callable[[], bool] | None = None,
     ) -> bool:
-        """Let time go by until all bodies stay where they are for `rest_s`, and go back to when that began; whether it begins
-        before so many simulated seconds are over, and before `ends` says that all is of no use. `look` is called every so many
-        steps, and `ends` after it.
+        """Let time go by until all bodies stay where they are for `rest_s` of the world's seconds, and go back to when that
+        began; whether it begins before so many simulated ones are over, and before `ends` says that all is of no use. `look`
+        is called every so many steps, and `ends` after it.
         """
         calm, tried, begun, step = list[Float](), None, 0, 0
         while tried is not None or (step + each) * STEP_S <= longest_s:
@@ -179,18 +179,18 @@ class World:
             now = self._data.qpos.reshape(-1, 7).copy()
             if tried is not None and _are_near(tried, now, REST_WAY * self._scale, REST_ANGLE):
                 if (self._steps - begun) * STEP_S >= rest_s * self._scale**0.5:
-                    self._let_go(tried, begun)
+                    self._begin_at(tried, begun)
                     return True
                 continue
             tried, calm = None, [*calm, now] if self._is_slow else []
             if len(calm) >= CALM_LOOKS and _are_near(calm[-CALM_LOOKS], now, CALM_WAY, CALM_ANGLE):
                 tried, begun, calm = now, self._steps, []
-                self._let_go(now, begun)
+                self._begin_at(now, begun)
                 if not rest_s:
                     return True
         return False
 
-    def _let_go(self, state: Float, steps: int) -> None:
+    def _begin_at(self, state: Float, steps: int) -> None:
         """Put all bodies at rest in a state (N, 7), which was after so many steps."""
         self._data.qpos[:], self._data.qvel[:], self._steps = state.ravel(), 0.0, steps
         self._mujoco.mj_forward(self._model, self._data)

@@ -46,8 +46,8 @@ MOST_OVERLAP = 0.002
 CLEAR = 0.001
 """The same of things that are caught in flight, where some hit others."""
 
-FENCE = 50.0
-"""How high fences are, in lengths of the longest thing."""
+FENCE, GAP = 50.0, 0.001
+"""How high fences are, in lengths of the longest thing, and how far from what is let go, metres."""
 
 RECORDED = 5
 """Steps of the simulation between two states of a way."""
@@ -121,7 +121,8 @@ class Drop:
         """What comes of one draw, and, where it is not good, how bad that is, and in words."""
         places = [self._spheres(i) for i in range(len(self.cast))]
         starts = self._starts(number, range(len(self.cast)), places, [])
-        fences = self._fences(self.ground.within, starts) if self.ground.within else ()
+        high = FENCE * max(shape.length for shape in self.shapes)
+        fences = _fences(self._enclosed(self.ground.within, starts), high) if self.ground.within else ()
         fixed = [(body_of(self._parts(shape), 1.0), pose) for shape, pose in self.room.taken]
         world = World(self._bodies, starts, (*self.ground.boards, *fences), self.typical, -self.room.below, fixed)
         if moment == "mid":
@@ -135,12 +136,11 @@ class Drop:
         made: dict[str, Any] = {"poses": world.poses}
         return made | ({"ways": film.ways} if film else {}), self._problem(world, calm, bool(film))
 
-    def _fences(self, within: Footprint, starts: Sequence[Matrix4]) -> tuple[Board, ...]:
-        """Around where things have to stay, and around all that is let go: what is as wide would be caught between them."""
+    def _enclosed(self, within: Footprint, starts: Sequence[Matrix4]) -> Footprint:
+        """Where things have to stay, and all that is let go: what is wider would be caught between fences."""
         corners = [transform(np.array(pose), body.corners)[:, :2] for body, pose in zip(self._bodies, starts, strict=True)]
         reach = np.abs((np.concatenate(corners) - within.center) @ within.axes.T).max(axis=0)
-        around = replace(within, half=np.maximum(within.half, reach + CLEAR))
-        return tuple(_fences(around, FENCE * max(s.length for s in self.shapes)))
+        return replace(within, half=np.maximum(within.half, reach + GAP))
 
     def _kept(self, world: World, number: str, places: Sequence[tuple[Float, float]], longest_s: float) -> bool:
         """Let time go by until all are at rest where they have to stay; whether they are at rest. What leaves is let go
