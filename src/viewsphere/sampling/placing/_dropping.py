@@ -26,7 +26,7 @@ from viewsphere.sampling.placing._parts import convex_parts
 
 Float = NDArray[np.float64]
 
-TRIES = 6
+TRIES = 10
 """Draws of a fall, of which the first that ends well is taken."""
 
 HASTY_S = 5.0
