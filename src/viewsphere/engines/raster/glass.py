@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from viewsphere.engines.raster.kernels_material import L_BENDS
+from viewsphere.engines.raster.kernels_trace import WIDE
 from viewsphere.engines.raster.records import Float32, Int32
 from viewsphere.engines.raster.surface import Rows
 from viewsphere.engines.raster.tracing import tree_of
@@ -25,9 +26,9 @@ class Glass(NamedTuple):
 
 
 NO_GLASS = Glass(
-    np.zeros((0, 48), np.float32),
-    np.zeros((0, 8), np.int32),
-    np.zeros((0, 72), np.float32),
+    np.zeros((0, 6 * WIDE), np.float32),
+    np.zeros((0, WIDE), np.int32),
+    np.zeros((0, 9 * WIDE), np.float32),
     np.zeros((0, 9), np.float32),
     np.zeros(0, np.int32),
 )

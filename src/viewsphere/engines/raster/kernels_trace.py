@@ -233,7 +233,8 @@ def _enters(typing, bounds, node, o, inverse, limit, stack):
         near = far.all(0.0)
         for k in range(3):
             a, b = (box[k] - start[k]) * turned[k], (box[k + 3] - start[k]) * turned[k]
-            near, far = most(least(b, a), near), least(most(a, b), far)  # passes over NaN: where a ray is in a plane
+            # In this order NaN, where the ray lies in a plane of the box, changes neither `near` nor `far`.
+            near, far = most(least(b, a), near), least(most(a, b), far)
         store(context.make_array(signature.args[5])(context, builder, arguments[5]).data, arguments[1].type(0), near)
         return _mask((near <= far * ROUNDED) & (near < np.inf))
 

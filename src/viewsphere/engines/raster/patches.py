@@ -63,9 +63,8 @@ class Patches:
 
     def trimmed(self) -> Patches:
         """Without places for further ones."""
-        table = self.table._replace(keys=self.table.keys[:0].copy(), patch=self.table.patch[:0].copy())
-        for name in ("known", "triangle", "far", "place", "way", "normal"):
-            table = table._replace(**{name: getattr(table, name)[: self.count].copy()})
+        kept = {name: getattr(self.table, name)[: self.count].copy() for name in Table._fields[2:]}
+        table = self.table._replace(keys=self.table.keys[:0].copy(), patch=self.table.patch[:0].copy(), **kept)
         return Patches(table, self.count, self.ids)
 
     @property
