@@ -40,7 +40,8 @@ def open_page(browser, page_file, settle):
     contexts, troubles = [], []
 
     def open_(width=1440, height=900, scheme="light", file=page_file):
-        context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+        # A click waits until its button lies still; a page that scrolls smoothly may still carry the button away from under it.
+        context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme, reduced_motion="reduce")
         contexts.append(context)
         page = context.new_page()
         page.on("console", lambda m: troubles.append(m.text) if m.type == "error" else None)
