@@ -549,20 +549,50 @@ def merged(whole, whole_records, tmp_path_factory):
     return dataset
 
 
-def missed_leaves(dataset, frame, places):
-    """Places in a frame's record where another value is not found, although digests are made to fit."""
-    file = records_file(dataset, frame)
-    text, missed = file.read_text(), []
-    for where in places:
-        records = json.loads(text)
-        inside, key = place_of(records[frame % 4], where)
-        inside[key] = another(inside[key])
-        file.write_text(json.dumps(records))
-        if not failures(dataset, rays=False, sample=None):
-            missed.append(where)
-    file.write_text(text)
+def missed_leaves(dataset, places):
+    """Places of records where another value is not found, although digests are made to fit. Every frame is spoilt at one of
+    them that it has, all frames at once; a frame in which nothing is found then is spoilt alone.
+    """
+    waiting, missed = list(places), []
+    while waiting:
+        spoilt: dict[int, tuple] = {}
+        for where in waiting:
+            free = (frame for frame in range(len(dataset)) if frame not in spoilt and holds(record_of(dataset, frame), where))
+            if (frame := next(free, None)) is not None:
+                spoilt[frame] = where
+            if len(spoilt) == len(dataset):
+                break
+        assert spoilt, waiting
+        waiting = [where for where in waiting if where not in spoilt.values()]
+        found = {frame for _, frame in failures_of(dataset, spoilt)}
+        missed += [where for frame, where in spoilt.items() if frame not in found and not failures_of(dataset, {frame: where})]
     seal_again(dataset.root)
     return missed
+
+
+def holds(record, where):
+    try:
+        inside, key = place_of(record, where)
+        inside[key]
+    except (LookupError, TypeError):
+        return False
+    return True
+
+
+def failures_of(dataset, spoilt):
+    """What is found where frames have another value at these places; the files are left as they were."""
+    texts = {file: file.read_text() for file in {records_file(dataset, frame) for frame in spoilt}}
+    for file, text in texts.items():
+        records = json.loads(text)
+        for frame, where in spoilt.items():
+            if records_file(dataset, frame) == file:
+                inside, key = place_of(records[frame % 4], where)
+                inside[key] = another(inside[key])
+        file.write_text(json.dumps(records))
+    found = failures(dataset, rays=False, sample=None)
+    for file, text in texts.items():
+        file.write_text(text)
+    return found
 
 
 def records_file(dataset, frame):
@@ -582,13 +612,13 @@ def test_every_field_of_every_record_is_proved(whole, merged, tmp_path, kind):
     if kind == "merged":
         assert {field.name for label in labels_of(()) for field in label.fields} <= record["objects"][0].keys()
     first = {where[:3]: where for where in leaves(record)}
-    assert missed_leaves(dataset, 6, first.values()) == []
+    assert missed_leaves(dataset, first.values()) == []
 
 
 @pytest.mark.slow
 def test_every_leaf_of_every_record_is_proved(merged, tmp_path):
     dataset = Dataset(shutil.copytree(merged.root, tmp_path / "out"))
-    assert missed_leaves(dataset, 6, leaves(record_of(dataset, 6))) == []
+    assert missed_leaves(dataset, leaves(record_of(dataset, 6))) == []
 
 
 def test_frames_of_another_split_than_the_plan_dealt(tmp_path):
@@ -630,6 +660,7 @@ def test_every_leaf_of_labels_on_request_is_proved(annotated, tmp_path, kind):
     assert check(dataset, rays=False).ok
     record = record_of(dataset, 1)
     fields = {*ASKED, *(field.name for name in ASKED for field in on_request()[name].fields)}
-    found = [where for where in leaves(record) if fields.intersection(where)]
+    # Of an outline's many corners the first ones are enough.
+    found = [where for where in leaves(record) if fields.intersection(where) and (len(where) < 4 or where[-2] not in range(6, 999))]
     assert {where[2] for where in found if where[0] == "objects"} >= {"amodal", "occluders"}
-    assert missed_leaves(dataset, 1, found) == []
+    assert missed_leaves(dataset, found) == []

@@ -34,7 +34,9 @@ SYSTEMS = [
     "sun_saenko",
 ]
 
-SMALL = {"camera.size": [96, 72]}
+SMALL = {"camera.size": [96, 72], "engine": {"name": "raster", "bounces": "off"}}
+"""Whether light bounces is no matter of a recipe's kind of content; its bake would take half of a room's time."""
+
 # A street with two cars: it is built in a tenth of a town's time.
 STREET = {
     "scene.place": "zoo:neighbourhood",

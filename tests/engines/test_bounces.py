@@ -17,15 +17,19 @@ from viewsphere.engines.raster import bounces as baking
 from viewsphere.engines.raster import gathering, lightmaps, volumes
 from viewsphere.engines.raster.kernels_probes import look_up
 from viewsphere.engines.raster.options import parse_options
+from viewsphere.engines.raster.painting import paint
 from viewsphere.engines.raster.records import Bounces
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, PointLight, Scene, Sky, Sun
 from viewsphere.model.thing import Thing
 from viewsphere.run import warm
+from viewsphere.truth.visibility import rasterize
 
 EVEN = Sky(zenith=(1, 1, 1), horizon=(1, 1, 1))
 OUT = Finish(background=BLACK)
+AWAY = mesh_of(rectangle((0, 0, 40), (0.1, 0, 0), (0, 0.1, 0)))
+"""A target that nothing sees."""
 
 
 @pytest.fixture(autouse=True)
@@ -236,6 +240,24 @@ def test_the_sky_is_not_mirrored_where_it_is_not_seen():
     view = camera(48, 36, 40, 0, -25, 1.4, (1.9, 1.3, 1.6))
     stage = stage_of(board, Scene(sun=None, sky=EVEN, finish=OUT), room(0.5, window=False))
     assert painted(stage, view).max() <= 1
+
+
+def test_the_roughest_floor_mirrors_as_much_as_falls_on_it():
+    """Between black walls, under an even sky: a lobe that is as wide as a matt surface's receives as much."""
+    view = camera(32, 24, 30, 0, 35, 2.0)
+    rough = Material("rough", (0, 0, 0, 1.0), roughness=1.0)
+    walls = np.concatenate([box((x, -4, 0), (x + 0.1, 4, 1.5)) for x in (-1.1, 1.0)])
+
+    def brightness(floor: Material, *parts) -> float:
+        level = np.array(rectangle((-0.9, -4, 0.01), (1.8, 0, 0), (0, 8, 0)))
+        stage = stage_of(AWAY, Scene(sun=None, sky=EVEN), painted_mesh((level, floor), *parts))
+        seen, radiance = rasterize(stage.at(0), view), np.zeros((view.width * view.height, 4), np.float32)
+        paint(stage.baked(0), view, seen, False, False, radiance)
+        return float(radiance.reshape(24, 32, 4)[9:15, 12:20, 0].mean())
+
+    shares = [brightness(floor, (walls, matt(0.0))) / brightness(floor) for floor in (matt(0.5), rough)]
+    assert 0.3 < shares[0] < 0.7
+    np.testing.assert_allclose(shares[1], shares[0], rtol=0.05)
 
 
 def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():

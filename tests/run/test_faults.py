@@ -79,11 +79,10 @@ def test_signals_at_any_moment(fault, stock, tmp_path):
         assert all("stopped; " in line and "to go on" in line for line in course.tally.said), course.tally
 
 
-@pytest.mark.parametrize("runs", [2, 3])
-def test_several_runs_on_one_output(runs, stock, whole, tmp_path):
-    started = [WORKS["render"].start(stock, tmp_path / "out") for _ in range(runs)]
+def test_several_runs_on_one_output(stock, whole, tmp_path):
+    started = [WORKS["render"].start(stock, tmp_path / "out") for _ in range(3)]
     said = [process.communicate(timeout=DEADLINE)[1] for process in started]
-    assert [process.returncode for process in started] == [0] * runs, said
+    assert [process.returncode for process in started] == [0, 0, 0], said
     assert tree_hash(tmp_path / "out") == tree_hash(whole)
 
 

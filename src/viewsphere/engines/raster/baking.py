@@ -154,6 +154,7 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
         bounces=bounces,
         blended=packed.blended,
         glass=glass_of(packed.rows),
+        hall=hall,
     )
 
 

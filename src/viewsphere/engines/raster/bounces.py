@@ -113,8 +113,8 @@ def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounce
     """The light that a hall's things throw at one another. The last hall's rays are kept, and the last light."""
     if not len(hall.which) or not (hall.high - hall.low).max() > 0:
         return NO_BOUNCES
-    # Shadows are cast here; and what lamps give the ground near the targets comes from the ground itself.
-    lights = lights._replace(first=np.zeros_like(lights.first))
+    lights = without_maps(lights)
+    # What lamps give the ground near the targets comes from the ground itself.
     light = surrounding.light.copy()
     light[LAMPS] = 0
     surrounding = surrounding._replace(light=light)
@@ -127,6 +127,16 @@ def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounce
     chart = np.full(len(hall.surfaces.triangles), -1, np.int32)
     chart[hall.which] = bounces.lightmap.chart
     return bounces._replace(lightmap=bounces.lightmap._replace(chart=chart))
+
+
+def without_maps(lights: Lights) -> Lights:
+    """The same lights without maps of their shadows, which are cast where light bounces."""
+    return lights._replace(first=np.zeros_like(lights.first))
+
+
+def tree_of_hall(hall: Hall) -> Tree:
+    """The tree of a hall's triangles, which was made when its light was baked."""
+    return _look(hall).tree
 
 
 @lru_cache(maxsize=1)

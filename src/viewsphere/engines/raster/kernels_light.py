@@ -35,6 +35,7 @@ U = nb.uintp
 
 COAT_F0 = np.float32(0.04)
 SMOOTHEST = np.float32(0.03)  # perceptual roughness, at least: in a perfect mirror a lamp would be a single point
+VIEWED = np.float32(0.25)  # squared roughness, as blurred as what probes see
 BRIGHTEST = np.float32(60000.0)
 UNEXPOSED = np.float32(1 / EXPOSURE)  # an unlit colour is shown unchanged by the exposure
 
@@ -335,6 +336,19 @@ def _shine(b):
 
 
 @lanewise
+def _shine_bounced(b):
+    """`_shine`, where light bounces: what probes see is as blurred as a mirror of roughness 0.5 shows it. The lobes of rougher
+    ones come ever closer to that of a matt surface, whose light is in GLOW.
+    """
+    lobe, rim, out, rough = b.get(LOBE, RIM, T7, ROUGH)
+    wide = clamp((rough * rough - VIEWED) * (1 / (1 - VIEWED))) * most(b[INSIDE], b[MAPPED])
+    for k in range(0, 3 * BLOCK, BLOCK):
+        light = b[T3 + k] * out
+        light = light + (b[GLOW_R + k] - light) * wide
+        b[SR + k] = b[SR + k] + (b[FACE_R + k] * lobe + b[EDGE_R + k] * rim) * light
+
+
+@lanewise
 def _shine_coat(b):
     shine = b[TAKEN] * b[T7]
     for k in range(0, 3 * BLOCK, BLOCK):
@@ -365,6 +379,8 @@ def _take(count, layer, is_bounced, b):
         _scatter_bounced(count, b)
     elif layer == MATT:
         _scatter(count, b)
+    elif layer == MIRROR and is_bounced:
+        _shine_bounced(count, b)
     elif layer == MIRROR:
         _shine(count, b)
     elif layer == COATING:

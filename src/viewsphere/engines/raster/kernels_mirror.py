@@ -95,7 +95,7 @@ def box_across(values, reach, out):
 def polish(at, gloss, near, soft, nearness, inverse_depth, sharp, matt, radiance):
     """Put what is mirrored in place of what pixels `at` (n,) of radiance (H * W, 4) were taken to mirror.
 
-    gloss (n, 7): see `kernels_split.gloss`; near, soft (n, 3): the mirror image of what is near and of what is far from the
+    gloss: see `kernels_split.gloss`; near, soft (n, 3): the mirror image of what is near and of what is far from the
     mirror; nearness (n,): one over the depth of its things; sharp, matt: roughness up to which it counts in full, and from
     which on not at all.
     """
@@ -107,4 +107,17 @@ def polish(at, gloss, near, soft, nearness, inverse_depth, sharp, matt, radiance
         for c in range(U(3)):
             shown = near[i, c] + (soft[i, c] - near[i, c]) * blur
             change = gloss[i, c] * shown - gloss[i, U(3) + c]
+            radiance[p, c] = max(radiance[p, c] + share * change, f4(0))
+
+
+@njit
+def glaze(at, gloss, shown, sharp, blurred, radiance):
+    """Put what rays see, shown (n, 3), in place of what pixels `at` (n,) of radiance (H * W, 4) were taken to mirror; sharp,
+    blurred: roughness up to which it counts in full, and from which on not at all. gloss: see `kernels_split.gloss`.
+    """
+    for i in range(U(at.shape[0])):
+        p = U(at[i])
+        share = min(max((blurred - gloss[i, U(6)]) / (blurred - sharp), f4(0)), f4(1))
+        for c in range(U(3)):
+            change = gloss[i, c] * shown[i, c] - gloss[i, U(3) + c]
             radiance[p, c] = max(radiance[p, c] + share * change, f4(0))

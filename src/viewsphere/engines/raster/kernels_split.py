@@ -23,14 +23,24 @@ from viewsphere.engines.raster.kernels_block import (
     GREEN,
     LOBE,
     METAL,
+    NX,
+    NY,
+    NZ,
+    PX,
     RED,
     RIM,
     ROUGH,
     ROWS,
     SR,
+    T0,
+    T1,
+    T2,
     T3,
     TAKEN,
     UNLIT,
+    VX,
+    VY,
+    VZ,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_bounce import bounced
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
@@ -48,12 +58,13 @@ from viewsphere.engines.raster.kernels_material import look_up, material
 from viewsphere.engines.raster.kernels_occlusion import occlude
 from viewsphere.engines.raster.kernels_paint import GLINT, start_matte
 from viewsphere.kernels.jit import inner, njit
-from viewsphere.kernels.lanes import FAST, clamp, lanewise, least
+from viewsphere.kernels.lanes import FAST, clamp, dot, lanewise, least
 
 f4 = nb.float32
 U = nb.uintp
 ALBEDO, EMITTED, DIFFUSE = 0, 3 * BLOCK, 6 * BLOCK
 COLUMNS = 9
+GLOSS = 13  # columns of `gloss`
 
 
 @lanewise
@@ -202,6 +213,14 @@ def _cover(b):
         b[FACE_R + k] = b[FACE_R + k] * b[LOBE] + b[EDGE_R + k] * b[RIM] + b[TAKEN]
 
 
+@lanewise
+def _reflect(b):
+    """T0 to T2: the mirrored ray."""
+    view, normal = b.get(VX, VY, VZ), b.get(NX, NY, NZ)
+    twice = 2 * dot(normal, view)
+    b.put((T0, T1, T2), tuple(twice * n - v for n, v in zip(normal, view, strict=True)))
+
+
 @inner(fastmath=FAST)
 def _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bounces, own, which, b):
     """All that `ambient` reads of a block of things that has been gathered."""
@@ -213,8 +232,8 @@ def _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bou
 
 @njit(fastmath=FAST, _nrt=True)
 def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
-    """Set `out` (N, 7) float32 to what the samples in `slots` (N,) mirror of their surroundings: its shares of red, green and
-    blue, the light that they are taken to mirror, and the roughness.
+    """Set `out` (N, GLOSS) float32 to what the samples in `slots` (N,) mirror of their surroundings: its shares of red, green
+    and blue, the light that they are taken to mirror, the roughness, where they are, and the mirrored ray.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -225,10 +244,12 @@ def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slot
         _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bounces, own, which, b)
         ambient(count, surrounding, bounces, b)
         _cover(count, b)
+        _reflect(count, b)
         for i in range(U(count)):
             q = U(start) + i
             for c in range(U(3)):
                 out[q, c], out[q, U(3) + c] = b[U(FACE_R) + c * U(BLOCK) + i], b[U(SR) + c * U(BLOCK) + i]
+                out[q, U(7) + c], out[q, U(10) + c] = b[U(PX) + c * U(BLOCK) + i], b[U(T0) + c * U(BLOCK) + i]
             out[q, U(6)] = b[U(ROUGH) + i]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_chosen, kernels_paint, kernels_split
+from viewsphere.engines.raster.bounces import Hall
 from viewsphere.engines.raster.environment import Surrounding, sky_behind
 from viewsphere.engines.raster.glass import NO_GLASS, Glass
 from viewsphere.engines.raster.kernels_material import L_BENDS
@@ -37,7 +38,8 @@ class Baked:
     only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over
     half their size; its slabs in a repeat, 0 for none. kind
     (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where neighbouring triangles look alike;
-    see_through (T + 1,). blended: `with_blended_colors`.
+    see_through (T + 1,). blended: `with_blended_colors`. hall: what
+    throws the light of `bounces`.
     """
 
     geometry: Geometry
@@ -56,6 +58,7 @@ class Baked:
     see_through: NDArray[np.bool_]
     blended: Geometry
     glass: Glass
+    hall: Hall | None
 
     @property
     def catches(self) -> bool:

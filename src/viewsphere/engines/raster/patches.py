@@ -120,7 +120,7 @@ class Patches:
             place, way, pixel = table.place[at], table.way[at], table.far[at] * width
             part = np.zeros((len(own), 6), np.float32), np.zeros((len(own), 3), np.float32)
             kernels.shade_hits(
-                _ANY_VIEW, surfaces, textures, floor, albedo, tree, lights, np.float32(off), whole[own], place, way, pixel,
+                ANY_VIEW, surfaces, textures, floor, albedo, tree, lights, np.float32(off), whole[own], place, way, pixel,
                 is_ground, *part,
             )  # fmt: skip
             answers[own], arrived[own] = part
@@ -130,7 +130,7 @@ class Patches:
         return Lit(mean[:, :3], mean[:, 3:6], mean[:, 6:])
 
 
-_ANY_VIEW = PictureRays(
+ANY_VIEW = PictureRays(
     eye=np.zeros(3, np.float32),
     rotation=np.eye(3, dtype=np.float32),
     lens=np.zeros((2, 3), np.float32),

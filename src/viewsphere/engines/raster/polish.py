@@ -40,7 +40,7 @@ def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radia
     at, plane = _mirror(baked, camera, visibility)
     if not len(at):
         return
-    gloss = np.empty((len(at), 7), np.float32)
+    gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     light = baked.surrounding, baked.occlusion, baked.bounces
     own = view_of(baked, camera), baked.surfaces, baked.textures, baked.floor

@@ -18,6 +18,7 @@ from viewsphere.engines.raster.blurring import Blur
 from viewsphere.engines.raster.halls import Halls
 from viewsphere.engines.raster.options import Options, parse_options
 from viewsphere.engines.raster.painting import Baked, materials, paint
+from viewsphere.engines.raster.panes import mirror_in_panes
 from viewsphere.engines.raster.polish import mirror_in_polish
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.surface import Lengths
@@ -156,9 +157,14 @@ class RasterStage:
     def _paint_one(self, baked: Baked, camera: Camera, seen: Visibility, has_sky: bool, radiance: Float32) -> None:
         scene = self.shot.scene
         fog, is_outdoors = scene.fog or scene.fog_outdoors, scene.fog is None
-        more = partial(mirror_in_polish, baked, camera, seen)
-        if scene.wet is not None:
-            more = partial(mirror_in_water, baked, camera, seen, scene.wet)
+
+        def more(light: Float32) -> None:
+            mirror_in_panes(baked, camera, seen, light)
+            if scene.wet is None:
+                mirror_in_polish(baked, camera, seen, light)
+            else:
+                mirror_in_water(baked, camera, seen, scene.wet, light)
+
         paint(baked, camera, seen, self.options.antialias == 4, has_sky, radiance, fog=fog, is_outdoors=is_outdoors, more=more)
 
     def _canvas(self, pixels: int) -> Float32:
