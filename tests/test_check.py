@@ -661,6 +661,8 @@ def test_every_leaf_of_labels_on_request_is_proved(annotated, tmp_path, kind):
     record = record_of(dataset, 1)
     fields = {*ASKED, *(field.name for name in ASKED for field in on_request()[name].fields)}
     # Of an outline's many corners the first ones are enough.
-    found = [where for where in leaves(record) if fields.intersection(where) and (len(where) < 4 or where[-2] not in range(6, 999))]
+    found = [
+        where for where in leaves(record) if fields.intersection(where) and (len(where) < 4 or where[-2] not in range(6, 999))
+    ]
     assert {where[2] for where in found if where[0] == "objects"} >= {"amodal", "occluders"}
     assert missed_leaves(dataset, found) == []
