@@ -564,7 +564,8 @@ def missed_leaves(dataset, places):
                 break
         assert spoilt, waiting
         waiting = [where for where in waiting if where not in spoilt.values()]
-        found = {frame for _, frame in failures_of(dataset, spoilt)}
+        # A record that cannot be read makes those beside it unreadable.
+        found = {frame for name, frame in failures_of(dataset, spoilt) if name != "files"}
         missed += [where for frame, where in spoilt.items() if frame not in found and not failures_of(dataset, {frame: where})]
     seal_again(dataset.root)
     return missed
@@ -593,6 +594,10 @@ def failures_of(dataset, spoilt):
     for file, text in texts.items():
         file.write_text(text)
     return found
+
+
+def is_late_corner(where):
+    return where[0] == "objects" and where[2] in ("contour", "hull") and where[-2] > 5
 
 
 def records_file(dataset, frame):
@@ -661,8 +666,6 @@ def test_every_leaf_of_labels_on_request_is_proved(annotated, tmp_path, kind):
     record = record_of(dataset, 1)
     fields = {*ASKED, *(field.name for name in ASKED for field in on_request()[name].fields)}
     # Of an outline's many corners the first ones are enough.
-    found = [
-        where for where in leaves(record) if fields.intersection(where) and (len(where) < 4 or where[-2] not in range(6, 999))
-    ]
+    found = [where for where in leaves(record) if fields.intersection(where) and not is_late_corner(where)]
     assert {where[2] for where in found if where[0] == "objects"} >= {"amodal", "occluders"}
     assert missed_leaves(dataset, found) == []

@@ -260,6 +260,17 @@ def test_the_roughest_floor_mirrors_as_much_as_falls_on_it():
     np.testing.assert_allclose(shares[1], shares[0], rtol=0.05)
 
 
+def test_no_ring_shows_where_probes_end():
+    """The roughest floor under an even sky, across the border of the probes around a slab below it."""
+    floor = mesh_of(rectangle((-8, -8, 0), (16, 0, 0), (0, 16, 0)), Material("rough", (0, 0, 0, 1.0), roughness=1.0))
+    view = camera(48, 36, 40, 0, 50, 1.5, (1.75, 0, 0))
+    stage = stage_of(floor, Scene(sun=None, sky=EVEN), painted_mesh((box((-1.5, -1.5, -0.2), (1.5, 1.5, -0.05)), matt(0.0))))
+    seen, radiance = rasterize(stage.at(0), view), np.zeros((view.width * view.height, 4), np.float32)
+    paint(stage.baked(0), view, seen, False, False, radiance)
+    row = radiance.reshape(36, 48, 4)[18, :, 0]
+    assert np.abs(np.diff(row) / row[1:]).max() < 0.015
+
+
 def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():
     """A probe within it, a little below the ceiling that closes it, knows nothing of the ceiling beside it."""
     small = mesh_of(box((3.0, 1.0, 0.5), (3.2, 1.2, 0.7)), matt(0.5))

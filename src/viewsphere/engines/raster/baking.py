@@ -14,7 +14,7 @@ from viewsphere.assets.srgb import linear
 from viewsphere.engines._arranged import Arranged
 from viewsphere.engines._lamps import lamplight
 from viewsphere.engines.raster import kernels_paint
-from viewsphere.engines.raster.bounces import bake_bounces
+from viewsphere.engines.raster.bounces import bake_bounces, tree_of_hall
 from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
 from viewsphere.engines.raster.glass import glass_of
 from viewsphere.engines.raster.halls import Halls
@@ -154,7 +154,8 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
         bounces=bounces,
         blended=packed.blended,
         glass=glass_of(packed.rows),
-        hall=hall,
+        hall=hall if bounces.grid[0] else None,
+        tree=tree_of_hall(hall) if hall is not None and bounces.grid[0] else None,
     )
 
 

@@ -135,7 +135,7 @@ def without_maps(lights: Lights) -> Lights:
 
 
 def tree_of_hall(hall: Hall) -> Tree:
-    """The tree of a hall's triangles, which was made when its light was baked."""
+    """The tree of a hall's triangles; it is there already where the hall is the last one whose light was baked."""
     return _look(hall).tree
 
 

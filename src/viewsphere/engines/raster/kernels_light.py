@@ -341,10 +341,10 @@ def _shine_bounced(b):
     ones come ever closer to that of a matt surface, whose light is in GLOW.
     """
     lobe, rim, out, rough = b.get(LOBE, RIM, T7, ROUGH)
-    wide = clamp((rough * rough - VIEWED) * (1 / (1 - VIEWED))) * most(b[INSIDE], b[MAPPED])
+    wide, known = clamp((rough * rough - VIEWED) * (1 / (1 - VIEWED))), most(b[INSIDE], b[MAPPED])
     for k in range(0, 3 * BLOCK, BLOCK):
         light = b[T3 + k] * out
-        light = light + (b[GLOW_R + k] - light) * wide
+        light = light + (b[GLOW_R + k] - light * known) * wide  # GLOW is as much less as it is known
         b[SR + k] = b[SR + k] + (b[FACE_R + k] * lobe + b[EDGE_R + k] * rim) * light
 
 

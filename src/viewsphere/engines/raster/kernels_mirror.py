@@ -95,7 +95,7 @@ def box_across(values, reach, out):
 def polish(at, gloss, near, soft, nearness, inverse_depth, sharp, matt, radiance):
     """Put what is mirrored in place of what pixels `at` (n,) of radiance (H * W, 4) were taken to mirror.
 
-    gloss: see `kernels_split.gloss`; near, soft (n, 3): the mirror image of what is near and of what is far from the
+    gloss (n, 13): see `kernels_split.gloss`; near, soft (n, 3): the mirror image of what is near and of what is far from the
     mirror; nearness (n,): one over the depth of its things; sharp, matt: roughness up to which it counts in full, and from
     which on not at all.
     """
@@ -113,7 +113,7 @@ def polish(at, gloss, near, soft, nearness, inverse_depth, sharp, matt, radiance
 @njit
 def glaze(at, gloss, shown, sharp, blurred, radiance):
     """Put what rays see, shown (n, 3), in place of what pixels `at` (n,) of radiance (H * W, 4) were taken to mirror; sharp,
-    blurred: roughness up to which it counts in full, and from which on not at all. gloss: see `kernels_split.gloss`.
+    blurred: roughness up to which it counts in full, and from which on not at all. gloss (n, 13): see `kernels_split.gloss`.
     """
     for i in range(U(at.shape[0])):
         p = U(at[i])

@@ -129,13 +129,15 @@ def patch(met, far, origins, directions, turn, normals, materials, box, cells, g
 
 @inner
 def _sight(tree, lights, k, which, p, n, stack):
-    """Whether light k reaches a place: 1 or 0. which: a number that says which part of a rectangle is looked at."""
+    """Whether light k reaches a place: 1 or 0. which: a number that says which part of a rectangle is looked at, its
+    middle if negative.
+    """
     if lights.kind[k] == DISTANT:
         d = lights.place[k, 0], lights.place[k, 1], lights.place[k, 2]
         limit = f4(np.inf)
     else:
         u = v = f4(0)
-        if lights.kind[k] == AREA:
+        if lights.kind[k] == AREA and which >= 0:
             u, v = f4(2 * ((which * 0.7548776662) % 1.0) - 1), f4(2 * ((which * 0.5698402910) % 1.0) - 1)
         right, up, place = lights.right[k], lights.up[k], lights.place[k]
         d = (
@@ -153,7 +155,7 @@ def _sight(tree, lights, k, which, p, n, stack):
 
 
 @inner
-def _arrive(start, count, tree, lights, off, arrived, b, stack):
+def _arrive(start, count, tree, lights, off, is_varied, arrived, b, stack):
     """arrived: irradiance of all lights at the block's samples, shadows cast."""
     for i in range(count):
         for c in range(3):
@@ -168,7 +170,7 @@ def _arrive(start, count, tree, lights, off, arrived, b, stack):
             if cosine <= f4(0) or b[SHARE + i] <= f4(0):
                 continue
             p = b[PX + i] + off * n[0], b[PX + BLOCK + i] + off * n[1], b[PX + 2 * BLOCK + i] + off * n[2]
-            light = _sight(tree, lights, k, start + i, p, n, stack) * cosine
+            light = _sight(tree, lights, k, start + i if is_varied else -1, p, n, stack) * cosine
             for c in range(3):
                 arrived[start + i, c] += b[IR + c * BLOCK + i] * light
 
@@ -185,16 +187,35 @@ def _answer(count, start, answers, b):
             shiny = b[FACE_R + r + i] * b[LOBE + i] + b[FACE_R + 3 * BLOCK + r + i] * b[RIM + i]
             answers[start + i, c] = min(b[BASE_R + r + i] + shiny, f4(0.98)) * (f4(1) - unlit)
             answers[start + i, c + 3] = b[ER + r + i] + (b[RED + r + i] * UNEXPOSED - b[ER + r + i]) * unlit
+        if answers.shape[1] > 6:
+            answers[start + i, 6] = b[row.ALPHA + i]
 
 
 @njit(fastmath=FAST, _nrt=True)
 def shade_hits(
-    view, surfaces, textures, floor, albedo, tree, lights, off, triangle, places, ways, pixels, is_ground, answers, arrived
+    view,
+    surfaces,
+    textures,
+    floor,
+    albedo,
+    tree,
+    lights,
+    off,
+    triangle,
+    places,
+    ways,
+    pixels,
+    is_ground,
+    is_varied,
+    answers,
+    arrived,
 ):
     """What the places (M, 3) that rays of directions `ways` (M, 3) hit are made of, all on the ground or none, as wide as
-    `pixels` (M,): reflectance and emitted light, answers (M, 6); irradiance of all lights, arrived (M, 3).
+    `pixels` (M,): reflectance, emitted light and, where there is room, opacity, answers (M, 6) or (M, 7); irradiance of all
+    lights, arrived (M, 3).
 
-    off: how far from a surface shadows are cast.
+    off: how far from a surface shadows are cast. Rectangular lights are seen at one place each: another one for each hit if
+    this `is_varied`, which means over many hits are free of, else in their middle.
     """
     b, stack = np.zeros(ROWS * BLOCK, np.float32), np.empty((DEEP, 2), np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -216,7 +237,7 @@ def shade_hits(
                     b[BASE_R + c * BLOCK + i] = b[RED + c * BLOCK + i]
                     b[FACE_R + c * BLOCK + i], b[FACE_R + (c + 3) * BLOCK + i] = f4(0), f4(0)
         _answer(count, start, answers, b)
-        _arrive(start, count, tree, lights, off, arrived, b, stack)
+        _arrive(start, count, tree, lights, off, is_varied, arrived, b, stack)
 
 
 @njit(fastmath=FAST, _nrt=True)

@@ -21,6 +21,9 @@ from viewsphere.engines.raster.kernels_block import (
     FACE_R,
     FADE,
     GREEN,
+    GX,
+    GY,
+    GZ,
     LOBE,
     METAL,
     NX,
@@ -208,17 +211,23 @@ def substance(view, surfaces, textures, floor, is_ground, slots, triangle, depth
 
 @lanewise
 def _cover(b):
-    """The shares that base and coat mirror of light from where their mirror images are, into FACE_R to FACE_B."""
+    """The shares that base and coat mirror of light from where their mirror images are, into FACE_R to FACE_B; of what is unlit
+    nothing is seen that it mirrors.
+    """
+    lit = 1 - b[UNLIT]
     for k in range(0, 3 * BLOCK, BLOCK):
-        b[FACE_R + k] = b[FACE_R + k] * b[LOBE] + b[EDGE_R + k] * b[RIM] + b[TAKEN]
+        b[FACE_R + k] = (b[FACE_R + k] * b[LOBE] + b[EDGE_R + k] * b[RIM] + b[TAKEN]) * lit
+        b[SR + k] = b[SR + k] * lit
 
 
 @lanewise
 def _reflect(b):
-    """T0 to T2: the mirrored ray."""
-    view, normal = b.get(VX, VY, VZ), b.get(NX, NY, NZ)
+    """T0 to T2: the mirrored ray; one that a smooth normal sends into the surface is thrown back by the facet."""
+    view, normal, facet = b.get(VX, VY, VZ), b.get(NX, NY, NZ), b.get(GX, GY, GZ)
     twice = 2 * dot(normal, view)
-    b.put((T0, T1, T2), tuple(twice * n - v for n, v in zip(normal, view, strict=True)))
+    ray = tuple(twice * n - v for n, v in zip(normal, view, strict=True))
+    inward = 2 * least(dot(ray, facet), 0)
+    b.put((T0, T1, T2), tuple(r - inward * f for r, f in zip(ray, facet, strict=True)))
 
 
 @inner(fastmath=FAST)
@@ -232,8 +241,9 @@ def _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bou
 
 @njit(fastmath=FAST, _nrt=True)
 def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
-    """Set `out` (N, GLOSS) float32 to what the samples in `slots` (N,) mirror of their surroundings: its shares of red, green
-    and blue, the light that they are taken to mirror, the roughness, where they are, and the mirrored ray.
+    """Set `out` (N, GLOSS) float32 to what the samples in `slots` (N,) mirror of their surroundings. Columns 0 to 2: its shares
+    of red, green and blue; 3 to 5: the light that they are taken to mirror; 6: the roughness; 7 to 9: where they are, in the
+    stage's lengths; 10 to 12: the mirrored ray, of length 1.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)

@@ -18,6 +18,7 @@ from viewsphere.engines.raster.occlusion import Occlusion
 from viewsphere.engines.raster.records import Bounces, Float32, Int32, PictureRays, Surfaces, Textures
 from viewsphere.engines.raster.samples import Layer, Marks, Samples, differs_behind, edge_samples, layers
 from viewsphere.engines.raster.surface import Rows
+from viewsphere.engines.raster.tracing import Tree
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.imaging.air import Air
 from viewsphere.model.camera import Camera
@@ -39,7 +40,7 @@ class Baked:
     half their size; its slabs in a repeat, 0 for none. kind
     (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where neighbouring triangles look alike;
     see_through (T + 1,). blended: `with_blended_colors`. hall: what
-    throws the light of `bounces`.
+    throws the light of `bounces`, None if none bounces; tree: of the hall's triangles.
     """
 
     geometry: Geometry
@@ -59,6 +60,7 @@ class Baked:
     blended: Geometry
     glass: Glass
     hall: Hall | None
+    tree: Tree | None
 
     @property
     def catches(self) -> bool:

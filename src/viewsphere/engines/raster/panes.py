@@ -1,7 +1,9 @@
-"""What smooth surfaces mirror of the things that stand still, where light bounces: panes, whichever way they face.
+"""What smooth surfaces mirror of the things that stand still, where light bounces: window panes, mirrors, polished metal.
 
-Their material mirrors what probes see, as blurred as roughness 0.5 shows it. A ray from each pixel finds what it sees instead:
-sharp, lit by sun, lamps and what bounces. What moves is not in it; level floors have a mirror image of their own (`polish`).
+Their material mirrors what probes see, as blurred as roughness 0.5 shows it. A ray from each pixel finds what is there instead:
+sharp, lit by sun, lamps and what bounces. Targets before scenery and what moves neither mirror in this way nor are mirrored;
+cut-out textures are solid; where a ray meets the ground, what probes say stays. Of level surfaces, the one that shows most has
+a mirror image of its own, which is of all things (`polish`).
 """
 
 from __future__ import annotations
@@ -12,13 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_mirror, kernels_paint, kernels_probes, kernels_split
-from viewsphere.engines.raster.bounces import Hall, tree_of_hall, without_maps
-from viewsphere.engines.raster.environment import sky_along
+from viewsphere.engines.raster.bounces import Hall, without_maps
 from viewsphere.engines.raster.kernels_material import L_ROUGH, L_ROUGH_TEXEL
 from viewsphere.engines.raster.mirroring import BRIGHTEST
 from viewsphere.engines.raster.painting import Baked, view_of
 from viewsphere.engines.raster.patches import ANY_VIEW
-from viewsphere.engines.raster.polish import LEVEL
 from viewsphere.engines.raster.records import Float32, Int32
 from viewsphere.engines.raster.tracing import Tree, cast
 from viewsphere.model.camera import Camera
@@ -28,61 +28,102 @@ SHARP, BLURRED = 0.1, 0.2
 """Roughness up to which what a ray sees counts in full, and from which on not at all."""
 
 OFF = 0.002
-"""Metres off a surface at which its rays begin, and those towards lights from what they see."""
+"""Metres along a ray at which it begins, and off the surface that it meets those towards lights."""
+
+LAYERS = 3
+"""Surfaces that a ray goes through, at most, where they are blended with what is behind them; the last is solid."""
+
+SKY_ROUGHNESS = np.float32(0.03)
+"""Of the map of the sky that is read: nearly sharp."""
+
+SOME = 1 << 16
+"""Pixels at a time: each takes some 300 bytes."""
 
 
-def mirror_in_panes(baked: Baked, camera: Camera, visibility: Visibility, radiance: Float32) -> None:
-    """Put what rays see in place of what smooth surfaces are taken to mirror in `radiance` (H * W, 4), if light bounces."""
-    hall = baked.hall
-    if hall is None or baked.bounces.grid[0] == 0:
+def mirror_in_panes(
+    baked: Baked, camera: Camera, visibility: Visibility, left_out: NDArray[np.intp], radiance: Float32
+) -> None:
+    """Put what rays see in place of what smooth surfaces are taken to mirror in `radiance` (H * W, 4), if light bounces, but in
+    the pixels `left_out` (n,).
+    """
+    if baked.hall is None or baked.tree is None:
         return
-    at = _panes(baked, visibility)
-    if not len(at):
-        return
-    gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
+    panes = _panes(baked, baked.hall, visibility, left_out)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    light = baked.surrounding, baked.occlusion, baked.bounces
-    view = view_of(baked, camera)
-    kernels_split.gloss(view, baked.surfaces, baked.textures, baked.floor, *light, at, triangle, depth, gloss)
-    places, ways = gloss[:, 7:10].copy(), gloss[:, 10:13].copy()
-    shown = np.minimum(_seen(baked, hall, places, ways, view.pixel * view.scale / depth[at]), np.float32(BRIGHTEST))
-    kernels_mirror.glaze(at, gloss, shown, np.float32(SHARP), np.float32(BLURRED), radiance)
+    view, light = view_of(baked, camera), (baked.surrounding, baked.occlusion, baked.bounces)
+    for start in range(0, len(panes), SOME):
+        at = panes[start : start + SOME]
+        gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
+        kernels_split.gloss(view, baked.surfaces, baked.textures, baked.floor, *light, at, triangle, depth, gloss)
+        places, ways = gloss[:, 7:10].copy(), gloss[:, 10:13].copy()
+        width = (view.pixel * view.scale / depth[at]).astype(np.float32)
+        shown, is_known = _seen(baked, baked.hall, baked.tree, (places, ways, width), view.pixel)
+        kernels_mirror.glaze(at[is_known], gloss[is_known], shown[is_known], np.float32(SHARP), np.float32(BLURRED), radiance)
 
 
-def _panes(baked: Baked, visibility: Visibility) -> Int32:
-    """Pixels (n,) whose solid surface is smooth, and no level floor."""
+def _panes(baked: Baked, hall: Hall, visibility: Visibility, left_out: NDArray[np.intp]) -> Int32:
+    """Pixels (n,) that show a smooth surface of the hall, and are not left out."""
     looks, shown = baked.surfaces.looks, visibility.triangle.reshape(-1)
     is_smooth = looks[:, L_ROUGH] + looks[:, L_ROUGH_TEXEL] < BLURRED
-    is_pane = is_smooth[baked.surfaces.material] & (baked.kind[:-1] == kernels_paint.SOLID)
-    is_pane &= np.abs(baked.surfaces.normals[:, 2]) <= LEVEL
-    return np.flatnonzero((shown >= 0) & is_pane[shown]).astype(np.int32)
+    is_pane = (shown >= 0) & is_smooth[baked.surfaces.material[shown]] & (baked.kind[shown] == kernels_paint.SOLID)
+    is_pane[left_out] = False
+    at = np.flatnonzero(is_pane)
+    if not len(at):
+        return at.astype(np.int32)
+    is_own = np.zeros(len(baked.surfaces.material), np.bool_)
+    is_own[hall.which] = True
+    return at[is_own[shown[at]]].astype(np.int32)
 
 
-def _seen(baked: Baked, hall: Hall, places: Float32, ways: Float32, width: NDArray[np.float32]) -> Float32:
-    """Radiance (n, 3) of what is seen from places (n, 3) along rays of length 1; width (n,): of a pixel there."""
-    tree, off = tree_of_hall(hall), np.float32(OFF / hall.unit)
-    origins = (places + off * ways).astype(np.float32)
-    turn = np.arange(len(places), dtype=np.int32)
-    (met,), (far,) = cast(tree, origins, ways[:, None], turn, np.inf)
-    light = sky_along(baked.surrounding, ways)
-    hit = np.flatnonzero(met >= 0)
-    own = hall.which[met[hit]], (origins[hit] + far[hit, None] * ways[hit]).astype(np.float32), ways[hit]
-    light[hit] = _shaded(baked, hall, tree, off, *own, width[hit])
-    return light
+def _seen(
+    baked: Baked, hall: Hall, tree: Tree, sights: tuple[Float32, Float32, Float32], pixel: float
+) -> tuple[Float32, NDArray[np.bool_]]:
+    """Radiance (n, 3) of what is seen along rays, and where it is known (n,). sights: where rays begin (n, 3), their
+    directions of length 1 (n, 3), and the width of a pixel there (n,), which grows by `pixel` a length.
+    """
+    origins, ways, width = sights
+    off, ground = np.float32(OFF / hall.unit), hall.ground_z is not None
+    origins, light = (origins + off * ways).astype(np.float32), np.zeros_like(origins)
+    left, at = np.ones(len(origins), np.float32), np.arange(len(origins))
+    is_known = np.ones(len(origins), np.bool_)
+    for layer in range(LAYERS):
+        turn = np.arange(len(at), dtype=np.int32)
+        (met,), (far,) = cast(tree, origins[at], ways[at][:, None], turn, np.inf)
+        on = at[met < 0]
+        is_known[on] &= (not ground) | (ways[on, 2] >= 0)
+        sky = np.empty((len(on), 3), np.float32)
+        kernels_probes.sky_from(baked.surrounding, ways[on], SKY_ROUGHNESS, sky)
+        light[on] += left[on, None] * sky
+        at, far, met = at[met >= 0], far[met >= 0], met[met >= 0]
+        origins[at] += far[:, None] * ways[at]
+        width[at] += far * np.float32(pixel)
+        shaded, opacity = _shaded(baked, hall, tree, off, (hall.which[met], origins[at], ways[at], width[at]))
+        opacity = np.ones_like(opacity) if layer == LAYERS - 1 else opacity
+        light[at] += (left[at] * opacity)[:, None] * shaded
+        left[at] *= 1 - opacity
+        at = at[left[at] > 0]
+        origins[at] += off * ways[at]
+        if not len(at):
+            break
+    return light, is_known
 
 
 def _shaded(
-    baked: Baked, hall: Hall, tree: Tree, off: np.float32, triangle: Int32, places: Float32, ways: Float32, width: Float32
-) -> Float32:
-    """Radiance (n, 3) of these triangles at places (n, 3), as if they scattered all light, towards where rays come from."""
-    answers, arrived, glow = (np.empty((len(places), columns), np.float32) for columns in (6, 3, 3))
+    baked: Baked, hall: Hall, tree: Tree, off: np.float32, hits: tuple[Int32, Float32, Float32, Float32]
+) -> tuple[Float32, Float32]:
+    """Radiance (n, 3) of what rays hit, as if it scattered all light, and its opacity (n,). hits: triangles (n,), places and
+    the rays' directions (n, 3), and a pixel's width (n,).
+    """
+    triangle, places, ways, _ = hits
+    answers, arrived, glow = (np.empty((len(places), columns), np.float32) for columns in (7, 3, 3))
     made = ANY_VIEW, hall.surfaces, hall.textures, hall.floor, baked.surrounding.albedo
     lights = without_maps(baked.lights)
-    kernels_probes.shade_hits(*made, tree, lights, off, triangle, places, ways, width, False, answers, arrived)
+    kernels_probes.shade_hits(*made, tree, lights, off, *hits, False, False, answers, arrived)
     normals, inside = hall.surfaces.normals[triangle], np.empty(len(places), np.float32)
     facing = np.where((normals * ways).sum(axis=1, keepdims=True) < 0, normals, -normals).astype(np.float32)
     kernels_probes.look_up(baked.bounces, places, facing, triangle, glow, inside)
     up = (1 + facing[:, 2:]) / 2
     elsewhere = up * baked.surrounding.up + (1 - up) * baked.surrounding.below
     light = arrived / np.float32(math.pi) + glow + (1 - inside[:, None]) * elsewhere
-    return (answers[:, 3:] + answers[:, :3] * light).astype(np.float32)
+    shaded = answers[:, 3:6] + answers[:, :3] * light
+    return np.minimum(shaded, BRIGHTEST).astype(np.float32), answers[:, 6].copy()

@@ -121,7 +121,7 @@ class Patches:
             part = np.zeros((len(own), 6), np.float32), np.zeros((len(own), 3), np.float32)
             kernels.shade_hits(
                 ANY_VIEW, surfaces, textures, floor, albedo, tree, lights, np.float32(off), whole[own], place, way, pixel,
-                is_ground, *part,
+                is_ground, True, *part,
             )  # fmt: skip
             answers[own], arrived[own] = part
         found = np.zeros((self.count, kernels.HITS, 9), np.float32)
@@ -152,7 +152,7 @@ def patches_of(
     begun: Patches | None = None,
 ) -> Patches:
     """The patches that all these rays hit, in their order; `begun`: those of the first bundles, whose table is gone on with
-    and not theirs any more;    other arguments as in `kernels_probes.patch`.
+    and not theirs any more; other arguments as in `kernels_probes.patch`.
     """
     done = begun or Patches(_empty(ROOM), 0, ())
     while True:

@@ -33,13 +33,18 @@ SPREAD = 0.6
 """Reach of the blur of what is far away, in halves of the picture's height, over the square of the roughness."""
 
 
-def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radiance: Float32) -> None:
-    """Put the mirror image of things in place of what polished surfaces mirror in `radiance` (H * W, 4), if light bounces."""
+NOWHERE = np.empty(0, np.intp)
+
+
+def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radiance: Float32) -> NDArray[np.intp]:
+    """Put the mirror image of things in place of what polished surfaces mirror in `radiance` (H * W, 4), if light bounces.
+    Returns the pixels (n,) that show these surfaces.
+    """
     if baked.bounces.grid[0] == 0:
-        return
+        return NOWHERE
     at, plane = _mirror(baked, camera, visibility)
     if not len(at):
-        return
+        return NOWHERE
     gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     light = baked.surrounding, baked.occlusion, baked.bounces
@@ -49,7 +54,7 @@ def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radia
     if not shines.all():
         at, gloss = at[shines], gloss[shines]
     if len(at) < LEAST * visibility.triangle.size:
-        return
+        return NOWHERE
     seen = mirrored(baked, camera, plane, lying(baked.geometry, plane + THICK), at)
     image = (seen.things + (1 - seen.hidden) * seen.sky).astype(np.float32)
     reach = SPREAD * float(np.mean(gloss[:, 6])) ** 2 * camera.height / 2
@@ -57,6 +62,7 @@ def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radia
     near = blurred(image, at, camera, (1, 1))
     borders = np.float32(SHARP), np.float32(MATT)
     kernels_mirror.polish(at, gloss, near, soft, seen.nearness, depth, *borders, radiance)
+    return at
 
 
 def _mirror(baked: Baked, camera: Camera, visibility: Visibility) -> tuple[NDArray[np.intp], float]:

@@ -19,7 +19,7 @@ from viewsphere.engines.raster.halls import Halls
 from viewsphere.engines.raster.options import Options, parse_options
 from viewsphere.engines.raster.painting import Baked, materials, paint
 from viewsphere.engines.raster.panes import mirror_in_panes
-from viewsphere.engines.raster.polish import mirror_in_polish
+from viewsphere.engines.raster.polish import NOWHERE, mirror_in_polish
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.surface import Lengths
 from viewsphere.engines.raster.thing_occlusion import TargetShades
@@ -31,6 +31,7 @@ from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
 from viewsphere.model.shot import Shot
+from viewsphere.model.weather import Wet
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 
@@ -107,7 +108,9 @@ class RasterStage:
         has_sky = shows_sky(finish.background)
         radiance = self._canvas(camera.width * camera.height)
         split = np.zeros((len(radiance), 9 if is_lit else 6), np.float32)
-        paint(self.baked(instant), camera, visibility, self.options.antialias == 4, has_sky, radiance, split)
+        baked, wet = self.baked(instant), self.shot.scene.wet
+        more = None if wet else partial(_mirror, baked, camera, visibility, None)
+        paint(baked, camera, visibility, self.options.antialias == 4, has_sky, radiance, split, more=more)
         shape = camera.height, camera.width, 3
         albedo, emission = (split[:, k : k + 3].reshape(shape) for k in (0, 3))
         if not is_lit:
@@ -157,14 +160,7 @@ class RasterStage:
     def _paint_one(self, baked: Baked, camera: Camera, seen: Visibility, has_sky: bool, radiance: Float32) -> None:
         scene = self.shot.scene
         fog, is_outdoors = scene.fog or scene.fog_outdoors, scene.fog is None
-
-        def more(light: Float32) -> None:
-            mirror_in_panes(baked, camera, seen, light)
-            if scene.wet is None:
-                mirror_in_polish(baked, camera, seen, light)
-            else:
-                mirror_in_water(baked, camera, seen, scene.wet, light)
-
+        more = partial(_mirror, baked, camera, seen, scene.wet)
         paint(baked, camera, seen, self.options.antialias == 4, has_sky, radiance, fog=fog, is_outdoors=is_outdoors, more=more)
 
     def _canvas(self, pixels: int) -> Float32:
@@ -173,6 +169,14 @@ class RasterStage:
             self._canvases.clear()
             self._canvases[pixels] = np.empty((pixels, 4), np.float32)
         return self._canvases[pixels]
+
+
+def _mirror(baked: Baked, camera: Camera, seen: Visibility, wet: Wet | None, light: Float32) -> None:
+    """Add to the light of a picture (H * W, 4) what smooth surfaces mirror of things near them, and what wet ground does."""
+    polished = mirror_in_polish(baked, camera, seen, light) if wet is None else NOWHERE
+    mirror_in_panes(baked, camera, seen, polished, light)
+    if wet is not None:
+        mirror_in_water(baked, camera, seen, wet, light)
 
 
 def build_stage(shot: Shot, load: Load) -> RasterStage:
