@@ -57,7 +57,7 @@ def mirror_in_panes(
         kernels_split.gloss(view, baked.surfaces, baked.textures, baked.floor, *light, at, triangle, depth, gloss)
         places, ways = gloss[:, 7:10].copy(), gloss[:, 10:13].copy()
         width = (view.pixel * view.scale / depth[at]).astype(np.float32)
-        shown, is_known = _seen(baked, baked.hall, baked.tree, (places, ways, width), view.pixel)
+        shown, is_known = _seen(baked, baked.hall, baked.tree, (places, ways, width), float(view.pixel))
         kernels_mirror.glaze(at[is_known], gloss[is_known], shown[is_known], np.float32(SHARP), np.float32(BLURRED), radiance)
 
 
