@@ -113,6 +113,7 @@ def test_several_objects_pass(tmp_path):
     assert report.notes == ()
 
 
+@pytest.mark.slow
 def test_every_export_that_is_there_is_proved_by_its_format(dataset):
     assert "coco" not in check(dataset, rays=False).checked
     export(dataset.root, ["coco", "native"])
@@ -373,6 +374,7 @@ def test_labels_of_rows_are_proved(rows):
     assert ROWS and all(report.checked[name] == len(rows) for name in ROWS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROWS)
 def test_every_field_of_labels_of_rows_is_computed_again(rows, tmp_path, name):
     dataset = Dataset(shutil.copytree(rows.root, tmp_path / "out"))
@@ -465,6 +467,7 @@ def test_findings_say_where(spelled):
     assert viewsphere.check.Finding("counts", None, "x").__str__() == "counts: x"
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_in_any_file_of_the_store_is_found(whole, tmp_path):
     """One bit of every file that stands in a manifest, and of every manifest itself."""
     root = Path(shutil.copytree(whole.root, tmp_path / "spoilt"))
@@ -608,6 +611,7 @@ def record_of(dataset, frame):
     return json.loads(records_file(dataset, frame).read_text())[frame % 4]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["short", pytest.param("merged", marks=pytest.mark.slow)])
 def test_every_field_of_every_record_is_proved(whole, merged, tmp_path, kind):
     """One number, text or truth of each field of each label, and of each thing that is known of a frame."""
@@ -652,6 +656,7 @@ def test_labels_on_request_are_proved_where_they_were_asked_for(annotated):
     assert {name: report.checked[name] for name in ASKED} == dict.fromkeys(ASKED, 4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["short", pytest.param("merged", marks=pytest.mark.slow)])
 def test_every_leaf_of_labels_on_request_is_proved(annotated, tmp_path, kind):
     """In a frame of objects that hide one another; records that say everything have their shots beside them."""

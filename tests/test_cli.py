@@ -147,6 +147,7 @@ def test_mistakes_are_one_line_and_status_2(tmp_path):
     assert "spaceship" in fails("render", tmp_path / "ship.yaml", "-o", tmp_path / "out")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
     import os

@@ -77,6 +77,7 @@ LABEL = ChannelLabel(
 """
 
 
+@pytest.mark.slow
 def test_a_label_of_motion_after_tracks_in_the_alphabet_is_computed_again_from_its_own_instants(labelled, tmp_path):
     """Picking points at four instants writes over the triangles of the instants that labels before it have asked for."""
     labelled("unseen", UNSEEN)
@@ -193,6 +194,7 @@ def test_a_format_may_be_a_tree(small_dataset, monkeypatch):
     assert [f.check for f in check(small_dataset, rays=False).findings] == ["lines"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("csv_boxes")
 @pytest.mark.parametrize("name", ["boxes.csv", "{split}/{index:06d}.png"])
 def test_it_proves_itself(small_dataset, name):

@@ -18,6 +18,7 @@ def cost(file):
     return [pytest.mark.slow] if "place:" in file.read_text("utf-8") else []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", [pytest.param(file, id=file.stem, marks=cost(file)) for file in RECIPES])
 def test_a_label_s_recipe_makes_a_data_set_that_passes(file, tmp_path):
     recipe = Recipe.load(file)

@@ -34,6 +34,7 @@ def calls():
                 yield file, node, node.func.attr
 
 
+@pytest.mark.slow
 def test_texts_have_the_same_bytes_on_every_system():
     """Windows would write CR LF, and older ones another encoding."""
     for file, call, name in calls():
@@ -45,6 +46,7 @@ def test_texts_have_the_same_bytes_on_every_system():
             assert {"newline", "encoding"} <= words, f"{file}:{call.lineno}"
 
 
+@pytest.mark.slow
 def test_modules_of_posix_are_imported_only_where_they_are_needed():
     for file, node in ((one, node) for one in SOURCE for node in ast.parse(one.read_text("utf-8")).body):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", None)]
@@ -90,6 +92,7 @@ def contents(root):
     return {file.relative_to(root).as_posix(): file.read_bytes() for file in root.rglob("*") if file.is_file()}
 
 
+@pytest.mark.slow
 def test_a_worker_s_pipe_may_be_of_any_class(tmp_path, monkeypatch):
     """On Windows `Pipe()` makes a PipeConnection, which is no Connection."""
     monkeypatch.setattr("viewsphere.run.executors.local.Connection", type("Another", (), {}))
@@ -159,6 +162,7 @@ def test_splits_are_folders_on_every_system(names, found):
         small_recipe(splits={"by": "frame", **dict.fromkeys(names, 0.5)})
 
 
+@pytest.mark.slow
 def test_letters_that_the_output_lacks_are_numbers(tmp_path):
     assert viewsphere("new", tmp_path / "first").returncode == 0
     own = {**os.environ, "PYTHONIOENCODING": "cp1252"}

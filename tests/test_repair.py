@@ -76,6 +76,7 @@ def test_every_kind_of_file_is_made_again(small_run, spoilt):
         assert changed and all(path.is_relative_to(folder) for path in changed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "lost", ["store/shots/*/*", "store/shots/*/*/manifest.json", "store/shots/*/*/depth", "store/models/*"]
 )
@@ -87,6 +88,7 @@ def test_what_is_lost_is_made_again(small_run, spoilt, lost):
     assert tree_hash(spoilt) == tree_hash(small_run)
 
 
+@pytest.mark.slow
 def test_labels_that_were_sealed_again_are_rendered_again(small_run, spoilt):
     file = sorted(spoilt.glob("store/shots/*/*/frames.json"))[2]
     records = json.loads(file.read_text())
@@ -102,6 +104,7 @@ def test_labels_that_were_sealed_again_are_rendered_again(small_run, spoilt):
     assert tree_hash(spoilt) == tree_hash(small_run)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_picture_spoilt_in_store_and_exports_alike(small_run, spoilt, workers):
     """Links are one file: what is written into one is in all."""
@@ -179,6 +182,7 @@ def test_models_that_are_not_what_they_were(tmp_path, change):
     assert tree_hash(out) == spoilt
 
 
+@pytest.mark.slow
 def test_parts_are_made_again_by_their_own_recipes(tmp_path):
     first = small_recipe(formats=["coco"], channels=["rgb", "depth"])
     generate(first, tmp_path / "out")
@@ -197,6 +201,7 @@ def test_parts_are_made_again_by_their_own_recipes(tmp_path):
     assert tree_hash(tmp_path / "out") == whole
 
 
+@pytest.mark.slow
 def test_what_came_from_elsewhere_cannot_be_rendered(small_run, tmp_path):
     generate(small_recipe(seed=1), tmp_path / "two")
     merge([small_run, tmp_path / "two"], tmp_path / "out")
@@ -208,6 +213,7 @@ def test_what_came_from_elsewhere_cannot_be_rendered(small_run, tmp_path):
         assert tree_hash(tmp_path / "out") == spoilt
 
 
+@pytest.mark.slow
 def test_exports_are_left_alone_while_frames_are_lost(small_run, tmp_path):
     """A merged shot cannot be rendered here; its pictures in the exports are the last copy."""
     generate(small_recipe(seed=1), tmp_path / "two")
@@ -229,6 +235,7 @@ def test_a_shot_without_records_is_made_again(small_run, spoilt):
     assert tree_hash(spoilt) == tree_hash(small_run)
 
 
+@pytest.mark.slow
 def test_frames_and_exports_are_proved_by_several_processes_as_by_one(spoilt, monkeypatch):
     file = sorted(spoilt.glob("coco/annotations/*.json"))[0]
     file.write_text(file.read_text().replace('"tilt":0.0', '"tilt":0.5', 1))

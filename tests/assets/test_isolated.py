@@ -226,6 +226,7 @@ def test_a_child_ends_when_its_standard_input_does(spec, reader, tmp_path):
         process.kill()
 
 
+@pytest.mark.slow
 def test_a_daemonic_pool_worker_may_read(spec):
     from multiprocessing import get_context
 

@@ -110,6 +110,7 @@ def test_a_closed_box_that_glows_evenly(reflectance):
     np.testing.assert_allclose(light, 1 / (1 - reflectance), rtol=0.018 if reflectance else 0.03)
 
 
+@pytest.mark.slow
 def test_a_closed_box_of_which_one_wall_glows(monkeypatch):
     """What is sent out is all absorbed: the mean irradiance is the power over area times absorption. A wall opposite has what
     the form factor of two equal rectangles says (here integrated) before any bounce, and a little more: it is read from probes
@@ -158,6 +159,7 @@ def test_the_ground_below_a_glowing_ball():
     assert np.sqrt((off**2).mean()) < 0.03
 
 
+@pytest.mark.slow
 def test_a_bulb_that_few_rays_hit_lights_all_walls_evenly(monkeypatch):
     """A bulb of 4 cm in a black box: pi L r^2 cos / d^2, though most probes have no ray that meets it."""
     monkeypatch.setattr(volumes, "ALONG", 36)
@@ -307,6 +309,7 @@ def test_a_dark_room_beside_a_lit_one_stays_dark(window, monkeypatch):
     assert dark.max() < 0.15 * lit.mean()  # in a corner of the partition, where a probe sees past it
 
 
+@pytest.mark.slow
 def test_the_same_bytes_whatever_was_baked_before():
     """Also with another target, which is not part of a place's light."""
     view = camera(60, 45, 40, 20, 20, 1.6, (1.5, 1.5, 1.0))
@@ -327,6 +330,7 @@ def is_bounced(stage) -> bool:
     return bool(bounces.grid[0] > 0)
 
 
+@pytest.mark.slow
 def test_auto_is_on_indoors_only():
     small = mesh_of(box((1, 1, 0), (1.5, 1.5, 0.4)), matt(0.5))
     street = mesh_of(np.concatenate([rectangle((-9, -9, 0), (18, 0, 0), (0, 18, 0)), box((4, 4, 0), (7, 7, 5))]), matt(0.5))
@@ -339,6 +343,7 @@ def test_auto_is_on_indoors_only():
     assert is_bounced(stage_of(small, scene, street))
 
 
+@pytest.mark.slow
 def test_a_wide_place_has_close_probes_around_its_origin_only(monkeypatch):
     """As far apart as is allowed at most, or little more; at their border nothing is seen of it on a wall in the open."""
     monkeypatch.setattr(volumes, "MOST", 14_000)
@@ -362,6 +367,7 @@ def canyon(width: float, height: float, reach: float) -> np.ndarray:
     return np.concatenate([rectangle((-reach, -reach, 0), (2 * reach, 0, 0), (0, 2 * reach, 0)), *walls])
 
 
+@pytest.mark.slow
 def test_shade_far_from_the_origin_is_known_from_a_wider_volume(monkeypatch):
     """In a long street of black walls a wall sees (1 - sin e) / 2 of an even sky, e how high the other wall reaches above it;
     65 m away, where probes are 6 m apart, and 5 m away. No seam shows where one volume ends.

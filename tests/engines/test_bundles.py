@@ -132,6 +132,7 @@ def test_the_same_textures_are_the_same_array_as_long_as_somebody_has_them(monke
     assert held() is None
 
 
+@pytest.mark.slow
 def test_what_is_kept_is_bounded_and_the_last(monkeypatch):
     sets = [images(k, *[(32, 32)] * 3) for k in range(6)]
     one = packed(sets[0], material(0))[1].texels.nbytes

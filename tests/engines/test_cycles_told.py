@@ -110,6 +110,7 @@ def test_what_is_told_is_plain_and_truths_own():
     assert floor["materials"][0]["roughness"] == 0.6
 
 
+@pytest.mark.slow
 def test_copies_share_their_mesh_and_repaints_only_its_arrays():
     told, arrays, _ = of_request(
         models=[{"source": "zoo:chair", "category": "chair", "count": 1, "scale": {"length": 0.5}}],

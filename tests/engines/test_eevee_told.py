@@ -121,6 +121,7 @@ def test_other_grounds_are_planned_as_they_are_said(name, scene, grounds):
     assert made == grounds
 
 
+@pytest.mark.slow
 def test_plan_refuses_a_catcher_by_the_recipe_s_line(tmp_path):
     recipe = (
         "models: [{source: zoo:chair}]\nviewpoints: {distance: 2}\nengine: workbench\nscene:\n  sun: on\n  ground: catcher\n"

@@ -307,6 +307,7 @@ def test_missing_file_is_said(tmp_path):
         bake_surrounding(Environment(file=str(tmp_path / "none.exr")), None, None)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not HDRI.is_dir(), reason="no models")
 def test_real_skies_light_as_their_pictures():
     from viewsphere.surroundings.environment_file import read_environment

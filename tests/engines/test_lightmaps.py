@@ -145,6 +145,7 @@ def test_the_back_of_a_wall_has_no_share_in_its_light():
     assert glow[1].max() < 0.03
 
 
+@pytest.mark.slow
 def test_the_same_bytes_where_a_place_is_lit_anew_beside_another_target(monkeypatch):
     """Triangles of the place have other numbers then."""
     monkeypatch.setattr(gathering, "NODE_RAYS", 64)

@@ -47,6 +47,7 @@ def test_it_is_the_mean_of_many_pictures(scene, pixels, known):
     assert blurred > 40 and one < 30, (blurred, one)
 
 
+@pytest.mark.slow
 def test_a_passing_car_is_the_mean_of_some_pictures(known):
     blurred, one = compared("car", 30.0, known, 16)
     assert blurred > 40 and one < 30, (blurred, one)

@@ -219,6 +219,7 @@ def test_materials_are_those_at_the_pixels_centres():
     close("metallic", "texels", middle[1], 0.5 * rough[..., 2] / 255, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_passes_are_those_of_the_shutter_s_centre():
     known = meshes()
     shot = SCENES["car"](30.0)

@@ -376,6 +376,7 @@ def test_bytes_are_the_light_through_the_curve_and_colours_come_back():
         assert (seen == [value, 255 - value, 128]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("antialias", [1, 4])
 @pytest.mark.parametrize("azimuth", [0, 180, 20])
 def test_transparent_layers_lie_over_one_another_as_they_stand(azimuth, antialias):

@@ -75,6 +75,7 @@ def cut(shot, first, stop):
     return shot.model_copy(update={"things": tuple(things), "instants": shot.instants[first:stop]})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "has_scenery, moves", [(False, False), (True, True), pytest.param(True, False, marks=pytest.mark.slow)]
 )
@@ -98,6 +99,7 @@ def test_an_instant_looks_as_if_it_were_built_alone(scene, has_scenery, moves):
     assert np.array_equal(picture(again, 4), alone[4])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("has_scenery", [False, True])
 def test_stills_of_what_moves_are_those_of_what_stands(has_scenery):
     """No sequence: each instant is a picture of its own, equal to the bit to one of things that stand there."""

@@ -81,6 +81,7 @@ def visible_share(stage, light, samples, count=16):
     return total / count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", ["car", "shapes"])
 @pytest.mark.parametrize(
     "light",
@@ -536,6 +537,7 @@ def test_cutouts_cast_their_shape(light):
     np.testing.assert_array_equal(share, [0, 1, 1, 0, 1])
 
 
+@pytest.mark.slow
 def test_scenery_casts_shadows_near_and_far_and_targets_on_it():
     """A box of 1 m and houses on a floor of 400 m; the wide maps do not change with the target."""
     floor, house = quad((-200, -200, 0), (400, 0, 0), (0, 400, 0)), cuboid((-4, -5, 0), (4, 5, 6))

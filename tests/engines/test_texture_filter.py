@@ -69,6 +69,7 @@ def test_probes_stand_along_the_longer_axis(ratio, count):
         np.testing.assert_allclose(way, axis * ratio * small, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_footprints_that_are_no_numbers_read_something():
     surfaces, textures = packed(textured(NOISE))
     bad = np.array([np.nan, np.inf, 1e30, -1e30, 0.5])

@@ -52,6 +52,7 @@ def painted(recipe):
     return [hue(sample) for sample in vs.render(recipe)]
 
 
+@pytest.mark.slow
 def test_each_model_takes_a_picture_of_the_folder_which_its_name_decides(folder):
     found = painted(recipe_of(folder))
     assert len(set(found)) > 1
@@ -70,6 +71,7 @@ def test_pictures_are_drawn_for_each_frame_where_materials_are(folder):
     assert painted(recipe.model_copy(update={"shot_frames": 5})) == found
 
 
+@pytest.mark.slow
 def test_labels_do_not_know_of_pictures_and_check_proves_the_set(folder, tmp_path):
     plain = recipe_of(folder, scene={"ground": "off"}, formats=["coco"])
     painted_, bare = (list(vs.render(recipe)) for recipe in (recipe_of(folder), plain))
@@ -83,6 +85,7 @@ def test_labels_do_not_know_of_pictures_and_check_proves_the_set(folder, tmp_pat
     assert not check(dataset, sample=None).findings
 
 
+@pytest.mark.slow
 def test_only_chosen_materials_and_models_change_and_one_picture_may_be_named(folder):
     one = {"images": None, "image": str(folder / "green.png"), "models": "chair_00[0-2]"}
     found = painted(recipe_of(folder, one))

@@ -47,6 +47,7 @@ def known(stage, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return at * baked.unit + baked.origin, normals, glow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reflectance", [0.0, 0.7])
 def test_a_ball_in_a_closed_box_that_glows_evenly(reflectance):
     """The furnace: all places have the same light, whatever is where."""
@@ -58,6 +59,7 @@ def test_a_ball_in_a_closed_box_that_glows_evenly(reflectance):
     np.testing.assert_allclose(light, 1 / (1 - reflectance), rtol=0.035)
 
 
+@pytest.mark.slow
 def test_a_ball_between_a_ceiling_that_glows_and_a_black_floor():
     """What a place has of an endless ceiling: half of one and the cosine between its normal and up."""
     wide = 36.0
@@ -94,6 +96,7 @@ def test_both_sides_of_a_curtain_have_light_of_their_own():
     assert light[~front].max() < 0.1
 
 
+@pytest.mark.slow
 def test_a_ball_in_the_furnace_is_as_even_as_the_walls_in_a_picture():
     walls = inside_out(box((-1.0, -0.8, -0.6), (1.0, 0.8, 0.6)))
     within = corners_of(ball(0.2, (0.0, 0.0, 0.0)))

@@ -116,6 +116,7 @@ def test_what_faces_up_is_wetter_and_plants_have_no_film():
         assert wetted(mesh, 1.0, evenly=True).triangle_material is mesh.triangle_material
 
 
+@pytest.mark.slow
 def test_where_light_bounces_a_film_loses_no_light_of_a_sky_that_it_does_not_mirror():
     """Below a wide black roof the floor's coat mirrors what probes see: the roof. Its mirror image takes nothing away again."""
     roof = painted_mesh((box((-15, -15, 2), (15, 15, 2.2)), matt(0.0)))

@@ -434,6 +434,7 @@ def test_pascal3d_of_others_is_projected_as_its_toolbox_does(release, tmp_path):
     assert bool(made.notes) == any("-" in name for name in lines)
 
 
+@pytest.mark.slow
 def test_pascal3d_of_others_renders(release, tmp_path):
     made, shots = make_again("pascal3d", release, tmp_path / "again"), tmp_path / "again/shots.jsonl"
     shots.write_text("".join(shots.read_text().splitlines(keepends=True)[::6]))  # all were projected above

@@ -178,6 +178,7 @@ def silhouette(model, pose, k, width, height):
     return out
 
 
+@pytest.mark.slow
 def test_pixels_outside_of_the_picture_are_counted(stills, written):
     folder, tried = written(stills), 0
     for sample in stills:

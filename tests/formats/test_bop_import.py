@@ -63,6 +63,7 @@ def test_poses_masks_and_depth_come_in(stills, imported):
             close("bop", "import: truncation", o.truncation, other.truncation, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_it_goes_out_as_it_came(exported, imported, tmp_path):
     assert check(imported).ok
     export(imported.root, "bop", output=tmp_path)
@@ -103,6 +104,7 @@ def spoil(tree, name, change):
     file.write_text(json.dumps(said))
 
 
+@pytest.mark.slow
 def test_of_others_less_is_known(tree, tmp_path):
     """What real data sets lack: names, masks, depth, infos, poses of cameras."""
     shutil.rmtree(tree / "test"), shutil.rmtree(tree / "val")
@@ -201,6 +203,7 @@ def same_within(before, after, atol):
         np.testing.assert_allclose(np.array(after, float), np.array(before, float), atol=atol)
 
 
+@pytest.mark.slow
 def test_models_that_cannot_be_read_are_told_and_left_out(tree, tmp_path):
     (tree / "models/obj_000001.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 3\n")
     with pytest.raises(StoreError, match=r"obj_000001.ply: expected a model; found: .*") as error:

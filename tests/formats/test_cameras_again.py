@@ -69,6 +69,7 @@ def rendered(made, place):
     return Dataset(place)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["text", "binary"])
 def test_colmaps_cameras_are_the_same_again(tmp_path, kind):
     """In the order of names; up, as most cameras have it, is -y, and the recipe's origin is what all look at."""
@@ -105,6 +106,7 @@ def pixels(camera, points):
     return np.stack([k[0, 0] * xd + k[0, 2], k[1, 1] * yd + k[1, 2]], 1)
 
 
+@pytest.mark.slow
 def test_a_stand_in_is_where_all_look_and_cameras_are_outside(tmp_path):
     colmap_tree(tmp_path / "scene")
     made = make_again("colmap", tmp_path / "scene" / "sparse" / "0", tmp_path / "again")
@@ -114,6 +116,7 @@ def test_a_stand_in_is_where_all_look_and_cameras_are_outside(tmp_path):
     assert all(0.05 < o.area / (64 * 48) < 0.6 for sample in again for o in sample.objects)
 
 
+@pytest.mark.slow
 def test_lenses_of_several_sizes_are_listed_shots(tmp_path):
     theirs = colmap_tree(tmp_path / "scene", sizes=((64, 48), (40, 60)))
     made = make_again("colmap", tmp_path / "scene", tmp_path / "again")
@@ -136,6 +139,7 @@ def mesh_of(folder, name):
     return box
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dense/meshed-poisson.ply", "mesh.obj"])
 def test_the_data_sets_own_mesh_is_where_it_was(tmp_path, name):
     """Its pixels are those that trimesh's rays meet, through COLMAP's own cameras; a cloud of points beside it is none."""
@@ -182,6 +186,7 @@ def transforms(folder, **more):
     return frames
 
 
+@pytest.mark.slow
 def test_nerfstudios_cameras_are_the_same_again(tmp_path):
     frames = transforms(tmp_path / "scene", test_filenames=["images/frame_00002.png"], train_filenames=[])
     made = make_again("nerfstudio", tmp_path / "scene", tmp_path / "again")
@@ -362,6 +367,7 @@ def test_cameras_that_look_away_from_one_another_have_a_stand_in_ahead_of_the_fi
     assert all(np.linalg.norm(np.array(found.origin) - np.array(s.world_from_camera)[:3, 3]) >= found.length for s in outward)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [1e8, 1e-9])
 def test_a_camera_at_any_distance_has_a_stand_in_that_can_be_rendered(tmp_path, place):
     """The second looks at the first's axis, so that what they look at is about as far away."""
@@ -382,6 +388,7 @@ def test_many_shots_of_one_name_are_numbered_in_time():
     assert len({name.casefold() for name in found}) == len(found) and time.process_time() - began < 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["colmap", "nerfstudio"])
 def test_recipes_keep_what_their_formats_read(tmp_path, kind):
     (colmap_tree if kind == "colmap" else transforms)(tmp_path / "scene")
@@ -390,6 +397,7 @@ def test_recipes_keep_what_their_formats_read(tmp_path, kind):
     assert not any("no format uses" in note for note in generate(str(made.recipe), tmp_path / "out", workers=0).notes)
 
 
+@pytest.mark.slow
 def test_the_command_line_makes_a_recipe_that_can_be_planned_and_shown(tmp_path):
     transforms(tmp_path / "scene")
     answer = viewsphere("new", "--from", "nerfstudio", tmp_path / "scene", cwd=tmp_path)

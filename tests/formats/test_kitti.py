@@ -211,6 +211,7 @@ def test_a_part_of_a_sequence(drives, tmp_path):
     assert {line[0] for line in rows((tmp_path / "kitti/training/label_02/0001.txt").read_text())} == {"2", "3", "4"}
 
 
+@pytest.mark.slow
 def test_an_empty_picture_has_an_empty_file(tmp_path):
     generate(level(viewpoints={"azimuth": 0, "elevation": 0, "distance": 3, "target": [90, 0, 0]}, formats=["kitti"]), tmp_path)
     assert {file.read_text() for file in (tmp_path / "kitti/training/label_2").iterdir()} == {""}
@@ -242,6 +243,7 @@ def test_refusals(tmp_path):
     refused(wide, "kitti: expected a camera or a rectified pair, and one LiDAR at most; found left, right, rear", tmp_path)
 
 
+@pytest.mark.slow
 def test_quoted_and_foreign_names(tmp_path):
     from worlds import MODELS, poses
 
@@ -306,6 +308,7 @@ def test_merged_pictures(stills, poses, written, tmp_path):
             assert (tmp_path / "kitti" / file).read_text() == (written("stills") / file).read_text()
 
 
+@pytest.mark.slow
 def test_merged_rigs_are_refused(videos, drives, tmp_path):
     from viewsphere.run.merging import merge
 

@@ -263,6 +263,7 @@ def test_datumaros_tree(tmp_path):
         assert sample.known_camera is None and not any(o.is_placed for o in sample.objects)
 
 
+@pytest.mark.slow
 def test_it_is_reported_and_merged(stills, tmp_path):
     import_dataset("kitti", data_set(tmp_path / "mine"), tmp_path / "in")
     write_report(Dataset(tmp_path / "in"), tmp_path / "report.html")

@@ -134,6 +134,7 @@ def test_torchvision_reads_eth3d(videos, written, tmp_path):
         equal("middlebury", "torchvision: validity of ETH3D", valid, left.disparity_state == 0)
 
 
+@pytest.mark.slow
 def test_still_pairs(tmp_path):
     """Every picture of a rig is a scene, whose number is that of the frame."""
     scenes = {"count": 1, "objects": [2, 2], "layout": "scatter"}

@@ -190,6 +190,7 @@ def passing(**changes):
     return videos(**{**said, "formats": [{"nuscenes": {"version": "v1.0-own"}}], **changes})
 
 
+@pytest.mark.slow
 def test_a_version_of_its_own_and_hostile_names(tmp_path):
     from worlds import MODELS
 
@@ -227,6 +228,7 @@ def test_a_lidar_without_points(tmp_path):
             generate(recipe, tmp_path / "no")
 
 
+@pytest.mark.slow
 def test_objects_come_and_go(tmp_path):
     """What is there at some instants only has annotations then, and its instance begins and ends with them."""
     from worlds import MODELS

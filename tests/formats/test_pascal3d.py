@@ -60,6 +60,7 @@ def test_models_on_the_axis_are_projected_exactly(poses, written):
             close("pascal3d", "scipy: azimuth", said.viewpoint.azimuth, sample.pose.azimuth_deg, "deg", atol=1e-9)
 
 
+@pytest.mark.slow
 def test_rolled_cameras_are_theta(tmp_path):
     recipe = poses_recipe(
         name="rolled",
@@ -118,6 +119,7 @@ def test_boxes_flags_and_anchors(stills, written):
     assert points > 20
 
 
+@pytest.mark.slow
 def test_models_and_their_points(stills, written):
     folder = written(stills)
     for category in ("car", "chair", "post_box"):

@@ -124,6 +124,7 @@ def differences(one, other, at=""):
         yield at, np.abs(np.subtract(one, other, dtype=float)).max(initial=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["stills", "poses"])
 def test_an_export_comes_back_and_goes_out_equal(world, request, tmp_path):
     own = request.getfixturevalue(world)
@@ -156,6 +157,7 @@ def test_an_export_comes_back_and_goes_out_equal(world, request, tmp_path):
             close("pascal3d", "import: keypoints", o.keypoints[shown], other.keypoints[shown], "px", atol=1e-12)
 
 
+@pytest.mark.slow
 def test_poses_without_our_own_fields(stills, tmp_path):
     """Of K alone and the viewpoint, where RT is not there, the same pose follows."""
     export(stills.root, "pascal3d", output=tmp_path)
@@ -257,6 +259,7 @@ def test_what_came_goes_out(imported, tmp_path):
                 assert again.viewpoint.azimuth_coarse == 30 and again.viewpoint.distance == 0 and not again.RT.size
 
 
+@pytest.mark.slow
 def test_it_is_reported_and_merged(poses, imported, tmp_path):
     _, dataset = imported
     write_report(dataset, tmp_path / "report.html")

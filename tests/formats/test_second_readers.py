@@ -529,6 +529,7 @@ def obj_vertices(path):
     return np.array([line.split()[1:4] for line in path.read_text().splitlines() if line.startswith("v ")], float)
 
 
+@pytest.mark.slow
 def test_nocs(views, tmp_path):
     root = written(views, tmp_path, "nocs")
     for sample in views:
@@ -882,6 +883,7 @@ def sscnet_class(sample):
     return found
 
 
+@pytest.mark.slow
 def test_sscnet(views, tmp_path):
     root = written(views, tmp_path, "sscnet")
     kinds: set[int] = set()

@@ -240,6 +240,7 @@ def test_videos_show_the_pictures(clips):
             assert off.index(min(off)) == k and off[k] < 3
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short")
 def test_it_is_proved_and_the_same_by_several_processes(people, written, tmp_path, monkeypatch):
     from viewsphere.run import preparing
@@ -301,6 +302,7 @@ def test_a_clip_s_pictures_are_not_in_memory_together(long):
     assert most < 50 * long[0].rgb.nbytes  # of 100; manifests, too, are in memory
 
 
+@pytest.mark.slow
 def test_a_check_of_the_whole_data_set(long, tmp_path):
     root = shutil.copytree(long.root, tmp_path / "out")
     export(root, ["surreal"])
@@ -392,6 +394,7 @@ def test_clips_that_it_cannot_hold(people, change, message):
         first_of(people, change)
 
 
+@pytest.mark.slow
 def test_a_moving_camera_leaves_nothing_written(people, tmp_path):
     source = write_gltf(person(figure(body.SMPL)), tmp_path / "person.gltf")
     orbit = {"kind": "orbit", "azimuth": [20, 50], "elevation": [5, 5], "distance": [4, 4]}

@@ -50,6 +50,7 @@ def remarks(dataset, name, folder):
     return list(plugins.load("formats", name).verify(view, folder, range(len(dataset)), *entry.arguments()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_holds_some_data_set_and_refuses_others_in_words(name, request):
     refused = []
@@ -65,6 +66,7 @@ def test_every_format_holds_some_data_set_and_refuses_others_in_words(name, requ
     assert len(refused) < len(WORLDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize("name", FORMATS)
 def test_an_export_is_proved(exported, name, world, request):

@@ -41,6 +41,7 @@ def inflated(stream) -> bytes:
     return data
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.integers(1, 700), st.booleans()), min_size=1, max_size=12), st.sampled_from([1, 3]))
 def test_any_runs_come_back(runs, components):
     rng = np.random.default_rng(len(runs))

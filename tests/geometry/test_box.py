@@ -164,6 +164,7 @@ def box_of(pixels):
 ONE = np.array([[0, 1, 2]], np.int32)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LENSES)
 @pytest.mark.parametrize(("spread", "focal"), [(0.04, 60.0), (0.1, 300.0), (0.5, 300.0)], ids=["8 px", "small", "large"])
 def test_boxes_of_bent_triangles_are_exact_to_a_thousandth(name, spread, focal):

@@ -96,6 +96,7 @@ def test_brown_conrady_round_trip(k1, k2, k3, k4, k5, k6, p1, p2):
     np.testing.assert_allclose(pixels[real], np.stack([k, j], -1)[real], atol=1e-9)
 
 
+@pytest.mark.slow
 @settings(PROFILE, max_examples=2 * settings.default.max_examples // 5)
 @given(seed=st.integers(0, 10**6))
 def test_brown_conrady_loses_no_ray(seed):

@@ -118,6 +118,7 @@ def test_streaks_are_as_long_as_their_drops_fall():
     assert long.max() < 0.5 * short.max()
 
 
+@pytest.mark.slow
 def test_a_lens_that_sees_everywhere_sees_rain_everywhere():
     bent = {"model": "fisheye", "coefficients": (0.0,) * 4}
     fisheye = Intrinsics(width=96, height=64, fx=30, fy=30, cx=48, cy=32, distortion=bent)

@@ -218,6 +218,7 @@ def test_what_was_changed_is_found(scanned, field):
     assert any(one.startswith(problem) for one in found)
 
 
+@pytest.mark.slow
 def test_check_finds_times_that_are_not_those_of_the_sweep(tmp_path):
     """Of which nothing else in a sample says anything: labels are computed again."""
     out = tmp_path / "out"

@@ -61,6 +61,7 @@ def test_they_are_proved(made):
     assert report.checked["keypoints"] == report.checked["canonical_pose"] == len(made)
 
 
+@pytest.mark.slow
 def test_rays_reach_what_is_visible_and_nothing_else(made):
     """Embree's ray towards a point meets nothing before it, but for the slack; near edges rounding may decide otherwise."""
     pytest.importorskip("embreex")

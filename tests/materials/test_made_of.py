@@ -117,6 +117,7 @@ def test_glass_and_what_has_holes_stay(chair):
     assert textured(mesh, (Repaint(material="e", texture=WOOD),)) is mesh
 
 
+@pytest.mark.slow
 def test_every_label_is_the_same_and_every_picture_another():
     plain, made = (list(vs.render(recipe_of("on", m))) for m in ((), [{"texture": "any"}]))
     for one, other in zip(plain, made, strict=True):

@@ -48,6 +48,7 @@ def test_counts_of_the_small_recipe(small_dataset):
     assert sum(found["distances"]["counts"]) == 12
 
 
+@pytest.mark.slow
 def test_many_processes_and_chunks_read_the_same_table(small_dataset, monkeypatch):
     from viewsphere.report import table as module
 
@@ -215,6 +216,7 @@ def test_colours_of_depth_normals_and_coordinates(small_dataset):
     assert colors[0].tolist() == [[0, 0, 0, 255], [0, 0, 0, 0]]
 
 
+@pytest.mark.slow
 def test_pictures_fit_the_budget_or_are_refused(small_dataset):
     samples = list(small_dataset)
 

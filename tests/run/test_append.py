@@ -116,6 +116,7 @@ def assert_same_frame(a, b):
             np.testing.assert_equal(getattr(p, name), getattr(o, name), err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [
@@ -565,6 +566,7 @@ def test_poses_that_a_merged_data_set_has_twice_are_there():
     assert [(v.index, v.azimuth_deg, v.elevation_deg) for v in seen] == [(10, 120, 50), (11, 240, 50)]
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.integers(0, 40), st.integers(1, 7)), min_size=1, max_size=5), st.integers(8, 20))
 def test_folders_never_overflow_and_what_is_there_stays(spans, size):
     record, firsts = whole(vs.plan(recipe())).record, [0]

@@ -92,6 +92,7 @@ def values(dataset):
 # Shots.
 
 
+@pytest.mark.slow
 def test_one_shot_shows_several_time_steps_and_its_samples_are_those_of_shots_of_one_each(folder):
     shot = Shot.model_validate_json(shot_of_three(folder).model_dump_json())
     together, stages = list(Stages().render(shot)), Stages()
@@ -207,6 +208,7 @@ def test_time_steps_are_chosen_by_their_keys(folder):
     assert [m.key for m in Dataset(folder / "out", Choice(("walker-f0013",))).models] == ["walker-f0013"]
 
 
+@pytest.mark.slow
 def test_appending_adds_time_steps_and_changes_nothing_that_was_there(folder):
     out = folder / "out"
     generate(recipe(folder, frames=[1, 25]), out)
@@ -260,6 +262,7 @@ def test_another_time_step_s_vertices_are_found_by_check(folder):
     assert {finding.frame for finding in report.findings} >= {0, 1, 2, 3}
 
 
+@pytest.mark.slow
 def test_equal_models_merge_and_others_stay_apart(folder):
     for name, frames, azimuth in (("a", FRAMES, [20]), ("b", FRAMES, [80]), ("c", (1, 25), [80])):
         viewpoints = {"azimuth": azimuth, "elevation": 20, "distance": 3}

@@ -43,6 +43,7 @@ def test_each_piece_of_work_is_timed_once():
     assert rates.export == pytest.approx(1 / frames)
 
 
+@pytest.mark.slow
 def test_the_bytes_are_those_of_a_real_run(tmp_path):
     recipe = small_recipe(viewpoints={"azimuth": [0, 60, 120, 180, 240, 300], "elevation": [0, 45], "distance": [0.8, 1.2]})
     expected = estimate(recipe).bytes
@@ -64,6 +65,7 @@ def test_the_command_says_it_in_one_line(tmp_path):
     assert printed.keys() == {"seconds", "bytes", "workers", "unused"} and printed["workers"] == 2
 
 
+@pytest.mark.slow
 def test_a_plan_without_an_estimate_touches_no_model():
     recipe = ROOT / "recipes" / "car_poses.yaml"
     code = "import sys; from viewsphere.cli.commands import app; app(['plan', sys.argv[1]], standalone_mode=False)\n"

@@ -59,6 +59,7 @@ def frames_of(lots):
     return sum(len(places) for lot in lots for _, places in lot)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_the_same_bytes_whoever_made_them(workers, rendered, shared, tmp_path):
     told = {}
@@ -84,6 +85,7 @@ def test_a_choice_is_shared_too(choice, frames, rendered, shared, tmp_path):
     assert frames - 8 < frames_of(shared) < frames
 
 
+@pytest.mark.slow
 def test_what_a_worker_cannot_read_is_told_in_a_line_and_nothing_is_put_in_place(rendered, shared, tmp_path):
     out = shutil.copytree(rendered, tmp_path / "out")
     (records,) = (out / "store" / "shots").glob("*/post_box_001-000015/frames.json")
@@ -176,6 +178,7 @@ def _do(task):
             raise MemoryError
 
 
+@pytest.mark.slow
 def test_results_come_in_order_and_a_slow_worker_holds_up_the_others(tmp_path):
     """Of two workers one waits for a file, which is made when the other is as far ahead of it as it may be."""
     asked, file = [], tmp_path / "go"

@@ -74,6 +74,7 @@ def test_a_recipe_gives_options_and_is_read_back_from_its_text(tmp_path):
     assert category_id(tmp_path / "out") == POST_BOX["contiguous"]
 
 
+@pytest.mark.slow
 def test_an_export_that_is_written_again_keeps_its_options(small_dataset):
     root = small_dataset.root
     assert category_id(root) == POST_BOX["contiguous"]

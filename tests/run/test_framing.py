@@ -76,6 +76,7 @@ def test_all_models_of_a_random_scene_have_to_be_seen():
     assert min(min(o.visibility for o in sample.objects) for sample in before) < 0.5 <= min(least)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_met_is_the_best_found_and_counted(tmp_path):
     views = {"kind": "jitter", "azimuth": 0, "elevation": 0, "distance": 2.5, "plus_minus": {"azimuth": 3}}
     row = {"company": {"layout": [[0, -0.6, 0], [0.6, 0.6, 0]], "gap": 0}, "ground": "off"}
@@ -164,6 +165,7 @@ def test_the_draws_do_not_depend_on_workers(tmp_path):
     assert tree_hash(tmp_path / "0/store/shots") == tree_hash(tmp_path / "2/store/shots")
 
 
+@pytest.mark.slow
 def test_exports_leave_out_annotations_of_what_is_hardly_seen(tmp_path):
     recipe = recipe_of(channels=["rgb", "instances"], formats=["coco", "native", "csv"], keep_annotations_above=0.5)
     vs.generate(recipe, tmp_path / "out")
@@ -192,6 +194,7 @@ def seen_more_than(least, dataset):
     return {(s.index, o.id) for s in dataset for o in s.objects if o.visibility > least}
 
 
+@pytest.mark.slow
 def test_another_threshold_renews_all_exports_and_renders_nothing(tmp_path):
     out, fresh = tmp_path / "out", tmp_path / "fresh"
     vs.generate(recipe_of(**LEFT_OUT, keep_annotations_above=0.5), out)
@@ -213,6 +216,7 @@ def test_another_threshold_renews_all_exports_and_renders_nothing(tmp_path):
     assert not check(vs.open(out)).findings
 
 
+@pytest.mark.slow
 def test_appended_frames_and_older_ones_have_one_threshold(tmp_path):
     vs.generate(recipe_of(**LEFT_OUT, keep_annotations_above=0.5), tmp_path / "out")
     more = {**LEFT_OUT, "viewpoints": {**LOW, "count": 4}, "keep_annotations_above": 0.9}
@@ -226,6 +230,7 @@ def test_appended_frames_and_older_ones_have_one_threshold(tmp_path):
     assert not check(vs.open(tmp_path / "out")).findings
 
 
+@pytest.mark.slow
 def test_an_export_is_proved_by_the_threshold_that_it_was_made_with(tmp_path):
     out = tmp_path / "out"
     vs.generate(recipe_of(**LEFT_OUT, keep_annotations_above=0.5), out)
@@ -250,6 +255,7 @@ def test_the_data_set_is_read_once_for_all_formats_that_leave_annotations_out(tm
     assert written == seen_more_than(0.5, vs.open(tmp_path / "out"))
 
 
+@pytest.mark.slow
 def test_a_merged_data_set_has_the_highest_threshold(tmp_path):
     places = [tmp_path / name for name in ("one", "two", "none")]
     for place, least in zip(places, (0.9, 0.5, None), strict=True):

@@ -65,6 +65,7 @@ def kill_on_its_way(command, out, wait):
     run.wait(timeout=DEADLINE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kills", [1, pytest.param(4, marks=[pytest.mark.slow])])
 def test_a_killed_run_goes_on_to_the_same_bytes(kills, recipe_file, small_run, tmp_path):
     out, rng = tmp_path / "out", random.Random(kills)

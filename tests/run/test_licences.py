@@ -155,6 +155,7 @@ def test_check_proves_the_file_and_repair_writes_it_again(spoil, licensed, tmp_p
     assert (out / CREDITS).read_bytes() == (licensed / CREDITS).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_damaged_model_is_mended_with_the_credit_that_was_said_later(folder, tmp_path):
     generate(recipe(folder), tmp_path / "out")
     generate(recipe(folder, credit=MAKER), tmp_path / "out")

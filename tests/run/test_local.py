@@ -153,6 +153,7 @@ def _without_memory():
     raise MemoryError
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("task", "said"),
     [
@@ -172,6 +173,7 @@ def test_a_worker_that_dies_costs_a_retry_then_an_error(task, said, tmp_path):
     assert said in str(outcomes[0].error)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
     before = set(workers_of(os.getpid()))
@@ -185,6 +187,7 @@ def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
     assert not any(outcome.error for outcome in outcomes[:-1])
 
 
+@pytest.mark.slow
 def test_what_a_worker_cannot_do_ends_the_run_with_its_traceback(tmp_path):
     with (
         pytest.raises(ViewsphereError, match=r"x: a worker failed\nTraceback(.|\n)*AttributeError") as caught,
@@ -200,6 +203,7 @@ CHAIR = ModelSpec(key="chair", source="zoo:chair", category="chair", category_id
 LOOK_AT_CHAIR = ModelTask("same model", CHAIR)
 
 
+@pytest.mark.slow
 def test_workers_stay_for_the_next_list_and_one_that_died_meanwhile_is_replaced(tmp_path):
     def pids():
         return {child.pid for child in active_children()} - before
@@ -233,6 +237,7 @@ def _interrupted():
     return PORTION
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals are masked on POSIX alone")
 def test_ctrl_c_while_a_worker_starts_is_the_parents_to_hear(tmp_path, capfd):
     with LocalCrew(tmp_path, Impatient(), 1) as crew:

@@ -197,6 +197,7 @@ def test_one_model_in_two_categories_is_two_models(sources, tmp_path):
     assert report.ok, report.findings
 
 
+@pytest.mark.slow
 def test_scenery_goes_along(tmp_path):
     """Both have a plane of one name, of different heights; rays are cast at the right one."""
     Image.new("RGB", (8, 8), (200, 0, 0)).save(tmp_path / "red.png")

@@ -88,6 +88,7 @@ def test_the_first_sensor_sees_what_a_single_camera_sees(mixed):
         assert one.pose == front.pose and np.array_equal(one.depth, front.depth) and np.array_equal(one.rgb, front.rgb)
 
 
+@pytest.mark.slow
 def test_channels_and_poses_are_added_for_every_sensor(tmp_path):
     out = tmp_path / "out"
     generate(Recipe(**BASE, rig=MIXED), out)

@@ -61,6 +61,7 @@ def test_no_format_is_written_before_all_is_there(tmp_path):
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"store", "CREDITS.md"}
 
 
+@pytest.mark.slow
 def test_there_may_be_more_shards_than_shots(small_run, tmp_path):
     order = list(range(9))
     random.Random(3).shuffle(order)
@@ -116,6 +117,7 @@ def test_what_shards_left_out_is_what_one_run_leaves_out(tmp_path):
     assert tree_hash(tmp_path / "out") == tree_hash(tmp_path / "one")
 
 
+@pytest.mark.slow
 def test_shards_add_to_a_data_set_as_one_run_does(small_dataset, tmp_path):
     more = small_recipe(models=[{**small_recipe().model_dump()["models"][0], "count": 3}])
     shutil.copytree(small_dataset.root, tmp_path / "one")
@@ -153,6 +155,7 @@ def test_each_shot_is_in_one_shard(tmp_path):
     assert {len(keys) for keys in shares} == {2, 3}
 
 
+@pytest.mark.slow
 @given(st.data())
 def test_a_share_of_an_index_is_counted_as_its_rows_are(data):
     number = st.integers(1, 12)
@@ -198,6 +201,7 @@ def test_two_that_finish_at_once_leave_what_one_leaves(recipe_file, small_run, t
     assert tree_hash(out) == tree_hash(small_run)
 
 
+@pytest.mark.slow
 def test_many_put_one_export_in_place_and_none_is_refused(small_dataset):
     code = (
         "import sys; from pathlib import Path; from viewsphere.store import Store\n"
@@ -214,6 +218,7 @@ def test_many_put_one_export_in_place_and_none_is_refused(small_dataset):
     assert not any((small_dataset.root / "store" / "writing").iterdir())
 
 
+@pytest.mark.slow
 def test_a_run_that_is_told_to_end_leaves_nothing_unfinished(recipe_file, tmp_path):
     out = tmp_path / "out"
     run = subprocess.Popen(command(recipe_file, out, "0/1", 1), **OWN)

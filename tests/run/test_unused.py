@@ -74,6 +74,7 @@ def test_one_channel_and_three_are_told_in_words():
     assert str(among(three, coco)).startswith("depth, normals and parts are 88% of ")
 
 
+@pytest.mark.slow
 def test_the_estimate_of_a_plan_tells_them(tmp_path):
     file = tmp_path / "r.yaml"
     file.write_text(small_recipe(channels=CHANNELS, formats=["coco"]).to_yaml())

@@ -56,6 +56,7 @@ def test_labels_are_the_same_bytes_and_pictures_are_not(made: Dataset) -> None:
 WEATHER = {"dry": {}, "fog": {"fog": 3.0}, "rain": {"rain": 40.0}, "snow": {"snow": 3.0}, "wet": {"wet": {"puddles": 0.6}}}
 
 
+@pytest.mark.slow
 def test_no_weather_changes_a_label_and_every_weather_a_picture() -> None:
     once = recipe(
         variations=WEATHER, models=[{**MODEL, "count": 1}], viewpoints={"azimuth": 30, "elevation": 20, "distance": 1}
@@ -87,6 +88,7 @@ def test_a_variation_looks_as_it_would_alone(made: Dataset) -> None:
     assert all((alone[name] == picture).all() for name, picture in together.items())
 
 
+@pytest.mark.slow
 def test_a_further_variation_is_appended_and_nothing_else_is_touched(made: Dataset, tmp_path: Path) -> None:
     out = tmp_path / "out"
     generate(recipe(), out)

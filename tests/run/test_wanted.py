@@ -28,6 +28,7 @@ def targets(folder):
     return [sample.objects[0] for sample in vs.Dataset(folder)]
 
 
+@pytest.mark.slow
 def test_company_between_hides_as_much_as_is_wanted(tmp_path):
     company = {"count": 1, "layout": "between", "draw": "per_frame", "gap": 0.05}
     recipe = wanted(scene={"company": company}, wanted={"visibility": [0.4, 0.7]})

@@ -71,6 +71,7 @@ def test_an_open_laptop_that_is_wider_than_a_shelf_lies_on_it(seed):
     assert np.abs(np.sort(placed([laptop], [pose])[0][:, 2])[:4]).max() < 0.002
 
 
+@pytest.mark.slow
 def test_things_lie_in_a_box():
     shapes, size = solids(8, seed=2), (0.8, 0.4, 0.6)
     poses = fallen(shapes, "container", given={"size": [0.8, 0.6, 0.4]})

@@ -53,6 +53,7 @@ def label_fill(sample, objects=None):
     return max(width / sample.camera.width, height / sample.camera.height)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lens", LENSES)
 def test_the_labels_box_fills_the_share_that_was_asked_for(lens):
     recipe = recipe_of(camera=LENSES[lens])
@@ -120,6 +121,7 @@ def test_jitter_comes_on_top_and_its_distance_is_a_factor():
         assert far.pose.distance == pytest.approx(1.5 * near.pose.distance)
 
 
+@pytest.mark.slow
 def test_the_distance_does_not_depend_on_how_shots_are_cut():
     recipe = recipe_of(("zoo:chair", "zoo:car"))
     whole, cut = (list(vs.render(recipe.model_copy(update={"shot_frames": n}))) for n in (8, 1))

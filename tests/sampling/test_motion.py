@@ -140,6 +140,7 @@ def test_smooth_keyframes_begin_and_end_slowly():
     np.testing.assert_allclose(x, 8 * (3 * (TIMES / 2) ** 2 - 2 * (TIMES / 2) ** 3), atol=1e-9)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.booleans())
 @settings(max_examples=10, deadline=None)
 def test_a_spline_passes_its_points_at_a_constant_speed(seed, closed):
@@ -175,6 +176,7 @@ def test_straight_up_things_keep_their_azimuth():
     np.testing.assert_allclose(poses(up)[:, :3, :3], np.tile(np.array(PLACED)[:3, :3], (len(TIMES), 1, 1)), atol=1e-10)
 
 
+@pytest.mark.slow
 def test_random_keeps_within_its_band_and_its_amplitudes():
     times = np.arange(5000) / 25
     one = {"kind": "random", "position": [2, 0.5, 0], "rotation_deg": [0, 0, 30], "highest_hz": 1.5}

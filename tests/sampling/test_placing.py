@@ -86,6 +86,7 @@ sizes = st.floats(0.05, 6)
 boxes_strategy = st.lists(st.tuples(sizes, sizes, st.floats(-1, 1), st.floats(-1, 1)), min_size=2, max_size=6)
 
 
+@pytest.mark.slow
 @given(boxes_strategy, st.integers(0, 2**32), st.sampled_from(["scatter", "row"]), st.floats(0, 1))
 def test_no_two_stand_in_one_another(measures, seed, how, gap):
     boxes = [box(w, n, x=x * w, y=y * n, z=0.3 * i) for i, (w, n, x, y) in enumerate(measures)]
@@ -165,6 +166,7 @@ def test_a_listed_layout_is_taken_as_it_is_and_refused_where_two_meet():
         listed()
 
 
+@pytest.mark.slow
 def test_all_stay_on_the_free_floor_or_it_is_said():
     free = footprint(box_vertices((-3.0, -50.0, 0.0), (3.0, 50.0, 0.0)), standing(np.zeros((8, 3))))
     square = footprint(box_vertices((-2.5, -2.5, 0.0), (2.5, 2.5, 0.0)), standing(np.zeros((8, 3))))

@@ -287,6 +287,7 @@ def test_each_of_several_lamps_is_drawn_by_itself():
     assert counts == {1, 2, 3}
 
 
+@pytest.mark.slow
 def test_statistics_of_a_field_over_models():
     found = planned({"sun": {"elevation_deg": [10, 70]}}, models=[{"source": "zoo:car", "count": 1000}])
     heights = np.array([found.shot(i, box_of).scene.sun.elevation_deg for i in range(found.shot_count)])

@@ -241,6 +241,7 @@ def test_what_is_missing_is_counted_in_scenes(dataset, tmp_path):
     assert any("3 scenes x 3 poses" in message for message in messages)
 
 
+@pytest.mark.slow
 def test_workers_appending_and_memory_make_the_same_pictures(dataset, tmp_path):
     vs.generate(recipe(2, scenes={"objects": [1, 3]}), tmp_path / "out")
     summary = vs.generate(recipe(3, scenes={"objects": [1, 3]}), tmp_path / "out", append=True)

@@ -65,6 +65,7 @@ def test_models_and_viewpoints_change_no_other_sequence():
         assert (things, scene, instant) == other
 
 
+@pytest.mark.slow
 def test_all_that_is_drawn_is_drawn_once_a_sequence():
     planned = vs.plan(recipe(scene=RANDOM, splits={"by": "sequence"}))
     for name in {shot.sequence for shot in planned.shots(box_of)}:
@@ -131,6 +132,7 @@ def test_mistakes_are_said_in_one_line(changes, message):
         vs.plan(recipe(**changes))
 
 
+@pytest.mark.slow
 def test_a_data_set_of_sequences_is_proved_and_does_not_depend_on_how_it_was_cut(tmp_path):
     made = {}
     for most in (2, 5):
@@ -145,6 +147,7 @@ def test_a_data_set_of_sequences_is_proved_and_does_not_depend_on_how_it_was_cut
     assert made[2] == made[5]
 
 
+@pytest.mark.slow
 def test_merged_sequences_of_one_name_stay_apart(tmp_path):
     for name, elevation in (("a", 20), ("b", 40)):
         seen_from = {"azimuth": 0, "elevation": elevation, "distance": 4}

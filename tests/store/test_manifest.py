@@ -14,6 +14,7 @@ PLAIN = st.dictionaries(
 )
 
 
+@pytest.mark.slow
 @given(value=PLAIN.filter(lambda value: "digest" not in value))
 def test_a_sealed_text_is_json_that_opens_to_what_was_sealed(value):
     text = sealed(value)

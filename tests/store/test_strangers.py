@@ -235,6 +235,7 @@ JSON = ("skipped.json", "plan.json", "models/*/model.json", *OF_A_SHOT)
 TEXTS = ["", '{"a', "null", "[]", "3", '{"a": 1}', '"\\ud800"', DEEP]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", TEXTS, ids=lambda text: text[:8] or "nothing")
 @pytest.mark.parametrize("pattern", JSON)
 def test_any_other_json_in_a_store_is_one_line(pattern, text, short, tmp_path):
@@ -289,6 +290,7 @@ def test_a_picture_of_too_many_pixels_is_not_unpacked(stranger, made, tmp_path, 
         check_size(1, 1)
 
 
+@pytest.mark.slow
 def test_pixels_beyond_those_that_the_head_tells_are_not_unpacked():
     data = encode_png(np.zeros((2, 2, 3), np.uint8))
     more = zlib.compress(bytes(1 << 28), 9)

@@ -92,6 +92,7 @@ def test_any_tar_reads_a_shard_and_finds_the_files_where_the_manifest_says(pair)
         assert shard.stat().st_size % tarfile.RECORDSIZE == 0
 
 
+@pytest.mark.slow
 @given(files=st.dictionaries(st.from_regex(r"[a-z]{1,20}/[0-9]{8}\.png", fullmatch=True), st.binary(max_size=2000)))
 def test_what_is_put_into_a_tar_comes_out(files):
     data = b"".join(tar.member(name, content) for name, content in files.items())
@@ -99,11 +100,13 @@ def test_what_is_put_into_a_tar_comes_out(files):
         assert {member.name: opened.extractfile(member).read() for member in opened} == files
 
 
+@pytest.mark.slow
 def test_workers_make_the_same_bytes(pair, tmp_path):
     generate(recipe("tar"), tmp_path / "out", workers=2)
     assert tree_hash(tmp_path / "out" / "store") == tree_hash(pair[1] / "store")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_damage_is_found_and_mended(pair, packed, seed):
     rng, shard = np.random.default_rng(seed), shards(packed)[seed % 3]
@@ -173,6 +176,7 @@ def test_numbers_that_are_none_are_told(packed, number):
         Manifest.read(folder)
 
 
+@pytest.mark.slow
 def test_frames_and_channels_are_added_to_either_kind(pair, tmp_path):
     out = shutil.copytree(pair[0], tmp_path / "out")
     more = {"azimuth": [0, 120, 240, 300], "elevation": [15, 50], "distance": 1.0}
@@ -184,6 +188,7 @@ def test_frames_and_channels_are_added_to_either_kind(pair, tmp_path):
     assert len(shards(out)) > 6  # the new frames, and the channel that the old ones got
 
 
+@pytest.mark.slow
 def test_merged_shots_are_packed_as_they_were(pair, tmp_path):
     other = tmp_path / "other"
     generate(recipe("files", seed=5, models=[{"source": "zoo:wheelie_bin", "category": "bin"}]), other)

@@ -50,6 +50,7 @@ def test_a_plane_that_moves_and_comes_near(step, far):
     np.testing.assert_allclose(match.xyz[..., :2], (there - half) / f * z, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_ball_that_turns_moves_with_its_facets():
     rng = np.random.default_rng(1)
     camera = orbit_camera(lens(120, 90, 0.8), 0.3, 0.4, 3.0)

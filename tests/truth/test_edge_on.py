@@ -52,6 +52,7 @@ def level(tmp_path_factory):
     return Dataset(out)
 
 
+@pytest.mark.slow
 def test_check_finds_nothing_wrong_with_pictures_from_the_plane(level):
     pytest.importorskip("embreex")
     for sample in level:

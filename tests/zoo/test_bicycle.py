@@ -253,6 +253,7 @@ def test_the_mask_has_a_hole_between_any_two_spokes(tmp_path: Path, style: str, 
     assert max(holes) < 0.08 * inside.sum()
 
 
+@pytest.mark.slow
 def test_a_whole_bicycle_has_holes_in_its_frame_and_wheels(tmp_path: Path) -> None:
     mesh = built(straight("road"))
     target = middle(mesh.vertices.astype(np.float64))

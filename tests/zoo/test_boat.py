@@ -139,6 +139,7 @@ def test_sails_fill_to_leeward_and_are_closed(lee: float) -> None:
     assert 0.3 < (sides > 0).mean() < 0.7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "least"), [(8, 2), pytest.param(30, 6, marks=pytest.mark.slow)])
 def test_the_tiller_stands_on_something(count: int, least: int) -> None:
     tillers = 0

@@ -57,6 +57,7 @@ def moving(clip):
 # The surface.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 5, pytest.param(3, marks=pytest.mark.slow)])
 def test_every_part_is_a_closed_surface_that_faces_outwards(seed):
     mesh = made(seed).mesh
@@ -75,6 +76,7 @@ def test_every_part_is_a_closed_surface_that_faces_outwards(seed):
     assert outward_share(mesh) > 0.99
 
 
+@pytest.mark.slow
 def test_someone_has_a_body_of_its_own_height_that_faces_minus_y():
     for build in BUILDS[:2]:
         one = person(Person(build=build))
@@ -88,6 +90,7 @@ def test_someone_has_a_body_of_its_own_height_that_faces_minus_y():
         np.testing.assert_allclose(right, left * (-1, 1, 1))
 
 
+@pytest.mark.slow
 def test_draws_differ_and_one_seed_gives_the_same_bytes():
     files = [rigged_glb_bytes(one) for one in (made(1), person(draw(np.random.default_rng(1))), made(5))]
     first, again, other = (hashlib.sha256(file).hexdigest() for file in files)
@@ -172,6 +175,7 @@ def test_who_sits_has_level_thighs_above_the_chair(build):
 # From here on it is a file as any other.
 
 
+@pytest.mark.slow
 def test_its_file_plays_without_blender_and_rests_in_a_pose_that_nobody_is_rigged_in(monkeypatch):
     monkeypatch.setattr("viewsphere.assets.via_blender.find_blender", None)
     one, spec = made(1), spec_of()
@@ -222,6 +226,7 @@ def walked(tmp_path_factory):
     return Dataset(out)
 
 
+@pytest.mark.slow
 def test_the_recipe_makes_a_data_set_that_passes(walked):
     assert len(walked) == 3
     report = check(walked, sample=None)

@@ -103,6 +103,7 @@ def test_small_things_stand_on_what_carries_them(seed: int) -> None:
             assert abs(a.z - b.z) > 0.2 or not overlap(a.rectangle, b.rectangle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["room", "flat", "table_top"])
 def test_surfaces_are_level_faces_of_furniture(name: str) -> None:
     pytest.importorskip("embreex")
@@ -131,6 +132,7 @@ def test_surfaces_are_level_faces_of_furniture(name: str) -> None:
         assert np.abs(heights - world[2, 3]).max() < 0.035, surface.name
 
 
+@pytest.mark.slow
 def test_every_kind_of_room_has_what_makes_it_one() -> None:
     found: dict[str, list[set[str]]] = {}
     for seed in range(40):
@@ -140,6 +142,7 @@ def test_every_kind_of_room_has_what_makes_it_one() -> None:
         assert np.mean([family in there for there in found[kind]]) > 0.8, kind
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["room", "flat"])
 def test_the_free_floor_is_free_and_cameras_have_room_around_it(name: str) -> None:
     for seed in range(3):

@@ -109,6 +109,7 @@ def test_heavy_vehicles_have_the_size_that_was_asked_for_and_face_minus_y(family
     assert {"windshield", "grille", "licence_plate", "wiper", "mirror_left", "mirror_right"} <= set(mesh.parts)
 
 
+@pytest.mark.slow
 def test_a_bus_has_its_doors_on_one_side_and_a_row_of_windows_on_each() -> None:
     p = Bus(doors=3, door_side="right")
     right, left = bus(p), bus(replace(p, door_side="left"))
