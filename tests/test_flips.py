@@ -17,7 +17,7 @@ from viewsphere.store import Dataset, decode
 from viewsphere.store.checksums import damaged_files
 from viewsphere.store.manifest import Manifest
 
-FLIPS = [pytest.param(400, marks=pytest.mark.slow, id="400"), pytest.param(12, id="12")]
+FLIPS = [pytest.param(100, marks=pytest.mark.slow, id="100"), pytest.param(12, id="12")]
 """Bits of each kind of file."""
 
 KINDS = {
