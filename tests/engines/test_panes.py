@@ -82,9 +82,7 @@ def test_a_mirror_shows_what_stands_behind_the_camera_as_a_camera_beyond_the_mir
     wanted = light(behind(mirrored_y), Scene(sun=sun(160), sky=DARK))[SHOWN]
     found, blurred = (light([plate(), *behind()], Scene(sun=sun(), sky=DARK), panes=how)[SHOWN] for how in (True, False))
     # Shadow, wall and bands.
-    assert [np.mean((low < wanted) & (wanted < high)) > 0.01 for low, high in ((0, 0.1), (0.1, 0.3), (0.45, 0.55))] == [
-        True
-    ] * 3
+    assert all(np.mean((low < wanted) & (wanted < high)) > 0.01 for low, high in ((0, 0.1), (0.1, 0.3), (0.45, 0.55)))
     assert np.mean(np.abs(found - wanted).max(axis=2) < 0.02) > 0.97
     assert np.mean(np.abs(blurred - wanted).max(axis=2) < 0.02) < 0.7
 

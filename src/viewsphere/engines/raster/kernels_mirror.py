@@ -108,16 +108,3 @@ def polish(at, gloss, near, soft, nearness, inverse_depth, sharp, matt, radiance
             shown = near[i, c] + (soft[i, c] - near[i, c]) * blur
             change = gloss[i, c] * shown - gloss[i, U(3) + c]
             radiance[p, c] = max(radiance[p, c] + share * change, f4(0))
-
-
-@njit
-def glaze(at, gloss, shown, sharp, blurred, radiance):
-    """Put what rays see, shown (n, 3), in place of what pixels `at` (n,) of radiance (H * W, 4) were taken to mirror; sharp,
-    blurred: roughness up to which it counts in full, and from which on not at all. gloss (n, 13): see `kernels_split.gloss`.
-    """
-    for i in range(U(at.shape[0])):
-        p = U(at[i])
-        share = min(max((blurred - gloss[i, U(6)]) / (blurred - sharp), f4(0)), f4(1))
-        for c in range(U(3)):
-            change = gloss[i, c] * shown[i, c] - gloss[i, U(3) + c]
-            radiance[p, c] = max(radiance[p, c] + share * change, f4(0))

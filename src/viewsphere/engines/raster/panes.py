@@ -58,7 +58,9 @@ def mirror_in_panes(
         places, ways = gloss[:, 7:10].copy(), gloss[:, 10:13].copy()
         width = (view.pixel * view.scale / depth[at]).astype(np.float32)
         shown, is_known = _seen(baked, baked.hall, baked.tree, (places, ways, width), float(view.pixel))
-        kernels_mirror.glaze(at[is_known], gloss[is_known], shown[is_known], np.float32(SHARP), np.float32(BLURRED), radiance)
+        at, gloss, shown = at[is_known].astype(np.intp), gloss[is_known], shown[is_known]
+        borders, nearness = (np.float32(SHARP), np.float32(BLURRED)), np.zeros(len(at), np.float32)
+        kernels_mirror.polish(at, gloss, shown, shown, nearness, depth, *borders, radiance)
 
 
 def _panes(baked: Baked, hall: Hall, visibility: Visibility, left_out: NDArray[np.intp]) -> Int32:

@@ -34,6 +34,7 @@ SPREAD = 0.6
 
 
 NOWHERE = np.empty(0, np.intp)
+"""No pixels."""
 
 
 def mirror_in_polish(baked: Baked, camera: Camera, visibility: Visibility, radiance: Float32) -> NDArray[np.intp]:
