@@ -83,10 +83,21 @@ def ggx(n_l, n_v, n_h, v_h, alpha, f0):
 
 def test_matt_surface_follows_lambert():
     cosines = np.linspace(-1, 1, N)
-    b = block(light=tilted(cosines), F0R=0, F0G=0, F0B=0, ROUGH=1, RED=0.5)
+    b = block(light=tilted(cosines), view=tilted(0.05), F0R=0, F0G=0, F0B=0, RED=0.5)
     lit(b)
-    # With no reflectance at normal incidence a little Fresnel is left at grazing angles: at normal view almost none.
-    assert np.allclose(out(b, "DR"), 0.5 * np.maximum(cosines, 0) / math.pi, atol=2e-4)
+    # What mirrors nothing straight on has no bright rim, either.
+    assert np.allclose(out(b, "DR"), 0.5 * np.maximum(cosines, 0) / math.pi, atol=1e-6)
+    assert (out(b, "SR") == 0).all()
+
+
+def test_the_rim_of_little_reflectance_has_its_share():
+    shares = np.repeat([0.0, 0.005, 0.01, 0.02, 0.04], 2)
+    b = block(view=tilted(0.1), F0R=shares, F0G=shares, F0B=shares)
+    stages.weigh(N, lobe_albedo(), b)
+    edge, face = out(b, "EDGE_R"), out(b, "FACE_R")
+    assert np.allclose(
+        edge + face, np.resize(np.minimum(50 * shares, 1), N) * (1 + np.resize(shares, N) * (1 / out(b, "LOBE") - 1))
+    )
 
 
 @pytest.mark.parametrize("rough", [0.1, 0.3, 0.6, 1.0])

@@ -34,6 +34,7 @@ i4 = nb.int32
 U = nb.uintp
 
 COAT_F0 = np.float32(0.04)
+FULL_RIM = np.float32(50)  # one over the share mirrored straight on from which on a surface mirrors all light at its rim
 SMOOTHEST = np.float32(0.03)  # perceptual roughness, at least: in a perfect mirror a lamp would be a single point
 VIEWED = np.float32(0.25)  # squared roughness, as blurred as what probes see
 BRIGHTEST = np.float32(60000.0)
@@ -100,10 +101,12 @@ def _share_out(b):
     shares = []
     for k in range(0, 3 * BLOCK, BLOCK):
         base, f0 = b[RED + k], b[F0R + k]
+        # What mirrors nothing straight on mirrors nothing at its rim either (Lagarde and de Rousiers 2014).
+        edge = least(f0 * FULL_RIM, 1) - f0
         more, more_metal = body * (1 + f0 * lost), metal * (1 + base * lost)
         b[FACE_R + k] = left * (more * f0 + more_metal * base)
-        b[EDGE_R + k] = left * (more * (1 - f0) + more_metal * most(1 - base, 0))
-        share = body * left * most(1 - (1 + f0 * lost) * (f0 * lobe + (1 - f0) * rim), 0)
+        b[EDGE_R + k] = left * (more * edge + more_metal * most(1 - base, 0))
+        share = body * left * most(1 - (1 + f0 * lost) * (f0 * lobe + edge * rim), 0)
         b[BASE_R + k] = base * share * (1 - through)
         shares.append(share)
         b[DR + k], b[SR + k] = 0, 0
