@@ -12,10 +12,12 @@ from shots import painted
 from viewsphere.engines.raster import bounces as baking
 from viewsphere.engines.raster import vertex_light
 from viewsphere.engines.raster.kernels_block import BARY1, BARY2, BLOCK, GLOW_R, GX, MAPPED, NX, ROWS
+from viewsphere.engines.raster.kernels_lightmap import WEIGHT
 from viewsphere.engines.raster.kernels_probes import look_up
-from viewsphere.engines.raster.kernels_vertex_light import read_vertices
+from viewsphere.engines.raster.kernels_vertex_light import NONE, read_vertices
 from viewsphere.engines.raster.lightmaps import charts_of
 from viewsphere.engines.raster.records import NO_LIGHTMAP
+from viewsphere.engines.raster.tracing import tree_of
 from viewsphere.engines.raster.vertex_light import vertex_light_of
 from viewsphere.kernels.jit import njit
 from viewsphere.model.scene import Scene
@@ -107,6 +109,31 @@ def test_a_ball_in_the_furnace_is_as_even_as_the_walls_in_a_picture():
     assert abs(np.median(on_ball) - np.median(picture)) <= 6
 
 
+def test_what_is_within_a_thing_takes_no_site_from_what_is_seen():
+    walls, within = inside_out(box((-1.0, -0.8, -0.6), (1.0, 0.8, 0.6))), corners_of(ball(0.2, (0.0, 0.0, 0.0)))
+    deeper = corners_of(ball(0.195, (0.0, 0.0, 0.0)))
+    lightmap = stage_of(mesh_of(np.concatenate([walls, deeper, within])), UNLIT).baked(0).bounces.lightmap
+    seen = lightmap.chart[-len(within) :]
+    points = lightmap.knots[np.concatenate([lightmap.facets[NONE - 1 - at, 4] + np.arange(3) for at in seen]).astype(int)]
+    assert lightmap.points[points, WEIGHT].min() > 0.9
+
+
+@pytest.mark.parametrize("width", [0.03, 0.1])
+def test_a_groove_is_as_dark_as_it_is_narrow(width):
+    """At the middle of its bottom the open share is the sine of half the angle that it opens with."""
+    depth, half = 0.05, width / 2
+    left = np.array([(-half, -2, 0), (-half, 2, 0), (-half, 2, depth), (-half, -2, depth)])
+    sides = [own[[0, i, i + 1]] for own in (left, left * (-1, 1, 1)) for i in (1, 2)]
+    places = np.stack([np.zeros(64), np.linspace(-1, 1, 64), np.zeros(64)], axis=1).astype(np.float32)
+    up = np.tile(np.float32([0, 0, 1]), (64, 1))
+    _, met, far = vertex_light.look_near(tree_of(np.array(sides, np.float32)), places, up, 1.0, 1.0)
+    share = float(np.sin(np.arctan(half / depth)))
+    assert (met < 0).mean() == pytest.approx(share, abs=0.02)
+    kept = vertex_light.THROWN_BACK
+    assert vertex_light.openness(far, 1.0).mean() == pytest.approx(kept + (1 - kept) * share, abs=0.02)
+    assert (vertex_light.openness(far, 0.25 * half) == 1).all()
+
+
 def test_sites_are_no_more_than_allowed_and_the_smaller_the_fewer(monkeypatch):
     mesh = ball(1.0, (0, 0, 0), 64)
     rows = np.zeros((len(mesh.vertices), 16), np.float32)
@@ -117,7 +144,8 @@ def test_sites_are_no_more_than_allowed_and_the_smaller_the_fewer(monkeypatch):
     sizes = []
     for most in (16_000, 2_000):
         monkeypatch.setattr(vertex_light, "MOST", most)
-        found = vertex_light_of(rows, mesh.triangles.astype(np.uint32), np.arange(len(a)), normals, 1.0, 16)
+        tree, triangles = tree_of(corners_of(mesh).astype(np.float32)), mesh.triangles.astype(np.uint32)
+        found = vertex_light_of(tree, rows, triangles, np.arange(len(a)), normals, 1.0, 16)
         assert found is not None
         sites, facets = found
         assert most / 4 < len(sites.origins) <= most
@@ -138,7 +166,8 @@ def test_triangles_without_area_or_numbers_have_no_points():
     rows = np.zeros((9, 16), np.float32)
     rows[:, 11:14] = corners.reshape(-1, 3)
     triangles, normals = np.arange(9, dtype=np.uint32).reshape(3, 3), np.tile(np.float32([0, 0, 1]), (3, 1))
-    found = vertex_light_of(rows, triangles, np.arange(3), normals, 1.0, 16)
+    tree = tree_of(corners)
+    found = vertex_light_of(tree, rows, triangles, np.arange(3), normals, 1.0, 16)
     assert found is not None
     sites, facets = found
     np.testing.assert_array_equal(facets.which, [1])
@@ -146,7 +175,7 @@ def test_triangles_without_area_or_numbers_have_no_points():
     assert len(facets.knots) == (parts + 1) * (parts + 2) // 2
     assert parts > 1
     np.testing.assert_allclose(facets.normals, np.tile([0, 0, 1], (len(facets.normals), 1)))
-    assert vertex_light_of(rows, triangles, np.array([0, 2]), normals, 1.0, 16) is None
+    assert vertex_light_of(tree, rows, triangles, np.array([0, 2]), normals, 1.0, 16) is None
 
 
 @njit

@@ -18,7 +18,7 @@ from viewsphere.engines.raster.patch_rays import PatchRays
 from viewsphere.engines.raster.patches import Patches, Rays
 from viewsphere.engines.raster.records import NO_LIGHTMAP, Float32, Int32, Lightmap
 from viewsphere.engines.raster.tracing import Tree, cast
-from viewsphere.engines.raster.vertex_light import Facets, Sites, numbered, vertex_light_of
+from viewsphere.engines.raster.vertex_light import NEAR, Facets, Sites, numbered, openness, vertex_light_of
 
 NODE_RAYS, SITE_RAYS = 256, 128
 """Of a node of the lightmap, and of a site."""
@@ -119,7 +119,9 @@ def look(
     ways, frame = (charts.directions, charts.turn), (charts.local, charts.axes)
     nodes = Spots.of(tree, charts.origins, ways, frame, normals, charts.cell, is_inside_out)
     nodes.counted[~charts.reached] = 0
-    found = vertex_light_of(vertices, triangles, np.flatnonzero(charts.chart < 0), normals, unit, SITE_RAYS)
+    found = vertex_light_of(
+        tree, vertices, triangles, np.flatnonzero(charts.chart < 0), normals, unit, SITE_RAYS, is_inside_out
+    )
     if found is None:
         return Look(charts, nodes, None)
     sites, facets = found
@@ -181,4 +183,4 @@ class Gathering(NamedTuple):
             sites, facets, spots = self.look.round
             nodes = np.empty_like(self.afar[1])
             spots.receive(self.ids[1], sent, self.afar[1], nodes)
-            self.lightmap.points[:] = sites.light_at(facets.places, facets.normals, nodes)
+            self.lightmap.points[:] = sites.light_at(facets, nodes, openness(spots.rays.far, NEAR * sites.cell))

@@ -16,6 +16,7 @@ LIKE = 0.3  # cosine between the normals of a point and of a site from which on 
 ASIDE = 0.15  # part of a normal along an axis from which on sites that face along this axis are asked
 THICK = 0.5  # cells between the planes of a point and a site from which on the site hardly counts
 HARDLY = 1e-3
+SHUT = 0.5  # how many squared cells aside a part may be that is all open, instead of one that is all shut in
 STRAIGHT = 0.5  # cosine between a vertex' normal and that of its triangle from which on the triangle is round there
 
 
@@ -54,18 +55,18 @@ def _cell_key(x, y, z, normal, low, cells):
 
 
 @njit
-def group(corners, normals, parts, low, cells, keys, sites, sums):
+def group(corners, normals, parts, shares, low, cells, keys, sites, sums):
     """Gather parts of triangles in sites: those in one cell that face along one axis. Returns how many sites there are, -1 if
     there are more than sums has room for.
 
-    corners (T, 3, 3), normals (T, 3); parts (T,): in the square of how many each is cut, 0 for left out; low (3,): where the
-    first of the cells is, of which there are `cells` in a length; keys (S,), sites (S,): an open table, empty; sums (N, 7),
-    zeros: the parts' number, times their mean place, and their mean normal.
+    corners (T, 3, 3), normals (T, 3); parts (T,): in the square of how many each is cut; shares (T,): how open each is, 0 for
+    left out; low (3,): where the first of the cells is, of which there are `cells` in a length; keys (S,), sites (S,): an open
+    table, empty; sums (N, 7), zeros: how open the parts are, all in all, times their mean place, and their mean normal.
     """
     count = 0
     for t in range(parts.shape[0]):
         n = normals[t]
-        for row in range(parts[t]):
+        for row in range(parts[t] if shares[t] > 0.0 else 0):
             for k in range(2 * (parts[t] - row) - 1):
                 x, y, z = _middle(corners[t], parts[t], row, k)
                 key = _cell_key(x, y, z, n, low, cells)
@@ -76,23 +77,23 @@ def group(corners, normals, parts, low, cells, keys, sites, sums):
                     keys[at], sites[at] = key, count
                     count += 1
                 total = sums[sites[at]]
-                total[0] += 1.0
-                total[1] += x
-                total[2] += y
-                total[3] += z
+                total[0] += shares[t]
+                total[1] += shares[t] * x
+                total[2] += shares[t] * y
+                total[3] += shares[t] * z
                 for c in range(3):
-                    total[4 + c] += n[c]
+                    total[4 + c] += shares[t] * n[c]
     return count
 
 
 @njit
-def settle(corners, normals, parts, low, cells, keys, sites, sums, best, places, facing):
+def settle(corners, normals, parts, shares, low, cells, keys, sites, sums, best, places, facing):
     """Where each site is and which way it faces, into places, facing (N, 3): as the part of a triangle that is the most like
     all its parts. best (N,): infinite; the others as `group` left them.
     """
     for t in range(parts.shape[0]):
         n = normals[t]
-        for row in range(parts[t]):
+        for row in range(parts[t] if shares[t] > 0.0 else 0):
             for k in range(2 * (parts[t] - row) - 1):
                 x, y, z = _middle(corners[t], parts[t], row, k)
                 own = sites[found(_cell_key(x, y, z, n, low, cells), keys, sites)]
@@ -100,7 +101,7 @@ def settle(corners, normals, parts, low, cells, keys, sites, sums, best, places,
                 per = 1.0 / total[0]
                 dx, dy, dz = x - total[1] * per, y - total[2] * per, z - total[3] * per
                 turn = 1.0 - (n[0] * total[4] + n[1] * total[5] + n[2] * total[6]) * per
-                apart = (dx * dx + dy * dy + dz * dz) * cells * cells + turn
+                apart = (dx * dx + dy * dy + dz * dz) * cells * cells + turn + SHUT * (1.0 - shares[t])
                 if apart < best[own]:
                     best[own] = apart
                     places[own, 0], places[own, 1], places[own, 2] = x, y, z
