@@ -680,11 +680,11 @@ def test_a_street_is_told_of(folder, tmp_path):
             tmp_path / labels,
             entries(folder),
             {"count": 20},
-            scenes={"count": 2, "objects": 4},
+            scenes={"count": 1, "objects": 4},
             scene={"place": {"source": "zoo:neighbourhood", "labels": labels}, "sky": {"daylight": {}}},
         )
         forms += read(dataset, 20)[1]
-    assert forms["surroundings"] and forms["hidden"] and forms["count"] == 8
+    assert forms["surroundings"] and forms["hidden"] and forms["count"] == 4
 
 
 def test_many_few_and_none(folder, tmp_path):
