@@ -22,14 +22,14 @@ MODELS = [
 
 
 def stills(**changes):
-    """Twelve pictures of six scenes of two to four objects that hide one another, in three splits."""
+    """Eight pictures of four scenes of two to four objects that hide one another, in three splits."""
     from viewsphere import Recipe
 
     said = {
         "name": "stills",
         "seed": 3,
         "models": MODELS,
-        "scenes": {"count": 6, "objects": [2, 4], "layout": "scatter"},
+        "scenes": {"count": 4, "objects": [2, 4], "layout": "scatter"},
         "viewpoints": {"azimuth": [30, 200], "elevation": [15], "distance": 3.5},
         "camera": {"size": [160, 120], "fov_deg": 50},
         "scene": {"ground": True},
@@ -43,8 +43,8 @@ def stills(**changes):
 
 
 def poses(**changes):
-    """Twelve pictures, four sides of three models one at a time: the paper's grid."""
-    said = {"name": "poses", "viewpoints": {"azimuth": [0, 100, 200, 300], "elevation": [20], "distance": 2.5},
+    """Nine pictures, three sides of three models one at a time: the paper's grid."""
+    said = {"name": "poses", "viewpoints": {"azimuth": [0, 100, 200], "elevation": [20], "distance": 2.5},
             "splits": {"by": "model", "train": 0.7, "val": 0.3}}  # fmt: skip
     return stills(**{**said, "scenes": None, "models": [{**model, "count": 1} for model in MODELS], **changes})
 

@@ -175,7 +175,8 @@ def test_pycocotools_finds_moved_points(stills, rle, tmp_path):
     for annotation in value["annotations"]:
         annotation["keypoints"] = [c + 50 * (i % 3 == 0) for i, c in enumerate(annotation["keypoints"])]
     file.write_text(json.dumps(value))
-    assert any("keypoints: expected AP 1.0" in message for _, message in testify(stills, file, "train", range(12), options))
+    remarks = testify(stills, file, "train", range(len(stills)), options)
+    assert any("keypoints: expected AP 1.0" in message for _, message in remarks)
 
 
 def test_without_the_annotation_there_are_no_points(small_dataset):

@@ -249,13 +249,13 @@ def test_it_is_proved_and_the_same_by_several_processes(people, written, tmp_pat
     assert list(surreal.verify(people, written, ())) == []
     export(people.root, ["surreal"], output=tmp_path)
     assert tree_hash(tmp_path / "surreal") == tree_hash(written)
-    for file in {path.name[-8:]: path for path in sorted(written.rglob("*_c0*"))}.values():
-        copy = tmp_path / "surreal" / file.relative_to(written)
+    names = [file.relative_to(written) for file in {path.name[-8:]: path for path in sorted(written.rglob("*_c0*"))}.values()]
+    for name in names:
+        copy = tmp_path / "surreal" / name
         data = copy.read_bytes()
         copy.write_bytes(data[:-9] + bytes([data[-9] ^ 1]) + data[-8:])
-        assert any("export again" in told for _, told in surreal.verify(people, tmp_path / "surreal", ())), file
-        copy.write_bytes(data)
-    assert list(surreal.verify(people, tmp_path / "surreal", ())) == []
+    told = [message for _, message in surreal.verify(people, tmp_path / "surreal", ()) if message.endswith("export again")]
+    assert sorted(message.split(":")[0].split("/")[-1] for message in told) == sorted(name.name for name in names)
 
 
 @pytest.fixture(scope="module")

@@ -78,7 +78,9 @@ def test_an_export_is_proved(exported, name, world, request):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_what_is_changed_is_found(exported, name, request, tmp_path):
-    """A file of each kind, which is cut, changed in one byte, missing, or too many."""
+    """A file of each kind, which is cut, changed in one byte, missing, or too many: all at once, as each proof reads the whole
+    export, and those alone that it does not name then.
+    """
     world = next(world for world in WORLDS if exported(name, world))
     dataset, folder = request.getfixturevalue(world), tmp_path / name
     shutil.copytree(exported(name, world), folder)
@@ -86,21 +88,45 @@ def test_what_is_changed_is_found(exported, name, request, tmp_path):
     kinds = {}
     for file in sorted(path for path in folder.rglob("*") if path.is_file() and path.stat().st_size):
         kinds.setdefault((file.suffix, file.parent.name), file)
-    for number, file in enumerate(kinds.values()):
-        data = file.read_bytes()
-        half = len(data) // 2
-        ways = (data[:-1], bytes([*data[:-1], data[-1] ^ 1]), data[:half] + b"x" + data[half:], None)
-        other = ways[number % len(ways)]  # in turn: each proof reads the whole export
-        file.unlink()
-        if other is not None:
-            file.write_bytes(other)
-        found = remarks(dataset, name, folder)
-        assert found, (file, other is None)
-        assert all("\n" not in message for _, message in found)
-        file.unlink(missing_ok=True)
-        file.write_bytes(data)
+    whole = {file: file.read_bytes() for file in kinds.values()}
+    for number, file in enumerate(whole):
+        spoil(file, number)
     (folder / "strange").write_text("")
-    assert any("strange" in message for _, message in remarks(dataset, name, folder))
+    messages = told(dataset, name, folder)
+    assert any("strange" in message for message in messages)
+    (folder / "strange").unlink()
+    for file, data in whole.items():
+        restore(file, data)
+    for number, file in enumerate(whole):
+        if not is_named(file.relative_to(folder), messages):
+            spoil(file, number)
+            assert told(dataset, name, folder), (file, number)
+            restore(file, whole[file])
+
+
+def spoil(file, number):
+    data = file.read_bytes()
+    half = len(data) // 2
+    ways = (data[:-1], bytes([*data[:-1], data[-1] ^ 1]), data[:half] + b"x" + data[half:], None)
+    file.unlink()
+    if (other := ways[number % len(ways)]) is not None:
+        file.write_bytes(other)
+
+
+def restore(file, data):
+    file.unlink(missing_ok=True)
+    file.write_bytes(data)
+
+
+def told(dataset, name, folder):
+    messages = [message for _, message in remarks(dataset, name, folder)]
+    assert all("\n" not in message for message in messages)
+    return messages
+
+
+def is_named(path, messages):
+    """Whether a message begins with a file's whole path, which names no other."""
+    return any(message.startswith(f"{path.as_posix()}: ") for message in messages)
 
 
 @pytest.mark.slow

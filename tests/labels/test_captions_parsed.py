@@ -634,14 +634,14 @@ def test_the_reader_notices_what_does_not_hold(few):
 
 
 @pytest.mark.slow
-def test_two_thousand_sentences_hold_of_their_pictures(folder, tmp_path):
+def test_a_thousand_sentences_hold_of_their_pictures(folder, tmp_path):
     """Of random scenes of all models, and of scenes of few models, in which looks alone single out nothing."""
-    dataset = made(tmp_path / "all", entries(folder), {"count": 12}, scenes={"count": 80, **SCENES}, seed=5)
+    dataset = made(tmp_path / "all", entries(folder), {"count": 12}, scenes={"count": 40, **SCENES}, seed=5)
     sentences, forms = read(dataset, 12)
     alike = [one for one in entries(folder) if one["category"] in {"bus", "umbrella"}][:2]
     crowds = made(tmp_path / "alike", alike, {"count": 12}, scenes={"count": 40, **SCENES, "objects": [4, 8]}, seed=6)
     more, _ = read(crowds, 12)
-    assert sentences > 2000 and more > 1000
+    assert sentences > 1000 and more > 1000
     assert {"hidden", "material"} <= set(forms)
     wanted = {one.relation or one.extreme or one.place for sample in crowds for one in sample.referring}
     assert {"in front of", "behind", "next to", *EXTREMES} <= wanted
@@ -680,11 +680,11 @@ def test_a_street_is_told_of(folder, tmp_path):
             tmp_path / labels,
             entries(folder),
             {"count": 20},
-            scenes={"count": 2, "objects": 4},
+            scenes={"count": 1, "objects": 4},
             scene={"place": {"source": "zoo:neighbourhood", "labels": labels}, "sky": {"daylight": {}}},
         )
         forms += read(dataset, 20)[1]
-    assert forms["surroundings"] and forms["hidden"] and forms["count"] == 8
+    assert forms["surroundings"] and forms["hidden"] and forms["count"] == 4
 
 
 def test_many_few_and_none(folder, tmp_path):
