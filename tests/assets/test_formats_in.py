@@ -160,7 +160,7 @@ class Forks:
     """Readers that are forked from a process in which everything is imported: to import takes longer than to read a file."""
 
     def __init__(self):
-        environment = os.environ | isolated.SINGLE_THREADED
+        environment = os.environ | isolated.SINGLE_THREADED | {"PYTHONPATH": os.pathsep.join(sys.path)}
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
         self._process = subprocess.Popen([sys.executable, "-P", "-c", FORKS], env=environment, **pipes)
         self.is_reading = False
