@@ -167,11 +167,11 @@ def test_a_name_that_looks_numbered_stays_unique(gltf, cube):
 
 @pytest.mark.slow
 def test_a_polygon_of_very_many_corners(write):
-    angle = np.linspace(0, 2 * np.pi, 100_000, endpoint=False)
+    angle = np.linspace(0, 2 * np.pi, 40_000, endpoint=False)
     radius = np.where(np.arange(len(angle)) % 2, 1.0, 0.5)
     points = "".join(f"v {x:.6f} {y:.6f} 0\n" for x, y in zip(np.cos(angle) * radius, np.sin(angle) * radius, strict=True))
-    mesh = outcome(write("a.obj", points + "f " + " ".join(map(str, range(1, len(angle) + 1)))), 200)
-    assert len(mesh.triangles) > 90_000
+    mesh = outcome(write("a.obj", points + "f " + " ".join(map(str, range(1, len(angle) + 1)))), 40)
+    assert len(mesh.triangles) > 36_000
     a, b, c = (mesh.vertices[mesh.triangles[:, i]].astype(float) for i in range(3))
     filled = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
     assert filled == pytest.approx(len(angle) / 4 * np.sin(2 * np.pi / len(angle)), rel=1e-4)  # a fan would fill more

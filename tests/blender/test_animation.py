@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ import pytest
 from animated import leaf
 from shots import camera_of
 from viewsphere import Dataset, Recipe, generate, plan
-from viewsphere.assets import cache
+from viewsphere.assets import cache as model_cache
 from viewsphere.assets.cache import load, load_normalised, read_ahead
 from viewsphere.assets.inspect import describe
 from viewsphere.assets.timeline import Blenders, Clip
@@ -70,6 +72,9 @@ def assert_holds(folder):
     assert report.ok, report
 
 
+pytestmark = [pytest.mark.usefixtures("blenders")]
+
+
 # Reading.
 
 
@@ -95,11 +100,12 @@ def test_bones_are_named_points_at_each_frame(files):
     assert [one["bone"][:2] for one in points] == [points[0]["bone"][:2]] * 3
 
 
-def test_frames_are_read_at_once_and_each_is_the_same_alone(files, tmp_path, monkeypatch):
+def test_frames_are_read_at_once_and_each_is_the_same_alone(files, tmp_path, monkeypatch, blenders):
     spec = spec_of(files / "bend.blend")
     alone = load_normalised(spec, folder=tmp_path / "other", step=at(13))
+    blenders.end()
     read_ahead(spec, FRAMES, tmp_path / "own")
-    monkeypatch.setattr(cache, "read_apart", None)
+    monkeypatch.setattr(model_cache, "read_apart", None)
     read_ahead(spec, FRAMES, tmp_path / "own")
     together = [load_normalised(spec, folder=tmp_path / "own", step=at(frame)) for frame in FRAMES]
     np.testing.assert_array_equal(together[1].vertices, alone.vertices)
@@ -232,6 +238,7 @@ for name, fps, base in (("fast", 60, 1.0), ("ntsc", 30, 1.001)):
 """
 
 
+@cache
 def steps_of(path, **fields):
     """Frame, seconds and middle in x of all time steps of a file."""
     recipe = Recipe(
@@ -277,15 +284,16 @@ def test_frames_are_as_many_a_second_as_the_recipe_says(rates):
 LINK = """
 import os, sys
 import bpy
-bpy.ops.wm.read_factory_settings(use_empty=True)
-kind, folder = sys.argv[1:]
-if kind in ("moving", "still"):
+folder = sys.argv[1]
+for name in ("library", "still"):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
     item = bpy.data.objects.new("cube", bpy.data.meshes.new("cube"))
     bpy.context.scene.collection.objects.link(item)
-    if kind == "moving":
+    if name == "library":
         item.keyframe_insert("location", frame=1)
-    bpy.ops.wm.save_as_mainfile(filepath=f"{folder}/deep/library.blend", check_existing=False)
-else:
+    bpy.ops.wm.save_as_mainfile(filepath=f"{folder}/deep/{name}.blend", check_existing=False)
+for kind in ("middle", "top"):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
     place, source = ("deep/middle", "deep/library") if kind == "middle" else ("top", "deep/middle")
     with bpy.data.libraries.load(f"{folder}/{source}.blend", link=True) as (_, wanted):
         wanted.objects = ["cube"] if kind == "middle" else ["holder"]
@@ -302,15 +310,10 @@ os._exit(0)
 @pytest.mark.usefixtures("own_cache")
 def test_a_changed_library_is_asked_about_anew(blender, tmp_path):
     """Of a library, too."""
-
-    def make(kind):
-        subprocess.run([blender, "-c", LINK, kind, tmp_path], check=True, capture_output=True)
-
     (tmp_path / "deep").mkdir()
-    for kind in ("moving", "middle", "top"):
-        make(kind)
+    subprocess.run([blender, "-c", LINK, tmp_path], check=True, capture_output=True)
     assert timeline(tmp_path / "top.blend").moves
-    make("still")
+    shutil.move(tmp_path / "deep" / "still.blend", tmp_path / "deep" / "library.blend")
     assert not timeline(tmp_path / "top.blend").moves
 
 

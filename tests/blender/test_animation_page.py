@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
+from command_line import viewsphere
 from small import ROOT
 from viewsphere import Dataset, Recipe, plan
 from viewsphere.assets.timeline import Blenders, Timeline
@@ -50,6 +50,6 @@ def test_commands_run(blender, tmp_path):
     commands = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL) for line in block.splitlines()]
     assert [line.split()[1] for line in commands] == ["plan", "render", "check"]
     for line in commands:
-        run = subprocess.run([sys.executable, "-m", *line.split()], cwd=tmp_path, capture_output=True, text=True)
+        run = viewsphere(*line.split()[1:], cwd=tmp_path)
         assert run.returncode == 0, f"{line}\n{run.stdout}{run.stderr}"
     assert len(Dataset(tmp_path / "walk")) == 6

@@ -25,7 +25,7 @@ from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.sampling.models import model_specs
 
-pytestmark = [pytest.mark.slow]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("blenders")]
 
 EXCHANGE = "corner.fbx", "corner.usda", "corner.usdc", "corner.usdz", "corner.abc", "corner.blend", "draco.glb"
 MODELS = Path(__file__).parents[3] / "shared" / "models"
@@ -174,9 +174,11 @@ def test_empties_are_named_points(made, name):
     assert {*found.skeleton} == {("nose", "eye.L"), ("nose", "eye.R")} and found.flips == (("eye.L", "eye.R"),)
 
 
-def test_the_same_file_gives_the_same_bytes(made, tmp_path):
+def test_the_same_file_gives_the_same_bytes(made, tmp_path, blenders):
+    """From one Blender to another."""
     specs = [spec_of(made / name) for name in ("evaluated.blend", "painted.blend")]
     for folder in ("one", "two"):
+        blenders.end()
         for spec in specs:
             load(spec, folder=tmp_path / folder)
     one, two = (sorted((tmp_path / folder).glob("*.npz")) for folder in ("one", "two"))

@@ -9,6 +9,7 @@ from viewsphere.check import check
 from viewsphere.labels import Label, channel_labels, labels, on_request
 
 CYCLES = {"name": "cycles", "samples": 1, "bounces": 1, "denoise": "off"}
+RASTER = {"name": "raster", "ambient_occlusion": "off", "bounces": "off"}
 TOLD = {"plan.json", "shot.json", "manifest.json", "scenery.json"}
 """Files that say which engine painted, from which files, and what pictures' digests are."""
 
@@ -81,7 +82,7 @@ def assert_same_labels(recipes, folder):
 
 @pytest.mark.parametrize("recipe", [still_recipe, moving_recipe])
 def test_all_labels_are_the_same_on_raster_and_in_cycles(blender, tmp_path, recipe):
-    assert_same_labels((recipe("raster"), recipe(CYCLES)), tmp_path)
+    assert_same_labels((recipe(RASTER), recipe(CYCLES)), tmp_path)
 
 
 def heap_recipe(engine):
@@ -99,14 +100,14 @@ def heap_recipe(engine):
 @pytest.mark.slow
 def test_all_labels_of_things_that_fell_in_a_room_are_the_same_on_raster_and_in_cycles(blender, tmp_path):
     pytest.importorskip("mujoco")
-    assert_same_labels((heap_recipe("raster"), heap_recipe(CYCLES)), tmp_path)
+    assert_same_labels((heap_recipe(RASTER), heap_recipe(CYCLES)), tmp_path)
 
 
 @pytest.mark.parametrize("recipe", [still_recipe, moving_recipe])
 def test_labels_in_a_blend_file_are_those_of_its_meshes_on_raster(made, tmp_path, recipe):
     """The file as Cycles opens it, and its meshes alone as a place on raster."""
     file = str(made / "street.blend")
-    ours = recipe("raster", scene={"place": file, "ground": "off"})
+    ours = recipe(RASTER, scene={"place": file, "ground": "off"})
     assert_same_labels((ours, recipe(CYCLES, scene={"blend": file})), tmp_path)
 
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from dataclasses import fields
 
 import pytest
 import yaml
 
+from command_line import viewsphere
 from small import ROOT
 from viewsphere import Dataset, Recipe, plan
+from viewsphere.blender.interpreter import SCRIPTS
 from viewsphere.engines._blender.options import PRESETS, Options, parse_options
 
 PAGE = (ROOT / "docs" / "blender.md").read_text("utf-8")
@@ -42,14 +42,15 @@ def test_the_table_has_every_option_and_preset():
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("blender")
-def test_commands_run(tmp_path):
+def test_commands_run(tmp_path, monkeypatch):
+    monkeypatch.setenv(SCRIPTS, "0")  # which --allow-scripts sets in this process
     (tmp_path / "drier.yaml").write_text(RECIPE, "utf-8")
     (tmp_path / "rust.py").write_text(re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[0], "utf-8")
     commands = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL) for line in block.splitlines()]
     assert [line.split()[1] for line in commands] == ["doctor", "doctor", "render", "check", "render"]
     for line in commands:
         if "--setup-blender" not in line:  # downloads a gigabyte
-            run = subprocess.run([sys.executable, "-m", *line.split()], cwd=tmp_path, capture_output=True, text=True)
+            run = viewsphere(*line.split()[1:], cwd=tmp_path)
             assert run.returncode == 0, f"{line}\n{run.stdout}{run.stderr}"
     plain, rusty = (next(iter(Dataset(tmp_path / name))).channels for name in ("drier", "rusty"))
     assert (plain["instances"] == rusty["instances"]).all()

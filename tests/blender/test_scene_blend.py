@@ -18,7 +18,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.stages import Stages
 from viewsphere.truth.visibility import rasterize
 
-pytestmark = [pytest.mark.usefixtures("blender")]
+pytestmark = [pytest.mark.usefixtures("blender", "blenders")]
 
 LABELS = [
     {"name": "Car*", "category": "car"},
@@ -373,9 +373,9 @@ def test_files_that_are_none_are_one_line(made, tmp_path):
 @pytest.mark.slow
 def test_data_sets_are_made_resumed_checked_and_the_same_whatever_the_workers(made, tmp_path):
     recipe = street(made, formats=["coco", "native"], camera={"size": [48, 36], "fov_deg": 45})
-    generate(recipe, tmp_path / "one")
+    generate(recipe, tmp_path / "one", workers=0)
     assert check(Dataset(tmp_path / "one")).ok
-    again = generate(recipe, tmp_path / "one")
+    again = generate(recipe, tmp_path / "one", workers=0)
     assert again.rendered == 0
     generate(recipe, tmp_path / "two", workers=2)
     files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*") if p.is_file())

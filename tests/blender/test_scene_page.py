@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 import yaml
 
+from command_line import viewsphere
 from small import ROOT
 from viewsphere import Dataset, Recipe
 from viewsphere.recipe.blend import LabelRule
@@ -30,14 +28,12 @@ def test_the_table_has_every_key_of_a_rule():
 
 
 @pytest.mark.slow
-def test_commands_run(blender, tmp_path):
-    script = Path(__file__).with_name("make_scene.py")
-    subprocess.run([blender, "-P", str(script), str(tmp_path / "made")], capture_output=True, check=True)
-    shutil.copy(tmp_path / "made" / "street.blend", tmp_path)
+def test_commands_run(made, tmp_path):
+    shutil.copy(made / "street.blend", tmp_path)
     (tmp_path / "street.yaml").write_text(RECIPE, "utf-8")
     for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL):
         for line in block.splitlines():
-            run = subprocess.run([sys.executable, "-m", *line.split()], cwd=tmp_path, capture_output=True, text=True)
+            run = viewsphere(*line.split()[1:], cwd=tmp_path)
             assert run.returncode == 0, f"{line}\n{run.stdout}{run.stderr}"
     dataset = Dataset(tmp_path / "street-ds")
     assert {name for sample in dataset for name in (o.category for o in sample.objects)} == {"chair", "car", "tree", "aerial"}

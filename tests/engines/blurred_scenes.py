@@ -21,7 +21,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.visibility import rasterize
 
-LENS = Intrinsics(width=480, height=360, fx=420, fy=420, cx=240, cy=180)
+LENS = Intrinsics(width=240, height=180, fx=210, fy=210, cx=120, cy=90)
 FINISH = Finish(view=ViewTransform(exposure=-1.5))  # nothing is clipped, so that pictures can be averaged
 NODES = np.linspace(-0.5, 0.5, 9)
 SHUTTER = 0.5
@@ -63,7 +63,7 @@ def thing(number, key, poses):
 
 
 def spinning_wheel(pixels: float):
-    radius = 118.0  # px, as seen
+    radius = 59.0  # px, as seen
     spin = [thing(1, "wheel", [turned_y(pixels / radius * u, 0.0, 0.0, 1.1) for u in NODES])]
     still = [thing(2, "wall", [turned_y(0.0, 0.0, 1.6, 0.0)])]
     return shot_of([*spin, *still], Viewpoint(index=0, azimuth_deg=8, elevation_deg=8, distance=3.9), (0.0, 0.0, 1.0))
@@ -71,7 +71,7 @@ def spinning_wheel(pixels: float):
 
 def passing_car(pixels: float):
     """Along x, before a wall and behind a post, with its shadow below."""
-    per_metre = 420 / 7.2
+    per_metre = LENS.fx / 7.2
     c, s = 0.0, 1.0
     drive = [
         ((c, -s, 0.0, pixels / per_metre * u), (s, c, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for u in NODES

@@ -40,16 +40,17 @@ def compared(scene, pixels, known, count):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pixels", [30.0, 80.0, 250.0])
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    ("scene", "pixels"), [("wheel", 40.0), ("wheel", 125.0), ("car", 40.0), ("car", 250.0), ("pan", 40.0), ("pan", 250.0)]
+)
 def test_it_is_the_mean_of_many_pictures(scene, pixels, known):
-    blurred, one = compared(scene, pixels, known, 64)
+    blurred, one = compared(scene, pixels, known, 32)
     assert blurred > 40 and one < 30, (blurred, one)
 
 
 @pytest.mark.slow
 def test_a_passing_car_is_the_mean_of_some_pictures(known):
-    blurred, one = compared("car", 30.0, known, 16)
+    blurred, one = compared("car", 15.0, known, 16)
     assert blurred > 40 and one < 30, (blurred, one)
 
 
@@ -59,7 +60,7 @@ def test_more_motion_takes_more_pictures(known):
         stage = raster.stage(shot, load(known))
         return Blur(stage.arrangements, 0, 0).count(stage.at(0), rasterize(stage.at(0), shot.camera(0)))
 
-    found = [count(pixels) for pixels in (0.0, 0.5, 3.0, 12.0, 40.0, 150.0, 1000.0)]
+    found = [count(pixels) for pixels in (0.0, 0.5, 3.0, 12.0, 40.0, 150.0, 500.0)]
     assert found[:3] == [1, 1, 2] and found == sorted(found) and found[-1] == MOST
 
 

@@ -222,7 +222,7 @@ def test_materials_are_those_at_the_pixels_centres():
 @pytest.mark.slow
 def test_passes_are_those_of_the_shutter_s_centre():
     known = meshes()
-    shot = SCENES["car"](30.0)
+    shot = SCENES["car"](15.0)
     stage, still = (raster.stage(each, load(known)) for each in (shot, sharp(shot)))
     seen = rasterize(stage.at(0), shot.camera(0))
     found, expected = stage.paint(0, 0, seen, ("rgb", *ALL)), still.paint(0, 0, seen, ("rgb", *ALL))

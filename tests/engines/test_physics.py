@@ -104,7 +104,7 @@ def furnace(tmp_path, mesh: Mesh, material: Material, distance: float, **options
     """Light that a mesh all of this material sends out where light 1 comes from everywhere."""
     sky = sky_file(tmp_path / "even.hdr", np.ones((16, 32, 3)))
     white = replace(mesh, materials=(material,) * len(mesh.materials), colors=None, images=())
-    light, seen = light_of(white, Scene(sun=None, sky=sky), camera(120, 90, 100, 30, 20, distance), **options)
+    light, seen = light_of(white, Scene(sun=None, sky=sky), camera(60, 45, 50, 30, 20, distance), **options)
     assert np.allclose(light[seen < 0], 1, atol=0.005)
     return light[seen >= 0]
 

@@ -17,7 +17,7 @@ from viewsphere.model.scene import Ground, PointLight, Scene, Sun
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.visibility import rasterize
 
-COUNT = 7
+COUNT = 5
 LENS = Intrinsics(width=128, height=96, fx=120, fy=120, cx=64, cy=48)
 SUN = Sun(azimuth_deg=60, elevation_deg=40, angle_deg=1.0)
 GLASS = Material("glass", (0.2, 0.8, 0.3, 0.4), alpha_mode="BLEND")
@@ -45,7 +45,7 @@ def thing(number, key, motion, scenery=False):
 
 def sequence_of(scene, has_scenery=False, sequence="drive", moves=False):
     """A tall box that drives and turns, a pane that comes and goes, a long box that stands still; scenery that `moves`."""
-    gone = Motion(poses=tuple(pose(i, -0.25, 0.3) if i not in (2, 5) else None for i in range(COUNT)))
+    gone = Motion(poses=tuple(pose(i, -0.25, 0.3) if i not in (1, 4) else None for i in range(COUNT)))
     things = [
         thing(1, "tall", Motion(poses=tuple(pose(i, 0.2, 0.5) for i in range(COUNT)))),
         thing(2, "pane", gone),
@@ -77,26 +77,25 @@ def cut(shot, first, stop):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "has_scenery, moves", [(False, False), (True, True), pytest.param(True, False, marks=pytest.mark.slow)]
+    "scene, has_scenery, moves", [("sun", False, False), ("sun", True, True), ("lamp", True, False), ("lamp", False, True)]
 )
-@pytest.mark.parametrize("scene", ["sun", pytest.param("lamp", marks=pytest.mark.slow)])
 def test_an_instant_looks_as_if_it_were_built_alone(scene, has_scenery, moves):
     """In any order, with a neighbour's geometry asked for between, on one stage or cut into shots of any length."""
     shot = sequence_of(scene, has_scenery, moves=moves)
     alone = [picture(stage_of(shot), i) for i in range(COUNT)]
     assert len({one.tobytes() for one in alone}) == COUNT
     stage = stage_of(shot)
-    for i in (0, 1, 2, 3, 4, 5, 6, 3, 1, 6, 0):
+    for i in (0, 1, 2, 3, 4, 2, 1, 4, 0):
         visible = rasterize(stage.at(i), shot.camera(i))
         stage.at((i + 1) % COUNT)
         stage.at((i - 1) % COUNT)
         assert np.array_equal(stage.paint(i, 0, visible, ("rgb",))["rgb"], alone[i]), i
-    for first, stop in ((0, 3), (3, 4), (4, 7)):
+    for first, stop in ((0, 2), (2, 3), (3, 5)):
         part = stage_of(cut(shot, first, stop))
         for i in range(first, stop):
             assert np.array_equal(picture(part, i - first), alone[i]), i
     again = stage.of(shot)
-    assert np.array_equal(picture(again, 4), alone[4])
+    assert np.array_equal(picture(again, 3), alone[3])
 
 
 @pytest.mark.slow

@@ -471,7 +471,7 @@ def prism(sides, turn, radius=0.6, height=1.2):
 
 
 @pytest.mark.parametrize("kind", ["ball", "level area", "upright area"])
-@pytest.mark.parametrize("sides", [3, 4, 5, 6, 8, 12, 24])
+@pytest.mark.parametrize("sides", [3, 4, 6, 24])
 def test_lamps_in_closed_prisms_light_nothing_outside(kind, sides):
     """However many walls there are and however they are turned; places from half a millimetre beside the foot to 3 m away."""
     rng = np.random.default_rng(sides)
