@@ -526,13 +526,10 @@ def test_frames_without_their_shots_are_a_note(spelled):
 
 
 def leaves(value, where=()):
-    """Places of the numbers, texts and truths in a value of JSON: all, but of a list the first, one between, and the last."""
-    if isinstance(value, dict) and value:
-        for key, item in value.items():
+    """Places of all numbers, texts and truths in a value of JSON."""
+    if isinstance(value, dict | list) and value:
+        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
             yield from leaves(item, (*where, key))
-    elif isinstance(value, list) and value:
-        for key in sorted({0, len(value) // 2, len(value) - 1}):
-            yield from leaves(value[key], (*where, key))
     else:
         yield where
 
@@ -637,7 +634,10 @@ def test_every_leaf_of_every_record_is_proved(whole, merged, tmp_path, kind):
     record = record_of(dataset, 6)
     if kind == "merged":
         assert {field.name for label in labels_of(()) for field in label.fields} <= record["objects"][0].keys()
-    assert missed_leaves(dataset, leaves(record)) == []
+    places = list(leaves(record))
+    if kind == "short":
+        places = {where[:3]: where for where in places}.values()  # all of them are in the merged records
+    assert missed_leaves(dataset, places) == []
 
 
 def test_frames_of_another_split_than_the_plan_dealt(tmp_path):

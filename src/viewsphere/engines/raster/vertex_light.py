@@ -165,14 +165,14 @@ class _Grid:
 
     def sites(self, corners: Float32, normals: Float32, shares: Float, unit: float, rays: int) -> Sites:
         """The sites of triangles that are so open, (T,), with this many rays each."""
-        count, *table = self._group(corners, normals, shares)
+        count, keys, sites, sums = self._group(corners, normals, shares)
         best, places, facing = np.full(count, np.inf), np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
         cells = np.float32(1 / self.cell)
-        kernels.settle(corners, normals, self.parts, shares, self.low, cells, *table, best, places, facing)
+        kernels.settle(corners, normals, self.parts, shares, self.low, cells, keys, sites, sums, best, places, facing)
         axes, local = axes_along(facing), domes(rays, WAYS).astype(np.float32)
         directions = np.matmul(local[np.arange(count) % len(local)], axes)
         origins = (places + facing * np.float32(OFF / unit)).astype(np.float32)
-        return Sites(self.low, self.cell, table[0], table[1], places, facing, origins, directions, local, axes)
+        return Sites(self.low, self.cell, keys, sites, places, facing, origins, directions, local, axes)
 
 
 def look_near(tree: Tree, places: Float32, normals: Float32, reach: float, unit: float) -> tuple[Float32, Int32, Float32]:
@@ -181,7 +181,8 @@ def look_near(tree: Tree, places: Float32, normals: Float32, reach: float, unit:
     """
     each = np.arange(len(places), dtype=np.int32)
     ways = np.matmul(domes(NEAR_RAYS, WAYS).astype(np.float32)[each % WAYS], axes_along(normals))
-    met, far = cast(tree, places + normals * np.float32(OFF / unit), ways, each, reach)
+    origins = (places + normals * np.float32(OFF / unit)).astype(np.float32)
+    met, far = cast(tree, origins, ways, each, reach)
     far[met < 0] = np.inf
     return ways, met, far
 
