@@ -24,7 +24,8 @@ def test_every_shot_is_planned_under_every_condition():
 
 @pytest.mark.slow
 def test_conditions_look_different_and_have_the_same_labels():
-    changes = {"camera.size": [96, 64], "channels": ["rgb", "depth", "instances", "semantic"]}
+    changes = {"camera.size": [96, 64], "channels": ["rgb", "depth", "instances", "semantic"], "models[0].count": 2}
+    changes |= {"models[1].count": 1, "scenes.objects": 3, "scenes.layout": [[-1.9, 14, 0], [-0.1, 8.6, 12], [0.9, 2.8, 155]]}
     found = {sample.variation: sample for sample in vs.render(Recipe.load(RECIPE, changes))}
     assert list(found) == NAMES
     first = found["morning"]

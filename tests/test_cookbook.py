@@ -7,6 +7,7 @@ import sys
 import pytest
 from typer.main import get_command
 
+import viewsphere as vs
 from command_line import viewsphere
 from small import ROOT
 from test_tutorial import blocks, run_outside
@@ -24,8 +25,10 @@ def test_the_pages():
         assert f"cookbook/{page.name}" in (ROOT / "mkdocs.yml").read_text("utf-8")
 
 
-def follow(page, folder):
-    """Do what a page says, its complete recipes and scripts saved; returns what its blocks of Python printed."""
+def follow(page, folder, small=None):
+    """Do what a page says, its complete recipes and scripts saved, and `small` put into the recipe that it makes, for what is
+    there; returns what its Python printed.
+    """
     said = []
     for block in blocks((ROOT / "docs" / "cookbook" / f"{page}.md").read_text("utf-8")):
         if block.file:
@@ -36,22 +39,35 @@ def follow(page, folder):
             said.append(printed)
         elif block.language == "sh":
             for line in block.text.splitlines():
-                command(line)
+                printed = command(line)
+                said += [] if printed is None else [printed]
+                if small and line.startswith("viewsphere new "):
+                    shrink(folder / shlex.split(line)[2] / "recipe.yaml", small)
     return said
 
 
+def shrink(recipe, small):
+    text = recipe.read_text("utf-8")
+    for old, new in small.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    recipe.write_text(text, "utf-8")
+
+
 def command(line):
+    """Run it; returns what a script printed."""
     words = shlex.split(line)
     if line == ONCE:
-        return
+        return None
     if words[0] == "viewsphere":
         more = ["--workers", "0"] if words[1] in {"render", "check"} else []
         answer = viewsphere(*words[1:], *more)
-        assert answer.returncode == 0, f"{line}\n{answer.stderr}"
-    else:
-        assert words[0] == "python"
-        status, printed = run_outside([sys.executable, *words[1:]])
-        assert status == 0, f"{line}\n{printed}"
+        assert answer.returncode == 0, f"{line}\n{answer.stdout}{answer.stderr}"
+        return None
+    assert words[0] == "python"
+    status, printed = run_outside([sys.executable, *words[1:]])
+    assert status == 0, f"{line}\n{printed}"
+    return printed
 
 
 INLINE = [
@@ -80,17 +96,23 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_the_detector_s_categories(folder):
-    (said,) = follow("detector", folder)
+    (said,) = follow("detector", folder, {"size: [480, 360]": "size: [160, 120]", "count: 30 ": "count: 10 "})
     found = re.findall(r"^(\d+) (bench|bicycle|post box) (\d+)$", said, re.MULTILINE)  # pycocotools prints, too
     assert [(number, name) for number, name, _ in found] == [("1", "bench"), ("2", "bicycle"), ("3", "post box")]
     assert all(int(count) > 0 for *_, count in found)
+    assert {"rgb", "instances"} <= set(vs.open(folder / "things-ds")[0].channels)
 
 
 @pytest.mark.slow
 def test_poses_give_depth(folder):
-    (said,) = follow("pose6d", folder)
+    poses, said = follow("pose6d", folder)
     model, difference = said.splitlines()
     assert model.endswith((".glb", ".obj")) and float(difference) < 1e-4
+    made, lines = vs.open(folder / "part-ds"), poses.splitlines()
+    assert {"rgb", "instances"} <= set(made[0].channels)
+    assert len(lines) == 1 + len(made) and lines[0].startswith("frame,object,category,qw")
+    first = made[0].objects[0]
+    assert [float(value) for value in lines[1].split(",")[7:10]] == pytest.approx(first.camera_from_object[:3, 3], abs=1e-6)
 
 
 @pytest.mark.slow
@@ -102,9 +124,13 @@ def test_depth_gives_points(folder):
 
 @pytest.mark.slow
 def test_frames_in_memory(folder):
-    assert follow("in-memory", folder) == [""]
+    trained, looped = follow("in-memory", folder, {"count: 20 ": "count: 5 "})
+    errors = [float(line.split()[-1]) for line in trained.splitlines()]
+    assert len(errors) == 2 and errors[1] < 0.9 * errors[0]
+    assert looped == ""
 
 
 @pytest.mark.usefixtures("blender")
 def test_blender_s_first_pictures(folder):
-    follow("blender", folder)
+    assert follow("blender", folder) == []
+    assert vs.open(folder / "photos-ds")[0].rgb.std() > 10

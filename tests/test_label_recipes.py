@@ -2,6 +2,7 @@
 
 import pytest
 
+from built_once import built_once
 from small import ROOT
 from viewsphere import Recipe, generate
 from viewsphere.check import check
@@ -11,6 +12,12 @@ from viewsphere.preview.frame import draw_sample
 from viewsphere.store import Dataset
 
 RECIPES = sorted((ROOT / "recipes" / "labels").glob("*.yaml"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _built_once():
+    with built_once():
+        yield
 
 
 def cost(file):

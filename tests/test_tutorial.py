@@ -15,6 +15,7 @@ from deadline import DEADLINE
 from small import ROOT
 
 PAGE = (ROOT / "docs" / "tutorial.md").read_text("utf-8")
+IN_A_SHELL = {"python make_houses.py\n", "viewsphere render toys/recipe.yaml -o toys-ds\n", "viewsphere check toys-ds\n"}
 TORCH = """
 import pickle
 import numpy as np
@@ -91,13 +92,18 @@ def test_the_page_has_what_it_promises():
 
 @pytest.mark.slow
 def test_from_top_to_bottom(empty_folder, monkeypatch):
+    """Frames are rendered and proved by commands in a shell, by as many workers as it has cores; the rest in this process."""
     monkeypatch.setattr("viewsphere.cli.making.cores", lambda: 0)
     monkeypatch.setattr("viewsphere.cli.datasets.cores", lambda: 1)
+    monkeypatch.setenv("PATH", os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]]))  # noqa: PTH120
+    assert {block.text for block in blocks()} >= IN_A_SHELL
     for block in blocks():
         if block.file:
             (empty_folder / block.file).write_text(block.text, "utf-8")
         elif block.language == "python":
             check_output(block, *run_outside([sys.executable, "-c", block.text]))
+        elif block.text in IN_A_SHELL:
+            check_output(block, *run_outside(["bash", "-c", block.text]))
         else:
             status, said = 0, ""
             for line in block.text.splitlines():
@@ -112,18 +118,6 @@ def test_from_top_to_bottom(empty_folder, monkeypatch):
     assert (empty_folder / "toys-ds" / "report.html").stat().st_size > 100_000
     for picture in ("blue-sides", "preview", "village", "street"):
         assert (empty_folder / f"{picture}.png").stat().st_size > 10_000
-
-
-@pytest.mark.slow
-def test_from_top_to_bottom_in_a_shell(empty_folder, monkeypatch):
-    monkeypatch.setenv("PATH", os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]]))  # noqa: PTH120
-    for block in blocks():
-        if block.file:
-            (empty_folder / block.file).write_text(block.text, "utf-8")
-        elif block.language == "python":
-            check_output(block, *run_outside(["python", "-c", block.text]))
-        else:
-            check_output(block, *run_outside(["bash", "-c", block.text]))
 
 
 def test_its_pictures_are_few_and_small():

@@ -140,10 +140,9 @@ def test_sails_fill_to_leeward_and_are_closed(lee: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("count", "least"), [(8, 2), pytest.param(30, 6, marks=pytest.mark.slow)])
-def test_the_tiller_stands_on_something(count: int, least: int) -> None:
+def test_the_tiller_stands_on_something() -> None:
     tillers = 0
-    for seed in range(count):
+    for seed in range(14):
         mesh = drawn("boat", seed)
         if "rudder_stock" in mesh.parts:
             stock, *bases = (
@@ -153,7 +152,7 @@ def test_the_tiller_stands_on_something(count: int, least: int) -> None:
             aft, floor = bases[0][:, 1].max(), bases[0][:, 2].min()
             assert stock[:, 2].min() < (floor if stock[:, 1].mean() < aft else bases[1][:, 2].max())
             tillers += 1
-    assert tillers >= least
+    assert tillers >= 3
 
 
 def test_one_seed_gives_one_boat() -> None:

@@ -127,7 +127,7 @@ def test_one_seed_gives_one_mesh(family: str) -> None:
     assert a.vertices.tobytes() != other.vertices.tobytes()
 
 
-@pytest.mark.parametrize("count", [8, pytest.param(30, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [8, pytest.param(16, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("family", "ranges", "most"),
     [

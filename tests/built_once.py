@@ -1,0 +1,23 @@
+"""Models of the zoo, built once for all tests of a file: many stand on the same street, and are built again to be checked."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from unittest.mock import patch
+
+from viewsphere import zoo
+
+
+@contextmanager
+def built_once():
+    """Within it, a family's builder is called once for each state of its random numbers. Nothing changes a mesh."""
+    build, kept = zoo._built, {}
+
+    def built(family, rng):
+        key = family, str(rng.bit_generator.state)
+        if key not in kept:
+            kept[key] = build(family, rng)
+        return kept[key]
+
+    with patch.object(zoo, "_built", built):
+        yield
