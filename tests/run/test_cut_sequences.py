@@ -13,15 +13,15 @@ from contextlib import suppress
 import pytest
 
 import viewsphere as vs
-from deadline import DEADLINE
+from deadline import DEADLINE, until
 from sequence_recipe import CHANNELS, eventful_recipe
 from small import tree_hash
 from viewsphere.check import check
 
-RUNS = ((1, 4), (7, 1), (100, 2))
-"""Most instants of a shot, and numbers of workers; each run is killed `KILLS` times."""
+FRAMES = 40
 
-KILLS = 2
+RUNS = ((1, 3, 1), (7, 1, 2), (FRAMES, 2, 1))
+"""Most instants of a shot, numbers of workers, and how often the run is killed."""
 
 
 def contents(root) -> dict[tuple[str, int, str], str]:
@@ -44,9 +44,9 @@ def contents(root) -> dict[tuple[str, int, str], str]:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """Two sequences of 100 instants and two sensors, each one shot, made in this process; what happens in them does happen."""
+    """Two sequences of two sensors, each one shot, made in this process; what happens in them does happen."""
     root = tmp_path_factory.mktemp("whole") / "out"
-    vs.generate(eventful_recipe(shot_frames=100), root, workers=0)
+    vs.generate(eventful_recipe(FRAMES, shot_frames=FRAMES), root, workers=0)
     seen, counts = Counter(), Counter()
     for sample in vs.open(root):
         counts[sample.sequence, len(sample.objects)] += 1
@@ -59,21 +59,28 @@ def whole(tmp_path_factory):
     return contents(root)
 
 
+def begun(out) -> set[str]:
+    """Names of the folders that shots are written into, each of which is used once."""
+    return {path.parts[-3] for path in out.glob("store/writing/*/new/rgb")}
+
+
 def command(recipe_file, out, workers):
     return [sys.executable, "-m", "viewsphere", "render", str(recipe_file), "-o", str(out), "--workers", str(workers)]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("most", "workers"), RUNS)
-def test_any_cut_by_any_number_of_workers_killed_on_its_way(most, workers, whole, tmp_path):
+@pytest.mark.parametrize(("most", "workers", "kills"), RUNS)
+def test_any_cut_by_any_number_of_workers_killed_on_its_way(most, workers, kills, whole, tmp_path):
     file, out, rng = tmp_path / "recipe.yaml", tmp_path / "out", random.Random(100 * most + workers)
-    file.write_text(eventful_recipe(shot_frames=most).to_yaml())
+    file.write_text(eventful_recipe(FRAMES, shot_frames=most).to_yaml())
     killed = 0
-    for _ in range(KILLS):
+    for _ in range(kills):
+        before = begun(out)
         run = subprocess.Popen(
             command(file, out, workers), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
         )
-        time.sleep(rng.uniform(1, 4))
+        assert until(lambda run=run, before=before: run.poll() is not None or begun(out) - before)
+        time.sleep(rng.uniform(0, 0.5))
         killed += run.poll() is None
         with suppress(ProcessLookupError):
             os.killpg(run.pid, signal.SIGKILL)
@@ -81,7 +88,7 @@ def test_any_cut_by_any_number_of_workers_killed_on_its_way(most, workers, whole
     assert killed, "it was done before it was killed"
     subprocess.run(command(file, out, workers), check=True, timeout=DEADLINE, capture_output=True)
     shots = len(list((out / "store/shots").rglob("shot.json")))
-    assert shots == 2 * -(-100 // most)
+    assert shots == 2 * -(-FRAMES // most)
     assert contents(out) == whole
 
 

@@ -16,8 +16,9 @@ from pathlib import Path
 
 import pytest
 
+from command_line import Answer
 from deadline import DEADLINE
-from faults import SIGNALS, WORKS, Course, Tally, finished, make_stock, recipe, small_disk, torn, workers_of
+from faults import SIGNALS, WORKS, Course, Tally, finished, make_stock, recipe, small_disk, torn, undisturbed, workers_of
 from small import tree_hash
 from viewsphere.aside import aside
 from viewsphere.run.generate import generate
@@ -37,8 +38,7 @@ def stock(tmp_path_factory):
 @pytest.fixture(scope="module")
 def whole(stock):
     """The undisturbed tree of the work "render"."""
-    WORKS["render"].finish(stock, stock / "whole")
-    return stock / "whole"
+    return undisturbed(WORKS["render"], stock).model
 
 
 @pytest.fixture(scope="module")
@@ -77,20 +77,22 @@ def test_signals_at_any_moment(fault, stock, tmp_path):
     assert course.tally.is_good, course.tally
     if fault in ("SIGTERM", "Ctrl-C", "workers SIGSTOPped, Ctrl-C"):
         assert all("stopped; " in line and "to go on" in line for line in course.tally.said), course.tally
+    else:
+        assert not course.tally.said
 
 
 def test_several_runs_on_one_output(stock, whole, tmp_path):
-    started = [WORKS["render"].start(stock, tmp_path / "out") for _ in range(3)]
+    started = [WORKS["render"].start(stock, tmp_path / "out", workers=workers) for workers in (0, 0, 2)]
     said = [process.communicate(timeout=DEADLINE)[1] for process in started]
     assert [process.returncode for process in started] == [0, 0, 0], said
     assert tree_hash(tmp_path / "out") == tree_hash(whole)
 
 
-def ended(process: subprocess.Popen[str], words: str) -> None:
+def ended(run: subprocess.Popen[str] | Answer, words: str) -> None:
     """The run ended with a mistake, in one line that has these words."""
-    said = process.communicate(timeout=DEADLINE)[1]
+    said = run.stderr if isinstance(run, Answer) else run.communicate(timeout=DEADLINE)[1]
     lines = [line for line in said.splitlines() if line.startswith("viewsphere: ")]
-    assert process.returncode == 2, said
+    assert run.returncode == 2, said
     assert len(lines) == 1 and words in lines[0], said
     assert "Traceback" not in said
 
@@ -105,8 +107,8 @@ def test_a_full_disk(what, ample, stock, whole, tmp_path):
     }
     with small_disk(tmp_path / "disk", **{what: f"{taken['models'] + taken['shots'] * 2 // 3}"}) as change:
         out = tmp_path / "disk" / "out"
-        for _ in range(2):
-            ended(WORKS["render"].start(stock, out), "No space left on device; what is finished is kept")
+        for run in (WORKS["render"].start, WORKS["render"].here):
+            ended(run(stock, out), "No space left on device; what is finished is kept")
             assert not torn(out, whole)
         there = finished(out)
         assert there
@@ -121,7 +123,7 @@ def test_a_disk_that_cannot_be_written_from_the_start(stock, whole, tmp_path):
     with small_disk(tmp_path / "disk", size="64m") as change:
         change(ro="")
         ended(
-            WORKS["render"].start(stock, tmp_path / "disk" / "out"),
+            WORKS["render"].here(stock, tmp_path / "disk" / "out"),
             "expected a writable output folder, found Read-only file system",
         )
         change(rw="")
@@ -173,7 +175,17 @@ def test_clocks_that_jump(stock, whole, tmp_path, monkeypatch):
     assert tree_hash(store.root) == tree_hash(whole)
 
 
-def test_faults_that_hit_nothing_do_not_count(stock, tmp_path):
+WORKING = """
+import time
+from multiprocessing import get_context
+worker = get_context("spawn").Process(target=time.sleep, args=(600,))
+worker.start()
+worker.join()
+print(worker.exitcode)
+"""
+
+
+def test_faults_that_hit_nothing_do_not_count():
     """A run that has ended; and workers are waited for."""
     for fault in SIGNALS.values():
         process = subprocess.Popen(["true"], stderr=subprocess.PIPE, text=True, start_new_session=True)
@@ -181,9 +193,9 @@ def test_faults_that_hit_nothing_do_not_count(stock, tmp_path):
         tally = Tally()
         tally.add(process, fault(process))
         assert tally.times == 0
-    process = WORKS["render"].start(stock, tmp_path / "out")
+    process = subprocess.Popen([sys.executable, "-c", WORKING], stdout=subprocess.PIPE, text=True)
     assert SIGNALS["SIGKILL of a worker"](process)
-    assert process.communicate(timeout=DEADLINE)[1] == ""
+    assert process.communicate(timeout=DEADLINE)[0] == "-9\n"
 
 
 def test_a_worker_that_ends_while_it_is_looked_at_is_left_out(tmp_path):

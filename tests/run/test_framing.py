@@ -290,13 +290,14 @@ def test_empty_pictures_are_the_same_without_their_models(tmp_path):
         channels=["rgb", "depth", "instances"],
         formats=["coco"],
         empty=0.4,
-        viewpoints={**LOW, "elevation": [10, 20]},
+        engine={"name": "raster", "bounces": "off"},
+        viewpoints={**LOW, "count": 4, "elevation": [10, 20]},
     )
     vs.generate(recipe, tmp_path / "out")
     dataset = vs.open(tmp_path / "out")
-    full = list(vs.render(recipe.model_copy(update={"empty": None})))
+    full = list(vs.render(recipe.model_copy(update={"empty": None, "channels": ("depth", "instances")})))
     bare = [not sample.objects for sample in dataset]
-    assert 2 <= sum(bare) <= 13
+    assert 2 <= sum(bare) <= 9
     assert sum(bare) < len(bare)
     for sample, whole in zip(dataset, full, strict=True):
         assert sample.pose == whole.pose

@@ -72,8 +72,7 @@ def test_the_cluster_of_the_docs_is_as_ray_wants_it():
 
 
 @pytest.mark.slow
-def test_nodes_may_die_and_join_in_the_middle(tmp_path, ray):
-    generate(small_recipe(**RECIPE), tmp_path / "local")
+def test_nodes_may_die_and_join_in_the_middle(tmp_path, local, ray):
     with ray(num_cpus=0) as cluster, rendering(tmp_path, cluster.address) as run:  # nobody is there yet
         first = cluster.add_node(**SMALL)
         assert until(lambda: finished(tmp_path) > 1)
@@ -89,27 +88,21 @@ def test_nodes_may_die_and_join_in_the_middle(tmp_path, ray):
         os.kill(slow, signal.SIGCONT)
         _, said = run.communicate(timeout=DEADLINE)
     assert (run.returncode, said) == (0, "")
-    assert tree_hash(tmp_path / "out") == tree_hash(tmp_path / "local")
+    assert tree_hash(tmp_path / "out") == tree_hash(local)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_ends_all_workers_and_the_run_goes_on_elsewhere(sent, tmp_path, ray):
-    generate(small_recipe(**RECIPE), tmp_path / "local")
-    with ray() as cluster:
-        with rendering(tmp_path, cluster.address) as run:
-            assert until(lambda: finished(tmp_path) > 1)
-            run.send_signal(sent)
+def test_a_cluster_is_reached_through_its_client_server_too(tmp_path, ray, small_run):
+    pytest.importorskip("grpc")
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        port = found.getsockname()[1]
+    with ray(ray_client_server_port=port):
+        assert until(lambda: listens(port))
+        with rendering(tmp_path, f"ray://127.0.0.1:{port}", changes={}) as run:
             _, said = run.communicate(timeout=DEADLINE)
-        assert run.returncode == 130
-        assert said.startswith("stopped; ")
-        assert said.endswith("frames are kept. Run the same command to go on\n")
-        assert not begun(tmp_path)
-    kept = finished(tmp_path)
-    assert 1 < kept < 24
-    summary = generate(small_recipe(**RECIPE), tmp_path / "out")
-    assert summary.rendered == 48 - 2 * kept
-    assert tree_hash(tmp_path / "out") == tree_hash(tmp_path / "local")
+    assert (run.returncode, said) == (0, "")
+    assert tree_hash(tmp_path / "out") == tree_hash(small_run)
 
 
 LOST = """
@@ -152,33 +145,53 @@ def test_what_kills_its_workers_is_told_and_the_rest_goes_on(tmp_path, ray):
 
 
 @pytest.mark.slow
-def test_machines_that_do_not_see_the_data_set_render_nothing(tmp_path, ray):
-    with ray() as cluster:
-        done = script(LOST, cluster.address, tmp_path / "out", "hidden")
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_all_workers_and_the_run_goes_on_elsewhere(sent, tmp_path, local, cluster):
+    with rendering(tmp_path, cluster) as run:
+        assert until(lambda: finished(tmp_path) > 1)
+        run.send_signal(sent)
+        _, said = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 130
+    assert said.startswith("stopped; ")
+    assert said.endswith("frames are kept. Run the same command to go on\n")
+    assert not begun(tmp_path)
+    kept = finished(tmp_path)
+    assert 1 < kept < 24
+    summary = generate(small_recipe(**RECIPE), tmp_path / "out")
+    assert summary.rendered == 48 - 2 * kept
+    assert tree_hash(tmp_path / "out") == tree_hash(local)
+
+
+@pytest.mark.slow
+def test_machines_that_do_not_see_the_data_set_render_nothing(tmp_path, cluster):
+    done = script(LOST, cluster, tmp_path / "out", "hidden")
     (line,) = (line for line in done.stderr.splitlines() if line.startswith("viewsphere.errors.ViewsphereError: node "))
     assert line.endswith(f"{tmp_path / 'out'}: expected a folder that all machines of the cluster share; found none here")
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow
-def test_a_cluster_is_reached_through_its_client_server_too(tmp_path, ray, small_run):
-    pytest.importorskip("grpc")
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        port = found.getsockname()[1]
-    with ray(ray_client_server_port=port):
-        assert until(lambda: listens(port))
-        with rendering(tmp_path, f"ray://127.0.0.1:{port}", changes={}) as run:
-            _, said = run.communicate(timeout=DEADLINE)
-    assert (run.returncode, said) == (0, "")
-    assert tree_hash(tmp_path / "out") == tree_hash(small_run)
+@pytest.fixture(scope="module")
+def local(tmp_path_factory):
+    """What a local run makes; do not change it."""
+    root = tmp_path_factory.mktemp("local") / "local"
+    generate(small_recipe(**RECIPE), root)
+    return root
 
 
 @pytest.fixture
 def ray():
-    """Starts clusters, of which no process is left."""
+    """Starts clusters, of which no process is left; not beside `cluster`."""
     pytest.importorskip("ray")
     yield ray_cluster
+    assert until(lambda: not list(ray_processes()))
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """The address of a cluster of one node that lives on, of which no process is left in the end."""
+    pytest.importorskip("ray")
+    with ray_cluster() as made:
+        yield made.address
     assert until(lambda: not list(ray_processes()))
 
 
