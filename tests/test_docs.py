@@ -11,7 +11,6 @@ import viewsphere as vs
 from command_line import viewsphere
 from deadline import DEADLINE
 from small import ROOT
-from test_cookbook import shrink
 
 README = (ROOT / "README.md").read_text("utf-8")
 
@@ -43,8 +42,6 @@ def test_readme_s_commands_and_code_run(tmp_path, monkeypatch):
     for line in (line for line in commands if not line.startswith("view ")):  # which goes on until Ctrl-C
         answer = viewsphere(*line.split(), cwd=tmp_path)
         assert answer.returncode == 0, f"{line}\n{answer.stdout}{answer.stderr}"
-        if line.strip() == "new cars":
-            shrink(tmp_path / "cars" / "recipe.yaml", {"size: [640, 480]": "size: [160, 120]"})
     assert {"rgb", "instances"} <= set(vs.open(tmp_path / "cars-ds")[0].channels)
     code = re.search(r"```python\n(.*?)```", README, re.DOTALL)
     assert code is not None
