@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from light_stage import ball
@@ -109,6 +111,11 @@ def test_a_ball_in_the_furnace_is_as_even_as_the_walls_in_a_picture():
     assert abs(np.median(on_ball) - np.median(picture)) <= 6
 
 
+def read_at(points: np.ndarray) -> np.ndarray:
+    """The light along x, y and z that points tell, (P, 9)."""
+    return points[:, 1:10] / points[:, :1]
+
+
 def test_what_is_within_a_thing_takes_no_site_from_what_is_seen():
     walls, within = inside_out(box((-1.0, -0.8, -0.6), (1.0, 0.8, 0.6))), corners_of(ball(0.2, (0.0, 0.0, 0.0)))
     deeper = corners_of(ball(0.195, (0.0, 0.0, 0.0)))
@@ -156,6 +163,16 @@ def test_sites_are_no_more_than_allowed_and_the_smaller_the_fewer(monkeypatch):
         radius = np.linalg.norm(sites.places, axis=1)
         assert 0.995 < radius.min() <= radius.max() <= 1
         np.testing.assert_allclose(facets.normals, facets.places / np.linalg.norm(facets.places, axis=1)[:, None], atol=0.05)
+        # A point that is half as open has half the light; beside sites that are half as open as well, all of it.
+        nodes = np.ones((len(sites.places), 12), np.float32)
+        shut = replace(facets, open=facets.open / 2)
+        one, half, same = (
+            read_at(sites.light_at(own, nodes, np.full(len(nodes), share, np.float32)))
+            for own, share in ((facets, 1.0), (shut, 1.0), (shut, 0.5))
+        )
+        assert np.abs(one).max() > 0.5
+        np.testing.assert_allclose(half, one / 2, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(same, one, rtol=1e-5, atol=1e-6)
     assert vertex_light.CELL <= sizes[0] < 0.6 * sizes[1]
 
 
