@@ -460,8 +460,8 @@ def test_metal_mirrors_the_sky_and_is_not_dead():
     ("options", "message"),
     [
         ({"antialais": 4}, "did you mean 'antialias'"),
-        ({"antialias": 3}, "expected 1 or 4, found 3"),
-        ({"antialias": True}, "expected 1 or 4"),
+        ({"antialias": 3}, "expected 1, 4, 16 or 64, found 3"),
+        ({"antialias": True}, "expected 1, 4, 16 or 64"),
         ({"exposure": 1.0}, "expected it as scene.view.exposure"),
         ({"ambient_occlusion": "soft"}, "ambient_occlusion: expected off, fast or fine"),
         ({"shadow_resolution": 10}, "shadow_resolution: expected an integer"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Literal
@@ -11,18 +12,26 @@ from pydantic import JsonValue
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import one_of
 
+ANTIALIAS = (1, 4, 16, 64)
+"""How many samples an edge pixel may have; beyond four, every pixel has a quarter as many."""
+
 
 @dataclass(frozen=True)
 class Options:
-    """antialias: samples in an edge pixel, 1 or 4; shadow_resolution: width of the shadow maps in texels, 0 to derive it from
-    the pictures' size; ambient_occlusion: off, fast or fine; bounces: whether still things throw light at one another: on,
-    off, or auto, on where a place shuts out the sky.
+    """antialias: samples in an edge pixel, see `ANTIALIAS`; shadow_resolution: width of the shadow maps in texels, 0 to derive
+    it from the pictures' size; ambient_occlusion: off, fast or fine; bounces: whether still things throw light at one another:
+    on, off, or auto, on where a place shuts out the sky.
     """
 
     antialias: int = 4
     shadow_resolution: int = 0
     ambient_occlusion: Literal["off", "fast", "fine"] = "fast"
     bounces: Literal["auto", "on", "off"] = "auto"
+
+    @property
+    def times(self) -> int:
+        """How many times as many pixels each way are painted; edges have four samples in each."""
+        return max(math.isqrt(self.antialias // 4), 1)
 
     def for_width(self, pixels: int) -> int:
         """Width of the shadow maps for pictures whose longer side has so many pixels: the next power of two, 1,024 to 4,096."""
@@ -41,8 +50,8 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
             raise RecipeError(f"engine.{name}: {one_of(name, known)}")
     default = Options()
     antialias = given.get("antialias", default.antialias)
-    if isinstance(antialias, bool) or antialias not in (1, 4):
-        raise RecipeError(f"engine.antialias: expected 1 or 4, found {antialias!r}")
+    if isinstance(antialias, bool) or antialias not in ANTIALIAS:
+        raise RecipeError(f"engine.antialias: expected 1, 4, 16 or 64, found {antialias!r}")
     resolution = given.get("shadow_resolution", default.shadow_resolution)
     if isinstance(resolution, bool) or not isinstance(resolution, int) or not (resolution == 0 or 64 <= resolution <= 8192):
         raise RecipeError(f"engine.shadow_resolution: expected an integer in 64..8192, found {resolution!r}")
@@ -56,4 +65,4 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
         bounces = "on" if bounces else "off"
     if bounces not in ("auto", "on", "off"):
         raise RecipeError(f"engine.bounces: expected auto, on or off, found {bounces!r}")
-    return Options(4 if antialias == 4 else 1, resolution - resolution % 16, occlusion, bounces)
+    return Options(ANTIALIAS[ANTIALIAS.index(antialias)], resolution - resolution % 16, occlusion, bounces)

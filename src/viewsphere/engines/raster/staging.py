@@ -17,19 +17,22 @@ from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_length
 from viewsphere.engines.raster.blurring import Blur
 from viewsphere.engines.raster.halls import Halls
 from viewsphere.engines.raster.options import Options, parse_options
-from viewsphere.engines.raster.painting import Baked, materials, paint
+from viewsphere.engines.raster.painting import NO_SPLIT, Baked, materials, paint
 from viewsphere.engines.raster.panes import mirror_in_panes
 from viewsphere.engines.raster.polish import NOWHERE, mirror_in_polish
 from viewsphere.engines.raster.records import Float32
+from viewsphere.engines.raster.supersampling import paint_finely
 from viewsphere.engines.raster.surface import Lengths
 from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.engines.raster.wet_ground import mirror_in_water
+from viewsphere.errors import RecipeError
 from viewsphere.imaging.background import display_background, shows_sky
 from viewsphere.imaging.falling import fall_in
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
+from viewsphere.model.listed import LARGEST_PICTURE
 from viewsphere.model.shot import Shot
 from viewsphere.model.weather import Wet
 from viewsphere.truth.geometry import Geometry
@@ -109,8 +112,12 @@ class RasterStage:
         radiance = self._canvas(camera.width * camera.height)
         split = np.zeros((len(radiance), 9 if is_lit else 6), np.float32)
         baked, wet = self.baked(instant), self.shot.scene.wet
-        more = None if wet else partial(_mirror, baked, camera, visibility, None)
-        paint(baked, camera, visibility, self.options.antialias == 4, has_sky, radiance, split, more=more)
+
+        def paint_all(camera: Camera, seen: Visibility, light: Float32, parts: Float32) -> None:
+            more = None if wet else partial(_mirror, baked, camera, seen, None)
+            paint(baked, camera, seen, self.options.antialias > 1, has_sky, light, parts, more=more)
+
+        paint_finely(paint_all, self.options.times, baked.geometry, camera, visibility, radiance, split)
         shape = camera.height, camera.width, 3
         albedo, emission = (split[:, k : k + 3].reshape(shape) for k in (0, 3))
         if not is_lit:
@@ -160,8 +167,13 @@ class RasterStage:
     def _paint_one(self, baked: Baked, camera: Camera, seen: Visibility, has_sky: bool, radiance: Float32) -> None:
         scene = self.shot.scene
         fog, is_outdoors = scene.fog or scene.fog_outdoors, scene.fog is None
-        more = partial(_mirror, baked, camera, seen, scene.wet)
-        paint(baked, camera, seen, self.options.antialias == 4, has_sky, radiance, fog=fog, is_outdoors=is_outdoors, more=more)
+
+        def paint_all(camera: Camera, seen: Visibility, light: Float32, parts: Float32) -> None:
+            more = partial(_mirror, baked, camera, seen, scene.wet)
+            edges = self.options.antialias > 1
+            paint(baked, camera, seen, edges, has_sky, light, parts, fog=fog, is_outdoors=is_outdoors, more=more)
+
+        paint_finely(paint_all, self.options.times, baked.geometry, camera, seen, radiance, NO_SPLIT)
 
     def _canvas(self, pixels: int) -> Float32:
         """Room for the light of a picture, the same one every time: fresh memory costs as much as the sky."""
@@ -180,8 +192,13 @@ def _mirror(baked: Baked, camera: Camera, seen: Visibility, wet: Wet | None, lig
 
 
 def build_stage(shot: Shot, load: Load) -> RasterStage:
-    """The stage of a shot, with all models loaded."""
+    """The stage of a shot, with all models loaded. Raises RecipeError for options that it cannot have."""
     options = parse_options(shot.engine_options)
     lenses = [sensor.intrinsics for sensor in shot.rig.sensors if sensor.lidar is None]
-    size = options.for_width(max((max(lens.width, lens.height) for lens in lenses), default=1))
+    longest = options.times * max((max(lens.width, lens.height) for lens in lenses), default=1)
+    if longest > LARGEST_PICTURE:
+        most = LARGEST_PICTURE // options.times
+        found = f"at most {most:,} pixels a side, found {longest // options.times:,}"
+        raise RecipeError(f"engine.antialias: {options.antialias} samples in a pixel want {found}")
+    size = options.for_width(longest)
     return RasterStage(Arrangements.build(shot, load), replace(options, shadow_resolution=size))
