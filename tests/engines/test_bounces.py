@@ -418,5 +418,5 @@ def test_yaml_reads_on_and_off_as_truth_values(given, known):
 
 
 def test_an_unknown_value_is_told():
-    with pytest.raises(RecipeError, match=r"engine.bounces: expected auto, on or off, found 'much'"):
+    with pytest.raises(RecipeError, match=r"engine.bounces: expected auto, on, fine or off, found 'much'"):
         parse_options({"bounces": "much"})

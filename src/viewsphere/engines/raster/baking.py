@@ -155,6 +155,7 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
         blended=packed.blended,
         glass=glass_of(packed.rows),
         hall=hall if bounces.grid[0] else None,
+        is_fine=options.bounces == "fine",
         tree=tree_of_hall(hall) if hall is not None and bounces.grid[0] else None,
     )
 

@@ -30,7 +30,18 @@ from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.patch_rays import RAYS as PATCH_RAYS
 from viewsphere.engines.raster.patch_rays import WAYS, PatchRays, rays_of
 from viewsphere.engines.raster.patches import Patches, Rays, patches_of
-from viewsphere.engines.raster.records import NO_BOUNCES, NO_LIGHTMAP, Bounces, Float32, Int32, Surfaces, Textures
+from viewsphere.engines.raster.records import (
+    NO_BOUNCES,
+    NO_LIGHTMAP,
+    NO_NEAR,
+    NO_PATCH_LIGHT,
+    Bounces,
+    Float32,
+    Int32,
+    PatchLight,
+    Surfaces,
+    Textures,
+)
 from viewsphere.engines.raster.tracing import Tree, cast, tree_of
 from viewsphere.engines.raster.volumes import LAST, Grid, Volume, grids_of, join, rays_of_probes, settle, volume_of
 
@@ -192,7 +203,7 @@ def _bake(lighting: _Lighting) -> Bounces:
     _settle(seen, light, views.reshape(len(views), -1))
     if seen.below is not None:
         bounces.floor[:] = _on_ground(seen, seen.below, sent, lanterns, lit.emitted, off).reshape(bounces.floor.shape)
-    return bounces
+    return bounces._replace(sent=PatchLight(patches.table.keys, patches.table.patch, sent, bounces.sent.frame))
 
 
 def _settle(seen: _Seen, light: Float32, views: Float32) -> None:
@@ -272,7 +283,9 @@ def _look(hall: Hall) -> _Seen:
         patches = patches_of([*bundles, around.rays], *made_of, patches)
     screens = np.concatenate([volume.screens for volume in volumes])
     light = np.zeros((len(screens), COLUMNS), np.float32)
-    bounces = Bounces(light, NO_BOUNCES.views, screens, inner.shape, _frame(grids), floor, floor_frame, NO_LIGHTMAP)
+    sent = NO_PATCH_LIGHT._replace(frame=np.array([*inner.corner, *inner.last, inner.cells * PATCHES], np.float32))
+    volume = light, NO_BOUNCES.views, screens, inner.shape, _frame(grids)
+    bounces = Bounces(*volume, floor, floor_frame, NO_LIGHTMAP, sent, NO_NEAR)
     return _Seen(bounces, tree, volumes, patches.trimmed(), below, looked, around)
 
 

@@ -63,7 +63,7 @@ class Halls:
         floor: Float32,
         lengths: Lengths,
         has_ground: bool,
-        bounces: Literal["auto", "on", "off"],
+        bounces: Literal["auto", "on", "fine", "off"],
     ) -> Hall | None:
         """The scenery that stands still, which lights whatever else is there; in a picture without scenery all targets. None
         where light is not to bounce: it shall not, or only indoors. All calls have the same `bounces`.

@@ -37,12 +37,13 @@ LOBE, RIM, TAKEN, THROUGH = range(79 * BLOCK, 83 * BLOCK, BLOCK)
 SCENERY = 83 * BLOCK
 # Position and shading normal in the axes in which what hides the sky was baked.
 OX, OY, OZ, ONX, ONY, ONZ = range(84 * BLOCK, 90 * BLOCK, BLOCK)
-# Light that things throw at the sample: radiance of a white matt surface; the share of the sky's own light that it replaces,
-# as far as probes know it, and 1 where it is all light, since a lightmap has it; then what the nearest probes see, and from
-# KEPT on their weights and place, see `kernels_bounce`. The last row is room for vectors that begin in the row before.
-GLOW_R, GLOW_G, GLOW_B, INSIDE, MAPPED, PROBES = range(90 * BLOCK, 96 * BLOCK, BLOCK)
+# Light that things throw at the sample: radiance of a white matt surface, and of one that leans towards the mirrored ray; the
+# share of the sky's own light that it replaces, as far as probes know it, and 1 where it is all light, since a lightmap has it;
+# then what the nearest probes see, and from KEPT on their weights and place, see `kernels_bounce`. The last row is room for
+# vectors that begin in the row before.
+GLOW_R, GLOW_G, GLOW_B, LEAN_R, LEAN_G, LEAN_B, INSIDE, MAPPED, PROBES = range(90 * BLOCK, 99 * BLOCK, BLOCK)
 KEPT = PROBES + 28 * BLOCK
 # The light that solid glass bends towards the viewer (`kernels_bend`): its direction, then its radiance; what further surfaces
 # leave of it; how far it takes the place of the light from straight behind.
-BENT_X, BENT_Y, BENT_Z, STAIN_R, STAIN_G, STAIN_B, BENT = range((95 + 28 + 10) * BLOCK, (95 + 28 + 17) * BLOCK, BLOCK)
-ROWS = 95 + 28 + 17
+BENT_X, BENT_Y, BENT_Z, STAIN_R, STAIN_G, STAIN_B, BENT = range((98 + 28 + 10) * BLOCK, (98 + 28 + 17) * BLOCK, BLOCK)
+ROWS = 98 + 28 + 17

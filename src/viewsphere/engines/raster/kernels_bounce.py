@@ -24,6 +24,9 @@ from viewsphere.engines.raster.kernels_block import (
     GZ,
     INSIDE,
     KEPT,
+    LEAN_B,
+    LEAN_G,
+    LEAN_R,
     LX,
     LY,
     LZ,
@@ -44,12 +47,15 @@ from viewsphere.engines.raster.kernels_block import (
     T5,
     T6,
     T7,
+    VX,
+    VY,
+    VZ,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_lightmap import forget_map, read_map
 from viewsphere.engines.raster.kernels_vertex_light import read_vertices
 from viewsphere.engines.raster.kernels_views import CORNERS
 from viewsphere.kernels.jit import inner
-from viewsphere.kernels.lanes import FAST, clamp, dot, lanewise, least, load, most, scatter, spread, where
+from viewsphere.kernels.lanes import FAST, clamp, dot, lanewise, least, load, most, root, scatter, spread, where
 
 f4 = nb.float32
 i4 = nb.int32
@@ -63,6 +69,7 @@ BEHIND = 0.02  # least weight of a probe that lies behind the surface
 HIDDEN, BURIED, OUTDOORS = 2e-3, 2e-5, 2e-7
 SHARP = 20.0  # one over the depth behind a screen, in cells, at which a probe no longer counts
 SLACK = -0.02  # cells behind a screen that still count in full; less than none, so that probes within a wall never count
+LEANING = 0.4  # how far the lobe of a rough surface leans from its normal (0) towards the mirrored ray (1)
 OFF = 0.1  # cells off the surface from which a sample looks at the screens
 PLACE, FIRST_X, FIRST_Y, FIRST_Z = LX, LY, LZ, GLOW_R  # scratch; the cell's first corner
 _blend4, _blend28 = blend(4), blend(COLUMNS)
@@ -167,14 +174,20 @@ def terms(x, y, z):
 
 @lanewise
 def _shine(b):
-    """GLOW."""
+    """GLOW, and LEAN: of a surface that leans towards the mirrored ray. The lightmap knows the same of both."""
     inside, open_, is_mapped = b[INSIDE], b[OPEN], b[MAPPED] > 0
-    polynomials = terms(*b.get(NX, NY, NZ))
-    for k, row in enumerate((GLOW_R, GLOW_G, GLOW_B)):
-        value = b[PROBES, k * BLOCK]
-        for j, polynomial in enumerate(polynomials, 1):
-            value = value + polynomial * b[PROBES, (3 * j + k) * BLOCK]
-        b[row] = where(is_mapped, b[row], most(value, 0) * inside) * open_
+    normal, view = b.get(NX, NY, NZ), b.get(VX, VY, VZ)
+    along = clamp(dot(normal, view))
+    leaning = tuple(n + (2 * along * n - v - n) * LEANING for n, v in zip(normal, view, strict=True))
+    per = 1 / most(root(dot(leaning, leaning)), 1e-6)
+    kinds = terms(*normal), terms(*(x * per for x in leaning))
+    for k in range(3):
+        own = b[GLOW_R, k * BLOCK]
+        for polynomials, row in zip(kinds, (GLOW_R, LEAN_R), strict=True):
+            value = b[PROBES, k * BLOCK]
+            for j, polynomial in enumerate(polynomials, 1):
+                value = value + polynomial * b[PROBES, (3 * j + k) * BLOCK]
+            b[row, k * BLOCK] = where(is_mapped, own, most(value, 0) * inside) * open_
 
 
 @lanewise
@@ -189,7 +202,7 @@ def _place_on_floor(frame, across, b):
     right = fu * fv
     b[T0] = where(is_within, row * across + column + 1, 0)
     b.put((T1, T2, T3, T4), (1 - fu - fv + right, fu - right, fv - right, right))
-    for row in (GLOW_R, GLOW_G, GLOW_B, INSIDE, MAPPED):
+    for row in (GLOW_R, GLOW_G, GLOW_B, LEAN_R, LEAN_G, LEAN_B, INSIDE, MAPPED):
         b[row] = 0
     for k in range(CORNERS + 1):
         b[KEPT, k * BLOCK] = 0
@@ -210,14 +223,24 @@ def _read_floor(count, floor, frame, b):
 @lanewise
 def _darken(b):
     """What a texture of occlusion says counts for this light, too."""
-    for row in (GLOW_R, GLOW_G, GLOW_B):
-        b[row] = b[row] * b[AO]
+    for row, lean in ((GLOW_R, LEAN_R), (GLOW_G, LEAN_G), (GLOW_B, LEAN_B)):
+        b[row] = b[lean] = b[row] * b[AO]
     b[INSIDE] = 0
+
+
+@inner(fastmath=FAST)
+def dim_by_near(start, count, slots, near, b):
+    """What is nearer to the samples `slots` than probes know, in place of the part of their light that it takes away."""
+    for i in range(U(count)):
+        own = near[U(slots[U(start) + i])]
+        for k in range(U(3)):
+            for row in (U(GLOW_R) + k * U(BLOCK) + i, U(LEAN_R) + k * U(BLOCK) + i):
+                b[row] = b[row] * own[U(0)] + own[U(1) + k]
 
 
 @inner
 def bounced(count, bounces, is_ground, own, b):
-    """Fill GLOW, INSIDE and MAPPED of a block that has been occluded, and from KEPT on the weights of the eight probes around
+    """Fill GLOW, LEAN, INSIDE and MAPPED of a block that has been occluded, and from KEPT on the weights of the eight probes around
     and which is the first. own: the samples' triangles, unless they are of the ground.
 
     Overwrites the rows of a light.

@@ -18,8 +18,8 @@ import numpy as np
 from viewsphere.engines.raster.kernels_blend import blend
 from viewsphere.engines.raster.kernels_block import (
     ALPHA, BASE_R, BENT, BENT_X, BENT_Y, BENT_Z, BLOCK, BLUE, BOUNCE, COAT, COAT_ROUGH, CX, CY, CZ, DR, EDGE_R, ER, F0R,
-    FACE_R, GLOW_R, GREEN, GX, GY, GZ, IB, IG, INSIDE, IR, LOBE, LX, LY, LZ, MAPPED, METAL, NX, NY, NZ, OPEN, OPENX, OPENY, RED,
-    RIM, ROUGH, SHARE, SR, STAIN_B, STAIN_G, STAIN_R, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION,
+    FACE_R, GLOW_R, GREEN, GX, GY, GZ, IB, IG, INSIDE, IR, LEAN_R, LOBE, LX, LY, LZ, MAPPED, METAL, NX, NY, NZ, OPEN, OPENX,
+    OPENY, RED, RIM, ROUGH, SHARE, SR, STAIN_B, STAIN_G, STAIN_R, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION,
     UNLIT, VX, VY, VZ, WIDTH,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_environment import ABOVE, BELOW, LAMPS, SCALE, TURN
@@ -341,13 +341,13 @@ def _shine(b):
 @lanewise
 def _shine_bounced(b):
     """`_shine`, where light bounces: what probes see is as blurred as a mirror of roughness 0.5 shows it. The lobes of rougher
-    ones come ever closer to that of a matt surface, whose light is in GLOW.
+    ones come ever closer to that of a matt surface that leans towards the mirrored ray, whose light is in LEAN.
     """
     lobe, rim, out, rough = b.get(LOBE, RIM, T7, ROUGH)
     wide, known = clamp((rough * rough - VIEWED) * (1 / (1 - VIEWED))), most(b[INSIDE], b[MAPPED])
     for k in range(0, 3 * BLOCK, BLOCK):
         light = b[T3 + k] * out
-        light = light + (b[GLOW_R + k] - light * known) * wide  # GLOW is as much less as it is known
+        light = light + (b[LEAN_R + k] - light * known) * wide  # LEAN is as much less as it is known
         b[SR + k] = b[SR + k] + (b[FACE_R + k] * lobe + b[EDGE_R + k] * rim) * light
 
 

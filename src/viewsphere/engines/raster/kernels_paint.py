@@ -35,7 +35,7 @@ from viewsphere.engines.raster.kernels_block import (
     ROWS,
     SHARE,
 )  # isort: skip  # fmt: skip
-from viewsphere.engines.raster.kernels_bounce import bounced
+from viewsphere.engines.raster.kernels_bounce import bounced, dim_by_near
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
 from viewsphere.engines.raster.kernels_light import (
     add_light,
@@ -204,6 +204,8 @@ def shade(
             _take(count, is_matte, b)
         if is_bounced:
             bounced(count, bounces, is_ground, own, b)
+            if bounces.near.shape[0] > 0:
+                dim_by_near(start, count, slots, bounces.near, b)
         if is_matte:
             ambient_matte(count, surrounding, is_bounced, b)
             _finish_matte(count, b)

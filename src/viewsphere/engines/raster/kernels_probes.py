@@ -58,7 +58,7 @@ OPEN_SKY = 0.4  # share of the rays up that meet nothing from which on a probe k
 
 
 @inner
-def _key(p, normal, cells, box, m):
+def patch_key(p, normal, cells, box, m):
     """One number for a patch: its cell, the axis along which its normal is longest, and its material. Patches outside of the
     probes' box are the larger the farther they are.
     """
@@ -109,7 +109,7 @@ def patch(met, far, origins, directions, turn, normals, materials, box, cells, g
                 m, x, y, z = nb.int64(materials[triangle]), normals[triangle, 0], normals[triangle, 1], normals[triangle, 2]
                 side = f4(-1) if x * d[0] + y * d[1] + z * d[2] > f4(0) else f4(1)
                 normal = x * side, y * side, z * side
-            key = _key(p, normal, cells, box, m)
+            key = patch_key(p, normal, cells, box, m)
             at = found(key, table.keys, table.patch)
             if table.patch[at] < 0:
                 if 2 * count >= len(table.keys):

@@ -45,7 +45,7 @@ from viewsphere.engines.raster.kernels_block import (
     VY,
     VZ,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_bounce import bounced
+from viewsphere.engines.raster.kernels_bounce import bounced, dim_by_near
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
 from viewsphere.engines.raster.kernels_light import (
     UNEXPOSED,
@@ -105,8 +105,8 @@ def _lay(start, count, is_ground, slots, b, p, out):
 
 
 @inner(fastmath=FAST)
-def _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, own, b):
-    """Add all light that arrives at the samples."""
+def _light(start, count, slots, is_ground, is_matte, surrounding, lights, occlusion, bounces, own, b):
+    """Add all light that arrives at a block of the samples in `slots`."""
     occlude(count, occlusion, b)
     for k in range(lights.kind.shape[0]):
         arrive(count, lights, k, b)
@@ -117,6 +117,8 @@ def _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, 
     is_bounced = bounces.grid[0] > 0
     if is_bounced:
         bounced(count, bounces, is_ground, own, b)
+        if bounces.near.shape[0] > 0:
+            dim_by_near(start, count, slots, bounces.near, b)
     if is_matte:
         ambient_matte(count, surrounding, is_bounced, b)
     else:
@@ -147,7 +149,7 @@ def split(
             material(count, view, surfaces, textures, b, which)
             weigh(count, surrounding.albedo, b)
         if is_lit:
-            _light(count, is_ground, is_matte, surrounding, lights, occlusion, bounces, own, b)
+            _light(start, count, slots, is_ground, is_matte, surrounding, lights, occlusion, bounces, own, b)
         if is_matte:
             _part_matte(count, b, p)
         else:

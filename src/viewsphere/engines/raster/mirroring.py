@@ -63,7 +63,7 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
     """What a mirror at the height `plane` shows in the pixels `at` (n,), without the triangles `left_out` (T,)."""
     below = _below(camera, plane)
     geometry, blended = (_without(geometry, left_out) for geometry in (baked.geometry, baked.blended))
-    own = replace(baked, geometry=geometry, blended=blended)
+    own = replace(baked, geometry=geometry, blended=blended, is_fine=False)
     found, view = rasterize(geometry, below), view_of(baked, below)
     baked.rows.write_seen(below, found, geometry)
     triangle, depth = np.full(found.triangle.size, -1, np.int32), np.zeros(found.triangle.size, np.float32)

@@ -20,13 +20,13 @@ ANTIALIAS = (1, 4, 16, 64)
 class Options:
     """antialias: samples in an edge pixel, see `ANTIALIAS`; shadow_resolution: width of the shadow maps in texels, 0 to derive
     it from the pictures' size; ambient_occlusion: off, fast or fine; bounces: whether still things throw light at one another:
-    on, off, or auto, on where a place shuts out the sky.
+    on, off, auto, on where a place shuts out the sky, or fine, gathered by rays from each pixel, too.
     """
 
     antialias: int = 4
     shadow_resolution: int = 0
     ambient_occlusion: Literal["off", "fast", "fine"] = "fast"
-    bounces: Literal["auto", "on", "off"] = "auto"
+    bounces: Literal["auto", "on", "fine", "off"] = "auto"
 
     @property
     def times(self) -> int:
@@ -63,6 +63,6 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
     bounces = given.get("bounces", default.bounces)
     if isinstance(bounces, bool):  # YAML reads on and off as True and False
         bounces = "on" if bounces else "off"
-    if bounces not in ("auto", "on", "off"):
-        raise RecipeError(f"engine.bounces: expected auto, on or off, found {bounces!r}")
+    if bounces not in ("auto", "on", "fine", "off"):
+        raise RecipeError(f"engine.bounces: expected auto, on, fine or off, found {bounces!r}")
     return Options(ANTIALIAS[ANTIALIAS.index(antialias)], resolution - resolution % 16, occlusion, bounces)

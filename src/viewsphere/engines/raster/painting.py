@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from viewsphere.engines.raster import kernels_chosen, kernels_paint, kernels_split
 from viewsphere.engines.raster.bounces import Hall
 from viewsphere.engines.raster.environment import Surrounding, sky_behind
+from viewsphere.engines.raster.gathering_near import with_near
 from viewsphere.engines.raster.glass import NO_GLASS, Glass
 from viewsphere.engines.raster.kernels_material import L_BENDS
 from viewsphere.engines.raster.lights import Lights
@@ -40,7 +41,8 @@ class Baked:
     half their size; its slabs in a repeat, 0 for none. kind
     (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where neighbouring triangles look alike;
     see_through (T + 1,). blended: `with_blended_colors`. hall: what
-    throws the light of `bounces`, None if none bounces; tree: of the hall's triangles.
+    throws the light of `bounces`, None if none bounces; tree: of the hall's triangles; is_fine: whether rays from each sample
+    find what is near, and what rough mirrors show.
     """
 
     geometry: Geometry
@@ -61,6 +63,7 @@ class Baked:
     glass: Glass
     hall: Hall | None
     tree: Tree | None
+    is_fine: bool
 
     @property
     def catches(self) -> bool:
@@ -257,7 +260,10 @@ def _shade_some(
     if is_ground and baked.catches:
         kernels_paint.catch(view, baked.floor, *light, *seen, radiance)
         return
-    given = view, baked.surfaces, baked.textures, baked.floor, *light, baked.bounces, is_ground, *seen, glass
+    bounces = baked.bounces
+    if baked.is_fine and baked.hall is not None and baked.tree is not None and not is_ground:
+        bounces = with_near(bounces, baked.hall, baked.tree, view, *seen)
+    given = view, baked.surfaces, baked.textures, baked.floor, *light, bounces, is_ground, *seen, glass
     kernels_paint.shade(*given, radiance)
     if len(split):
         kernels_split.split(*given, split)

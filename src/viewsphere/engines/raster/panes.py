@@ -16,16 +16,22 @@ from numpy.typing import NDArray
 from viewsphere.engines.raster import kernels_mirror, kernels_paint, kernels_probes, kernels_split
 from viewsphere.engines.raster.bounces import Hall, without_maps
 from viewsphere.engines.raster.kernels_material import L_ROUGH, L_ROUGH_TEXEL
+from viewsphere.engines.raster.lobes import lobe_rays
 from viewsphere.engines.raster.mirroring import BRIGHTEST
 from viewsphere.engines.raster.painting import Baked, view_of
 from viewsphere.engines.raster.patches import ANY_VIEW
-from viewsphere.engines.raster.records import Float32, Int32
+from viewsphere.engines.raster.records import Float32, Int32, PictureRays
 from viewsphere.engines.raster.tracing import Tree, cast
 from viewsphere.model.camera import Camera
 from viewsphere.truth.visibility import Visibility
 
 SHARP, BLURRED = 0.1, 0.2
 """Roughness up to which what a ray sees counts in full, and from which on not at all."""
+
+FINE_SHARP, FINE_BLURRED, LOBE_RAYS = 0.45, 0.55, 16
+"""The same where light bounces finely, with so many rays in each pixel's lobe: what probes see is as blurred as roughness 0.5
+shows it.
+"""
 
 OFF = 0.002
 """Metres along a ray at which it begins, and off the surface that it meets those towards lights."""
@@ -51,22 +57,41 @@ def mirror_in_panes(
     panes = _panes(baked, baked.hall, visibility, left_out)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     view, light = view_of(baked, camera), (baked.surrounding, baked.occlusion, baked.bounces)
-    for start in range(0, len(panes), SOME):
-        at = panes[start : start + SOME]
+    count, *borders = (LOBE_RAYS, FINE_SHARP, FINE_BLURRED) if baked.is_fine else (1, SHARP, BLURRED)
+    for start in range(0, len(panes), SOME // count):
+        at = panes[start : start + SOME // count]
         gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
         kernels_split.gloss(view, baked.surfaces, baked.textures, baked.floor, *light, at, triangle, depth, gloss)
-        places, ways = gloss[:, 7:10].copy(), gloss[:, 10:13].copy()
+        ways, weights = _lobes(view, gloss, at, count)
         width = (view.pixel * view.scale / depth[at]).astype(np.float32)
-        shown, is_known = _seen(baked, baked.hall, baked.tree, (places, ways, width), float(view.pixel))
-        at, gloss, shown = at[is_known].astype(np.intp), gloss[is_known], shown[is_known]
-        borders, nearness = (np.float32(SHARP), np.float32(BLURRED)), np.zeros(len(at), np.float32)
-        kernels_mirror.polish(at, gloss, shown, shown, nearness, depth, *borders, radiance)
+        sights = np.tile(gloss[:, 7:10], (count, 1)), ways.reshape(-1, 3), np.tile(width, count)
+        seen, is_known = _seen(baked, baked.hall, baked.tree, sights, float(view.pixel))
+        total = weights.sum(axis=0)
+        shown = (weights[..., None] * seen.reshape(count, -1, 3)).sum(axis=0) / np.maximum(total, np.float32(1e-6))[:, None]
+        known = (is_known.reshape(count, -1) | (weights == 0)).all(axis=0) & (total > 0)
+        at, gloss, shown = at[known].astype(np.intp), gloss[known], shown[known].astype(np.float32)
+        nearness = np.zeros(len(at), np.float32)
+        kernels_mirror.polish(at, gloss, shown, shown, nearness, depth, *map(np.float32, borders), radiance)
+
+
+def _lobes(view: PictureRays, gloss: Float32, at: Int32, count: int) -> tuple[Float32, Float32]:
+    """So many rays (count, n, 3) from each of the pixels `at` (n,), and their weights (count, n): the mirrored ray where the
+    surface is smooth, or the only one; gloss (n, 13): see `kernels_split.gloss`.
+    """
+    mirrored = gloss[:, 10:13]
+    if count == 1:
+        return mirrored[None].copy(), np.ones((1, len(at)), np.float32)
+    toward = view.eye - gloss[:, 7:10]
+    toward /= np.sqrt((toward * toward).sum(axis=1, keepdims=True))
+    normals = toward + mirrored
+    normals /= np.sqrt((normals * normals).sum(axis=1, keepdims=True))
+    return lobe_rays(toward, normals, gloss[:, 6], at, int(view.columns), count)
 
 
 def _panes(baked: Baked, hall: Hall, visibility: Visibility, left_out: NDArray[np.intp]) -> Int32:
     """Pixels (n,) that show a smooth surface of the hall, and are not left out."""
     looks, shown = baked.surfaces.looks, visibility.triangle.reshape(-1)
-    is_smooth = looks[:, L_ROUGH] + looks[:, L_ROUGH_TEXEL] < BLURRED
+    is_smooth = looks[:, L_ROUGH] + looks[:, L_ROUGH_TEXEL] < (FINE_BLURRED if baked.is_fine else BLURRED)
     is_pane = (shown >= 0) & is_smooth[baked.surfaces.material[shown]] & (baked.kind[shown] == kernels_paint.SOLID)
     is_pane[left_out] = False
     at = np.flatnonzero(is_pane)

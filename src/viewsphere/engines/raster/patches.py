@@ -62,10 +62,9 @@ class Patches:
     ids: tuple[Int32, ...]
 
     def trimmed(self) -> Patches:
-        """Without places for further ones."""
+        """Without room for what further ones hit."""
         kept = {name: getattr(self.table, name)[: self.count].copy() for name in Table._fields[2:]}
-        table = self.table._replace(keys=self.table.keys[:0].copy(), patch=self.table.patch[:0].copy(), **kept)
-        return Patches(table, self.count, self.ids)
+        return Patches(self.table._replace(**kept), self.count, self.ids)
 
     @property
     def is_ground(self) -> NDArray[np.bool_]:

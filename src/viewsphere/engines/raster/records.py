@@ -81,6 +81,17 @@ class Lightmap(NamedTuple):
     points: Float32
 
 
+class PatchLight(NamedTuple):
+    """What patches send. keys (S,) uint64, patch (S,) int32: their table, see `kernels_probes.patch`; light (M, 3): of each,
+    radiance; frame (7,): the box of the probes, and how many patches there are in a length.
+    """
+
+    keys: NDArray[np.uint64]
+    patch: Int32
+    light: Float32
+    frame: Float32
+
+
 class Bounces(NamedTuple):
     """Light that things throw at one another: a volume of probes, and a map of level ground below things that stand on it.
 
@@ -93,7 +104,8 @@ class Bounces(NamedTuple):
     length, how far from a surface it is read in cells, one over the number of cells in which its light ends at the border, the
     first probe's row; floor (n, n, 4): radiance of a white matt ground lit by
     things alone; floor_frame (4,): its cells per length, its corner's x and y, whether there is a map; lightmap: where it is
-    known better than by probes.
+    known better than by probes; sent: what patches of things send; near (S, 4), or empty: of each sample, how much of the
+    probes' light arrives, and the light of what is nearer than they know (`gathering_near`).
     """
 
     light: Float32
@@ -104,6 +116,8 @@ class Bounces(NamedTuple):
     floor: Float32
     floor_frame: Float32
     lightmap: Lightmap
+    sent: PatchLight
+    near: Float32
 
 
 NO_LIGHTMAP = Lightmap(
@@ -114,6 +128,10 @@ NO_LIGHTMAP = Lightmap(
     np.zeros(0, np.int32),
     np.zeros((1, 12), np.float32),
 )
+NO_PATCH_LIGHT = PatchLight(
+    np.zeros(1, np.uint64), np.full(1, -1, np.int32), np.zeros((0, 3), np.float32), np.zeros(7, np.float32)
+)
+NO_NEAR = np.zeros((0, 4), np.float32)
 NO_BOUNCES = Bounces(
     np.zeros((1, 28), np.float32),
     np.zeros((1, 4), np.float32),
@@ -123,4 +141,6 @@ NO_BOUNCES = Bounces(
     np.zeros((2, 2, 4), np.float32),
     np.zeros(4, np.float32),
     NO_LIGHTMAP,
+    NO_PATCH_LIGHT,
+    NO_NEAR,
 )

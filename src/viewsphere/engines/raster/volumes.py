@@ -40,7 +40,7 @@ outer one does, and within which what the outer one knows becomes light of the s
 """
 
 ABOVE = 0.25
-"""Cells above the ground where a layer of wide cells is: what stands there is lit as places at this height are."""
+"""Cells above the ground where a layer of cells of wide places is: what stands there is lit as places at this height are."""
 
 RAYS, FEW_RAYS, MANY_PROBES = 384, 256, 24_000
 """Of a probe, and of one of so many; half of them beside a lightmap."""
@@ -63,6 +63,11 @@ class Grid(NamedTuple):
     def last(self) -> Float:
         """Where the last probe is, (3,)."""
         return self.corner + (self.shape[::-1] - 1) / self.cells
+
+    def resting(self, ground_z: float) -> Grid:
+        """The same, up to a cell higher: one layer is `ABOVE` the ground."""
+        up = (ground_z - float(self.corner[2])) * self.cells + ABOVE
+        return self._replace(corner=self.corner + np.array([0, 0, (up - math.floor(up)) / self.cells]))
 
     def around(self, ground_z: float) -> Grid:
         """The grid of as many probes around the same middle whose cells are `WIDER`, one layer of which is `ABOVE` the ground;
@@ -100,8 +105,9 @@ def grids_of(low: Float, high: Float, unit: float) -> tuple[Grid, ...]:
     cells = max(unit / CELL, ALONG / float((high - low).max()))
     if np.prod(_shape((high - low) * unit / WIDEST)) <= MOST:
         return (_grid(low, high, cells),)
-    inner = _grid(*_part(low, high, unit), cells)
-    return inner, inner.around(0.0 if low[2] <= 0 <= high[2] else float(low[2]))
+    ground_z = 0.0 if low[2] <= 0 <= high[2] else float(low[2])
+    inner = _grid(*_part(low, high, unit), cells).resting(ground_z)
+    return inner, inner.around(ground_z)
 
 
 def rays_of_probes(grids: tuple[Grid, ...], has_charts: bool) -> Float32:
