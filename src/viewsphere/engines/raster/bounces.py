@@ -203,7 +203,8 @@ def _bake(lighting: _Lighting) -> Bounces:
     _settle(seen, light, views.reshape(len(views), -1))
     if seen.below is not None:
         bounces.floor[:] = _on_ground(seen, seen.below, sent, lanterns, lit.emitted, off).reshape(bounces.floor.shape)
-    return bounces._replace(sent=PatchLight(patches.table.keys, patches.table.patch, sent, bounces.sent.frame))
+    light = np.where((lanterns.froms == 0)[:, None], sent, np.float32(-1))
+    return bounces._replace(sent=PatchLight(patches.table.keys, patches.table.patch, light, bounces.sent.frame))
 
 
 def _settle(seen: _Seen, light: Float32, views: Float32) -> None:

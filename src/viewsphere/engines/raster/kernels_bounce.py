@@ -240,8 +240,8 @@ def dim_by_near(start, count, slots, near, b):
 
 @inner
 def bounced(count, bounces, is_ground, own, b):
-    """Fill GLOW, LEAN, INSIDE and MAPPED of a block that has been occluded, and from KEPT on the weights of the eight probes around
-    and which is the first. own: the samples' triangles, unless they are of the ground.
+    """Fill GLOW, LEAN, INSIDE and MAPPED of a block that has been occluded, and from KEPT on the weights of the eight probes
+    around and which is the first. own: the samples' triangles, unless they are of the ground.
 
     Overwrites the rows of a light.
     """

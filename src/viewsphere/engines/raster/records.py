@@ -83,7 +83,8 @@ class Lightmap(NamedTuple):
 
 class PatchLight(NamedTuple):
     """What patches send. keys (S,) uint64, patch (S,) int32: their table, see `kernels_probes.patch`; light (M, 3): of each,
-    radiance; frame (7,): the box of the probes, and how many patches there are in a length.
+    radiance, -1 for lanterns, whose light arrives as probes know it; frame (7,): the box of the probes, and how many patches
+    there are in a length.
     """
 
     keys: NDArray[np.uint64]
