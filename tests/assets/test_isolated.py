@@ -133,7 +133,13 @@ def test_a_loop_that_keeps_the_interpreter_to_itself_is_stopped(spec, reader, mo
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not enforce it")
-@pytest.mark.parametrize("body", ["import numpy; numpy.ones(1 << 40)", "x = [bytearray(1 << 20) for _ in range(1 << 20)]"])
+@pytest.mark.parametrize(
+    "body",
+    [
+        "import numpy; numpy.ones(1 << 40)",
+        pytest.param("x = [bytearray(1 << 20) for _ in range(1 << 20)]", marks=pytest.mark.slow),
+    ],
+)
 def test_a_flood_of_memory_is_stopped(spec, reader, monkeypatch, body):
     reader(body)
     monkeypatch.setenv("VIEWSPHERE_MAX_READ_BYTES", str(1 << 30))
@@ -195,7 +201,9 @@ load_normalised(ModelSpec(key="a", source=sys.argv[1], category="x", category_id
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "how", [signal.SIGKILL, *(pytest.param(way, marks=pytest.mark.slow) for way in (signal.SIGTERM, signal.SIGINT))]
+)
 def test_no_child_outlives_its_parent(spec, reader, tmp_path, how):
     pid_file = tmp_path / "pid"
     reader("import os, pathlib, re", f"pathlib.Path({str(pid_file)!r}).write_text(str(os.getpid()))", "while True: pass")

@@ -148,6 +148,7 @@ def test_axes_of_round_shapes(name, axes):
     assert all(abs(np.array(flip)[:3, :3] @ axis + axis).max() < 1e-6 for flip in found.discrete)
 
 
+@pytest.mark.slow
 def test_a_ball_has_the_three_axes_of_the_object():
     found = find(surface(solid.icosphere(3)))
     assert [one.axis for one in found.continuous] == [(1, 0, 0), (0, 1, 0), (0, 0, 1)] and not found.discrete

@@ -74,6 +74,7 @@ def test_it_is_said_to_be_killed_and_not_the_file_to_be_damaged(dying, file, rea
     assert "damaged" not in said
 
 
+@pytest.mark.slow
 def test_nothing_of_it_is_kept(dying, file, tmp_path):
     python, started = dying("KILL"), tmp_path / "started"
     python.write_text(python.read_text().replace("#!/bin/sh\n", f"#!/bin/sh\necho >> {started}\n"))

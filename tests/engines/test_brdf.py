@@ -151,6 +151,7 @@ def test_distant_lights_all_around_are_a_furnace(rough, metal, coat):
     assert total == pytest.approx(np.ones(3), abs=0.02)
 
 
+@pytest.mark.slow
 def test_white_furnace():
     """Within 1 %: any roughness, metal, coat and angle."""
     surrounding = white_furnace()

@@ -132,6 +132,7 @@ def test_white_furnace_of_a_box(tmp_path, material):
     assert np.mean(np.abs(occluded - 1) < 0.01) > 0.99
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("material", [MATERIALS[0], MATERIALS[4], pytest.param(MATERIALS[-2], marks=pytest.mark.slow)])
 def test_white_furnace_of_a_car(tmp_path, material):
     """Dents of shading normals that look away from what is seen may darken single pixels; occlusion only ever darkens."""
@@ -418,7 +419,7 @@ def test_a_magnified_blended_texture_fades_from_texel_to_texel(wrap, antialias):
     assert np.abs(seen.astype(int) - expected).max() <= 2
 
 
-@pytest.mark.parametrize("lit", ["sun", "low sun", "sky"])
+@pytest.mark.parametrize("lit", [pytest.param("sun", marks=pytest.mark.slow), "low sun", "sky"])
 def test_a_catcher_darkens_as_the_ground_does(lit):
     """Over a plain background of the open ground's colour a catcher looks like the ground; light and ground are grey."""
     box = flat(cuboid((-0.4, -0.3, 0), (0.4, 0.3, 0.7)), Material(base_color=(0.5, 0.5, 0.5, 1)))

@@ -111,7 +111,12 @@ def test_stills_of_what_moves_are_those_of_what_stands(has_scenery):
 
 @pytest.mark.parametrize(
     "scene, occlusion, most, share",
-    [("sun", "off", 0.6, 0.02), ("lamp", "off", 0.3, 0.01), ("sun", "fast", 2.0, 0.03), ("lamp", "fast", 2.0, 0.03)],
+    [
+        ("sun", "off", 0.6, 0.02),
+        ("lamp", "off", 0.3, 0.01),
+        pytest.param("sun", "fast", 2.0, 0.03, marks=pytest.mark.slow),
+        pytest.param("lamp", "fast", 2.0, 0.03, marks=pytest.mark.slow),
+    ],
 )
 def test_a_sequence_looks_like_stills(scene, occlusion, most, share):
     """But for the shadows' edges, as maps are a little coarser where they stay in place for a while; and for ambient

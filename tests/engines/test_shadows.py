@@ -440,6 +440,7 @@ def test_a_light_in_a_box_lights_its_walls_and_nothing_else(light):
     assert stage.arrives(lights, 0, outside)["irradiance"].max() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("has_bottom", [True, False])
 def test_a_lamp_in_a_box_does_not_light_the_ground_beside_its_foot(has_bottom):
     """However large a pixel is: a part of it would lie under the box."""

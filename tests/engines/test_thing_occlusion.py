@@ -92,6 +92,7 @@ def test_two_cars_beside_each_other_against_rays():
     assert np.corrcoef(found[sure], truth[sure])[0, 1] > 0.7
 
 
+@pytest.mark.slow
 def test_what_is_beside_a_wall_loses_light():
     """More the nearer it is, none far away, and nothing of it depends on the order."""
     s = step_samples(pose())

@@ -75,6 +75,7 @@ def of_bop(stills, tmp_path_factory):
     return place / "bop", *rendered_again("bop", place / "bop", place)
 
 
+@pytest.mark.slow
 def test_bop_is_the_same_again(of_bop):
     tree, again, lines, made = of_bop
     assert made.notes == ()
@@ -100,6 +101,7 @@ def test_bop_is_the_same_again(of_bop):
         close("bop", "again: depth", sample.depth[surface], depth[surface], "m", atol=5.1e-4)
 
 
+@pytest.mark.slow
 def test_bop_exports_alike_again(of_bop):
     """The recipe asks for BOP: scene_gt, with the objects' numbers, and scene_gt_info are those of the first tree."""
     tree, again, lines, _ = of_bop
@@ -224,6 +226,7 @@ def save_by_toolkit(scene, cameras, gt):
     inout.save_scene_gt(str(scene / "scene_gt.json"), gt)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [0.0, 0.5])
 @pytest.mark.parametrize("save", [save_plainly, save_by_toolkit])
 def test_trees_that_others_write_are_the_same_again(tree, tmp_path, shift, save):
@@ -374,6 +377,7 @@ def of_pascal(stills, tmp_path_factory):
     return stills, place / "pascal3d", *rendered_again("pascal3d", place / "pascal3d", place)
 
 
+@pytest.mark.slow
 def test_pascal3d_is_the_same_again(of_pascal):
     """All objects of a picture in one shot, as its record says K and RT; masks are those of SegmentationObject."""
     own, tree, again, lines, made = of_pascal
@@ -414,6 +418,7 @@ def release(of_pascal, tmp_path):
     return folder
 
 
+@pytest.mark.slow
 def test_pascal3d_of_others_is_projected_as_its_toolbox_does(release, tmp_path):
     made = make_again("pascal3d", release, tmp_path / "again")
     again = plan(str(made.recipe))
@@ -445,6 +450,7 @@ def test_pascal3d_of_others_renders(release, tmp_path):
     assert sorted(again.root.glob("pascal3d/CAD/*.mat"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "message"),
     [

@@ -92,6 +92,7 @@ def test_points_lie_where_images_show_them(stills, videos, kind, tmp_path):
             close("colmap", f"pycolmap {kind}: points", found, expected, "px", atol=1e-3)
 
 
+@pytest.mark.slow
 def test_followed_points_have_all_images_that_show_them(videos, tmp_path):
     folder = written(videos, tmp_path, "text")
     moving = 0
@@ -162,6 +163,7 @@ def test_a_part_of_an_instant(videos, tmp_path):
         close("colmap", "a part", image.cam_from_world().matrix(), np.column_stack((camera.R, camera.t)), "m", atol=1e-12)
 
 
+@pytest.mark.slow
 def test_pictures_of_other_lenses_have_cameras_of_their_own(tmp_path):
     camera = {"size": [96, 72], "fov_deg": {"uniform": [30, 50]}}
     generate(small_recipe(camera=camera, channels=["rgb", "depth"], formats=[]), tmp_path / "out", workers=0)

@@ -76,7 +76,7 @@ def everything(folder, kind):
 
 
 @pytest.mark.parametrize("kind", ["nerfstudio", "instant-ngp", "nerf-synthetic"])
-@pytest.mark.parametrize("world", ["stills", "poses", "videos"])
+@pytest.mark.parametrize("world", ["stills", "poses", pytest.param("videos", marks=pytest.mark.slow)])
 def test_world_points_come_to_their_pixels(world, kind, request, tmp_path):
     dataset = request.getfixturevalue(world)
     found = everything(written(dataset, tmp_path, kind=kind), kind)
@@ -111,6 +111,7 @@ def test_depth_lifts_to_the_points(videos, kind, tmp_path):
         close("nerfstudio", "depth: lifted points beyond rounding", over, 0, "m", atol=1e-6)
 
 
+@pytest.mark.slow
 def test_splits_points_and_masks(poses, stills, tmp_path):
     for dataset, place in ((poses, tmp_path / "poses"), (stills, tmp_path / "stills")):
         folder = written(dataset, place, masks=True)

@@ -95,6 +95,7 @@ def test_q_p1_and_p2_are_those_of_stereo_rectify(videos, tmp_path):
 BENT = {"model": "fisheye", "coefficients": LENSES["fisheye"].coefficients}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", ["pinhole", "fisheye"])
 def test_any_pair_and_that_rigs_take_it(first, tmp_path):
     sensors = {

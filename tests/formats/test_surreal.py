@@ -279,6 +279,7 @@ def long(tmp_path_factory):
     return Dataset(folder / "out")
 
 
+@pytest.mark.slow
 def test_clips_have_at_most_a_hundred_pictures(long, tmp_path):
     export(long.root, ["surreal"], output=tmp_path)
     first, second = sorted((tmp_path / "surreal").rglob("*_info.mat"))
@@ -290,6 +291,7 @@ def test_clips_have_at_most_a_hundred_pictures(long, tmp_path):
     equal("surreal", "scipy: segm, Mixamo's names", last["segm_2"], long[-1].body_parts)
 
 
+@pytest.mark.slow
 def test_a_clip_s_pictures_are_not_in_memory_together(long):
     tree = surreal.Surreal(long)
     clip = tree._clip_of(long[0])

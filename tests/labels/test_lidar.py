@@ -387,6 +387,7 @@ def test_a_sweep_in_which_nothing_moves_has_the_same(wall):
     assert (np.abs(one["intensity"] - other["intensity"]) > 1e-4 * one["intensity"]).mean() < 0.002
 
 
+@pytest.mark.slow
 def test_changes_to_materials_change_it_and_are_checked(wall, tmp_path):
     """Tints, and pictures; labels computed again from exported models have the same, and so the same points drop out."""
     _, rows = points_of(wall())

@@ -118,6 +118,7 @@ def test_colours_are_drawn_from_names_and_codes():
     assert Entry(light=[2, 0, 0]).light == (2, 0, 0)
 
 
+@pytest.mark.slow
 def test_arguments_may_be_distributions():
     found = np.array(draws("number", {"uniform": [{"choice": [10, 20]}, {"uniform": [20, 30]}]}))
     assert 10 <= found.min() < 10.5

@@ -250,6 +250,7 @@ def test_backgrounds_and_splits_by_frame_do_not_change(tmp_path):
         generate(recipe(**fixed, models=models(4)), tmp_path / "out", append=True)
 
 
+@pytest.mark.slow
 def test_company_stands_in_appended_frames(tmp_path):
     scene = {"scene": {"ground": True, "company": {"count": 1, "layout": [[1.0, 0, 30]]}}, "splits": {"by": "frame"}}
     far = {"azimuth": [0, 120], "elevation": [30], "distance": 3.0}
@@ -525,6 +526,7 @@ def test_two_appends_at_once_do_not_mix(out):
     assert report.ok, report.findings
 
 
+@pytest.mark.slow
 def test_large_data_sets_are_planned_fast_and_kept_small():
     views = {"azimuth": {"start": 0, "stop": 359, "step": 1}, "elevation": list(range(0, 80, 4)), "distance": 3.0}
     large = vs.plan(recipe(models=[{"source": "zoo:car", "count": 38}], viewpoints=views, shot_frames=None))

@@ -38,6 +38,7 @@ def few_moving(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["stills", "videos"])
 def test_what_is_computed_is_what_would_have_been_kept(world, request, tmp_path_factory):
     whole = Dataset(rendered(world, shared_place(tmp_path_factory)))
@@ -87,6 +88,7 @@ def test_a_choice_of_frames_is_computed_as_all_are(few, tmp_path):
     assert all(text == labels["all"][name] for place in ("some", "cars") for name, text in labels[place].items())
 
 
+@pytest.mark.slow
 def test_parts_of_which_only_some_keep_a_label_are_completed(tmp_path):
     generate(stills(channels=["rgb"], **SHORT), tmp_path / "few")
     generate(stills(channels=["rgb", "depth"], **{**SHORT, "annotations": ["keypoints"]}, seed=4), tmp_path / "more")

@@ -147,6 +147,7 @@ def test_appended_frames_show_as_much_of_their_models(name, tmp_path):
 DRAWN = {"min_visibility": 0.6, "viewpoints": {**LOW, "count": 5}, "empty": 0.2}
 
 
+@pytest.mark.slow
 def test_the_draws_do_not_depend_on_how_shots_are_cut(tmp_path):
     recipe = recipe_of(**DRAWN)
     vs.generate(recipe, tmp_path / "one")
@@ -244,6 +245,7 @@ def test_an_export_is_proved_by_the_threshold_that_it_was_made_with(tmp_path):
     assert {finding.check for finding in check(vs.open(out)).findings} == {"coco"}
 
 
+@pytest.mark.slow
 def test_the_data_set_is_read_once_for_all_formats_that_leave_annotations_out(tmp_path, monkeypatch):
     vs.generate(recipe_of(**LEFT_OUT, keep_annotations_above=0.5), tmp_path / "out", formats=[])
     made, begin = [], Exported.__init__

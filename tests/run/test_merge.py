@@ -107,6 +107,7 @@ def test_the_same_model_is_kept_once(sources, tmp_path):
     assert joined.plan.poses == 7
 
 
+@pytest.mark.slow
 def test_merging_again_finds_it_done_and_a_merge_can_be_merged(sources, merged, tmp_path):
     before = tree_hash(merged / "store")
     merge(sources, merged)
@@ -125,6 +126,7 @@ BAD = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("change", "message"), BAD)
 def test_other_cameras_and_channels_are_refused_unless_asked_for(sources, tmp_path, change, message):
     generate(recipe(**change), tmp_path / "d")

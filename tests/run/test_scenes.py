@@ -87,6 +87,7 @@ def test_memory_and_store_hold_the_same(whole):
         assert stored.pose == sample.pose
 
 
+@pytest.mark.slow
 def test_labelled_scenery_becomes_objects_with_models(files, tmp_path):
     _, summary = made(files, tmp_path / "ds", labels="own", draw="per_frame")
     dataset = Dataset(tmp_path / "ds")
@@ -110,6 +111,7 @@ def test_any_number_of_workers_makes_the_same(files, whole, tmp_path):
     assert tree_hash(tmp_path / "ds") == tree_hash(whole[1].root)
 
 
+@pytest.mark.slow
 def test_the_proof_covers_the_scenery(whole, tmp_path):
     """A post that the store knows nothing of is found by its pixels; scenery that has changed is named."""
     _, dataset = whole
@@ -132,6 +134,7 @@ def test_the_proof_covers_the_scenery(whole, tmp_path):
     assert any("background not checked where scenery-yard" in note for note in report.notes)
 
 
+@pytest.mark.slow
 def test_what_cannot_stand_there_is_refused_in_one_line(files, tmp_path):
     def problem(scene, viewpoints=None):
         recipe = small_recipe(

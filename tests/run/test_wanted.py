@@ -39,6 +39,7 @@ def test_company_between_hides_as_much_as_is_wanted(tmp_path):
     assert not check(vs.Dataset(tmp_path / "a")).findings
 
 
+@pytest.mark.slow
 def test_models_are_cut_off_as_much_as_is_wanted(tmp_path):
     jitter = {"off_center": {"uniform": [[-0.6, -0.5], [0.6, 0.5]]}}
     generate(wanted(scene={"jitter": jitter}, wanted={"truncation": [0.2, 0.5]}), tmp_path / "a")

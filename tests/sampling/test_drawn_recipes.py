@@ -76,6 +76,7 @@ def test_focal_lengths_and_principal_points_may_be_drawn(camera, fx, fy):
     assert all(30 <= cx <= 34 for cx, _ in centres)
 
 
+@pytest.mark.slow
 def test_a_drawn_camera_is_recorded_with_each_sample_and_proved(tmp_path):
     recipe = small_recipe(camera={"size": [96, 72], "fov_deg": [30, 45], "principal_point": [[45, 50], 36]})
     vs.generate(recipe, tmp_path / "out")

@@ -109,6 +109,7 @@ def test_shots_are_added_to_a_data_set_that_has_others(rendered, tmp_path):
         np.testing.assert_array_equal(one.instances, other.instances)
 
 
+@pytest.mark.slow
 def test_a_camera_may_be_inside_of_scenery(tmp_path):
     line = shot(0, objects=1, split="train")
     line["objects"][0]["world_from_object"] = line["world_from_camera"]

@@ -74,6 +74,7 @@ def test_a_scene_is_the_same_however_many_there_are(by, views):
     assert {key: shot.scene for key, shot in few.items()} == {key: many[key].scene for key in few}
 
 
+@pytest.mark.slow
 def test_a_model_more_takes_one_place_at_most():
     before, after = (shots(vs.plan(recipe(40, models, splits={"by": "frame"}))) for models in (20, 21))
     changed = 0
@@ -233,6 +234,7 @@ def test_a_data_set_of_scenes_is_proved(dataset):
     assert 0 < len(chosen) <= 9 and all(first in {o.key for o in sample.objects} for sample in chosen)
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_counted_in_scenes(dataset, tmp_path):
     vs.generate(recipe(3, scenes={"objects": [1, 3]}), tmp_path / "out")
     gone = next((tmp_path / "out" / "store" / "shots").glob("*/*/manifest.json"))
@@ -269,6 +271,7 @@ def test_channels_are_added_to_scenes_of_the_same_models(tmp_path):
         vs.generate(recipe(scenes={}).model_copy(update={"scenes": None}), out, append=True)
 
 
+@pytest.mark.slow
 def test_preview_and_estimate_know_scenes():
     samples = list(preview_samples(recipe(3), 6))
     assert len({(sample.objects[0].key, sample.pose.azimuth_deg) for sample in samples}) == 6

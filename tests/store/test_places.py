@@ -143,6 +143,7 @@ def test_ranges_of_servers_that_have_none_or_end_before(url, monkeypatch):
     assert byte_range(file, 300, 20) == b""
 
 
+@pytest.mark.slow
 def test_a_rendered_data_set_is_the_same_at_a_url(few, url, monkeypatch):
     kind, written = fsspec.get_filesystem_class("memory"), {}
     works = kind.put_file

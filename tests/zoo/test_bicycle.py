@@ -230,7 +230,9 @@ def components(background: np.ndarray) -> Iterator[int]:
         yield size
 
 
-@pytest.mark.parametrize(("style", "spokes", "crosses"), [("road", 28, 3), ("mountain", 32, 3)])
+@pytest.mark.parametrize(
+    ("style", "spokes", "crosses"), [pytest.param("road", 28, 3, marks=pytest.mark.slow), ("mountain", 32, 3)]
+)
 def test_the_mask_has_a_hole_between_any_two_spokes(tmp_path: Path, style: str, spokes: int, crosses: int) -> None:
     p = straight(style)
     p = replace(p, wheel=replace(p.wheel, spokes=spokes, crosses=crosses))
@@ -265,6 +267,7 @@ def test_a_whole_bicycle_has_holes_in_its_frame_and_wheels(tmp_path: Path) -> No
     assert 0.5 * triangle < sizes[1] < 1.5 * triangle
 
 
+@pytest.mark.slow
 def test_one_seed_gives_one_mesh() -> None:
     a, b, other = drawn("bicycle", 4), zoo.build("bicycle", np.random.default_rng(4)), drawn("bicycle", 3)
     for name in ("vertices", "triangles", "normals", "triangle_material", "triangle_part"):
@@ -273,6 +276,7 @@ def test_one_seed_gives_one_mesh() -> None:
     assert a.vertices.tobytes() != other.vertices.tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [5, pytest.param(14, marks=pytest.mark.slow)])
 def test_draws_differ_in_shape_and_colour(count: int) -> None:
     meshes = [drawn("bicycle", seed) for seed in range(count)]

@@ -40,7 +40,7 @@ def at(piece) -> np.ndarray:
     return np.array(piece.world_from_piece)
 
 
-@pytest.mark.parametrize("name", ["room", "flat", "table_top"])
+@pytest.mark.parametrize("name", ["room", pytest.param("flat", marks=pytest.mark.slow), "table_top"])
 def test_a_seed_gives_one_layout_and_others_give_others(name: str) -> None:
     layouts = [place(name, seed) for seed in range(5)]
     assert place(name, 3) == layouts[3]

@@ -127,6 +127,7 @@ def test_the_ground_is_sound_and_the_roads_are_level(seed: int) -> None:
     assert mesh.vertices.tobytes() == town_ground(ground).vertices.tobytes()
 
 
+@pytest.mark.slow
 def test_the_country_begins_where_the_town_ends() -> None:
     ground = plugins.family("town_ground").draw(np.random.default_rng(4))
     land = drawn("outskirts", 4)

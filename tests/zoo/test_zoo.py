@@ -118,7 +118,7 @@ def test_a_drier_has_its_size_parts_and_sound_triangles(parameters: HairDrier) -
     assert outward_share(mesh) > 0.997
 
 
-@pytest.mark.parametrize("family", ["car", "hair_drier"])
+@pytest.mark.parametrize("family", [pytest.param("car", marks=pytest.mark.slow), "hair_drier"])
 def test_one_seed_gives_one_mesh(family: str) -> None:
     a, b, other = drawn(family, 4), zoo.build(family, np.random.default_rng(4)), drawn(family, 3)
     for name in ("vertices", "triangles", "normals", "triangle_material", "triangle_part"):
@@ -131,7 +131,7 @@ def test_one_seed_gives_one_mesh(family: str) -> None:
 @pytest.mark.parametrize(
     ("family", "ranges", "most"),
     [
-        ("car", ((1.75, 2.6), (1.38, 2.4), (3.6, 5.75)), 44_500),
+        pytest.param("car", ((1.75, 2.6), (1.38, 2.4), (3.6, 5.75)), 44_500, marks=pytest.mark.slow),
         ("hair_drier", ((0.07, 0.16), (0.2, 0.4), (0.1, 0.32)), 17_000),
     ],
 )
