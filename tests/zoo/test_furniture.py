@@ -21,7 +21,7 @@ from viewsphere.zoo.sofa import surfaces as surfaces_of_sofa
 from viewsphere.zoo.table import Table, table
 from viewsphere.zoo.television import Television, television
 from viewsphere.zoo.television import surfaces as surfaces_of_television
-from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
+from zoo_mesh import assert_sound, drawn, outward_share, part_vertices, seeds
 
 SIZES = {
     "bed": ((0.95, 2.7), (0.85, 2.1), (1.9, 2.6)),
@@ -51,7 +51,7 @@ PARTS = {
 
 SOFT = ("bed", "sofa")
 STANDS = tuple(name for name in SIZES if hasattr(plugins.family(name), "surfaces"))
-SEEDS = range(5)
+SEEDS = seeds(5)
 
 
 def parameters(family: str, seed: int):
@@ -87,7 +87,7 @@ def test_one_seed_gives_one_mesh(family: str) -> None:
 
 @pytest.mark.parametrize("family", SIZES)
 def test_furniture_shows_its_outside(family: str) -> None:
-    for seed in range(3):
+    for seed in seeds(3):
         assert outward_share(drawn(family, seed)) > 0.995
 
 

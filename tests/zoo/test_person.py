@@ -239,6 +239,7 @@ def test_the_recipe_makes_a_data_set_that_passes(walked):
         assert len(np.unique(sample.channels["body_parts"][own])) > 10
 
 
+@pytest.mark.slow
 def test_a_foot_that_is_down_stays_where_it_is_in_the_world(walked):
     places = []
     for sample in walked:

@@ -18,7 +18,7 @@ from viewsphere.zoo.townscape.lettering import lettering
 from viewsphere.zoo.traffic_cone import TrafficCone, traffic_cone
 from viewsphere.zoo.traffic_light import TrafficLight, traffic_light
 from viewsphere.zoo.truck import Truck, truck
-from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
+from zoo_mesh import assert_sound, drawn, outward_share, part_vertices, seeds
 
 SIZES = {
     "backpack": ((0.25, 0.5), (0.38, 0.9), (0.25, 0.65)),
@@ -51,7 +51,7 @@ STYLES = {
 
 @pytest.mark.parametrize("family", SIZES)
 def test_draws_are_sound_of_real_size_and_differ(family: str) -> None:
-    meshes = [drawn(family, seed) for seed in range(4)]
+    meshes = [drawn(family, seed) for seed in seeds(4)]
     for mesh in meshes:
         assert_sound(mesh, MOST.get(family, 8_000), least=150)
         assert mesh.uv0 is None or (np.isfinite(mesh.uv0).all() and all(i.pixels.shape[0] <= 512 for i in mesh.images))
