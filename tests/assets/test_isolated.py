@@ -105,14 +105,16 @@ def test_a_reader_says_what_is_wrong(spec, write):
 @pytest.mark.parametrize(
     ("body", "said"),
     [
-        ("import os; os.abort()", "reading it crashed (SIGABRT)"),
+        pytest.param("import os; os.abort()", "reading it crashed (SIGABRT)", marks=pytest.mark.slow),
         ("import ctypes; ctypes.string_at(0)", "reading it crashed (SIGSEGV)"),
         ("import os; os.kill(os.getpid(), 9)", "reads it ended unexpectedly: it was killed (SIGKILL), perhaps"),
-        ("import os; os.kill(os.getpid(), 15)", "try again with more memory free, or fewer --workers"),
-        ("import os; os._exit(3)", "reading it crashed (exit code 3)"),
-        ("raise SystemExit('no\\nmore')", "the process that reads it failed (more)"),
+        pytest.param(
+            "import os; os.kill(os.getpid(), 15)", "try again with more memory free, or fewer --workers", marks=pytest.mark.slow
+        ),
+        pytest.param("import os; os._exit(3)", "reading it crashed (exit code 3)", marks=pytest.mark.slow),
+        pytest.param("raise SystemExit('no\\nmore')", "the process that reads it failed (more)", marks=pytest.mark.slow),
         ("raise TypeError('a\\nb')", "its reader failed (TypeError: a b)"),
-        ("f = lambda x: f(x) + 1; f(0)", "within one another (recursion)"),
+        pytest.param("f = lambda x: f(x) + 1; f(0)", "within one another (recursion)", marks=pytest.mark.slow),
     ],
 )
 def test_a_crash_costs_one_message(spec, reader, body, said):

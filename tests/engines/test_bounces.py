@@ -10,6 +10,7 @@ import pytest
 from light_stage import ball
 from test_raster import BLACK, DARK, SPEC, box, camera, mesh_of, rectangle
 
+from quick import quick
 from shots import painted, still_shot
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines import raster
@@ -291,7 +292,7 @@ def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():
     assert near < 1.15 * far
 
 
-@pytest.mark.parametrize("window", [True, False])
+@pytest.mark.parametrize("window", quick([True, False], True))
 def test_a_dark_room_beside_a_lit_one_stays_dark(window, monkeypatch):
     """A partition of 10 cm, less than half of what lies between probes; without a window a lamp stands in the first room."""
     monkeypatch.setattr(lightmaps, "CELL", 0.1)

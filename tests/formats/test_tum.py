@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cube_dataset import LENS, make
 from proven import close, equal
+from quick import quick
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
@@ -62,7 +63,7 @@ def compare(sample, steps, points, rays, kind):
     assert np.abs(points - cloud).max() < 2e-4
 
 
-@pytest.mark.parametrize("world", ["stills", "poses", "videos"])
+@pytest.mark.parametrize("world", quick(["stills", "poses", "videos"], "stills", "poses"))
 def test_depth_lifts_to_the_worlds_points(world, request, tmp_path):
     dataset = request.getfixturevalue(world)
     folder = written(dataset, tmp_path)

@@ -13,6 +13,7 @@ import pytest
 
 import viewsphere as vs
 from counting import counted
+from quick import quick
 from small import ROOT, small_recipe, tree_hash
 from viewsphere import plugins
 from viewsphere.check import check
@@ -64,7 +65,10 @@ def test_a_number_is_short_for_so_many_scenes():
     assert small_recipe().sampler == "product"
 
 
-@pytest.mark.parametrize(("by", "views"), [("model", None), ("model", 2), ("pose", 2), ("place", None), ("frame", 2)])
+@pytest.mark.parametrize(
+    ("by", "views"),
+    quick([("model", None), ("model", 2), ("pose", 2), ("place", None), ("frame", 2)], ("model", 2), ("place", None)),
+)
 def test_a_scene_is_the_same_however_many_there_are(by, views):
     more = {"splits": {"by": by, "train": 0.5, "val": 0.5}, "scenes": {"views": views}}
     more |= {"scene": {"place": {"source": "zoo:neighbourhood", "draw": "per_model"}, "sun": {"azimuth_deg": [0, 360]}}}
@@ -300,7 +304,7 @@ def test_the_sampler_in_the_docs_is_one_file(monkeypatch):
     assert [len(sample.objects) for sample in vs.render(pairs)] == [2] * 4
 
 
-@pytest.mark.parametrize(("models", "poses"), [(1, 10**8), (1000, 10**5)])
+@pytest.mark.parametrize(("models", "poses"), quick([(1, 10**8), (1000, 10**5)], (1, 10**8)))
 @pytest.mark.parametrize("by", ["model", "frame"])
 def test_a_hundred_million_frames_are_planned_in_little_memory(models, poses, by, tmp_path):
     big = small_recipe(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from quick import quick
 from viewsphere import zoo
 from viewsphere.assets.glb import glb_bytes
 from viewsphere.zoo.bicycle import STYLES, Bicycle, bicycle, draw
@@ -107,7 +108,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", quick(OTHERS, "road", "shock", "case"))
 def test_a_bicycle_is_sound_and_shows_its_outside(name: str) -> None:
     mesh = built(OTHERS[name])
     assert_sound(mesh, MOST)
