@@ -105,6 +105,7 @@ def clone(tmp_path):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("git") is None, reason="no git")
 def test_the_version_is_the_tag_s(clone, tmp_path):
     assert re.fullmatch(r"0\.0\.1\.dev1\+g[0-9a-f]+", hatch("version", folder=clone))

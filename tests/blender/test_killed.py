@@ -84,12 +84,14 @@ def test_nothing_of_it_is_kept(dying, file, tmp_path):
         assert len(started.read_text()) == count
 
 
+@pytest.mark.slow
 def test_a_script_that_starts_blender_tells_the_signal(dying, file):
     python = dying("KILL")
     python.write_text(python.read_text().replace("exec ", "") + "\nexit $?\n")
     assert refused("model", file).startswith(SAID.format(how="KILL"))
 
 
+@pytest.mark.slow
 def test_a_crash_of_its_own_may_be_the_file_s(dying, file):
     dying("SEGV")
     assert refused("model", file).startswith("reading it crashed (Blender died (signal SIGSEGV) after")

@@ -155,6 +155,7 @@ def test_what_stands_still_is_drawn_once():
     assert sum(len(part().triangles) for part in maps[0].still) + 12 == len(stage.at(0).triangles)
 
 
+@pytest.mark.slow
 def test_what_is_in_no_picture_has_no_rows_but_casts_shadows():
     """A wall behind the camera, which shades the ground before it, beside one that is looked at."""
     behind = Motion.still(((1, 0, 0, 0.0), (0, 1, 0, -8.0), (0, 0, 3, 1.0), (0, 0, 0, 1)))

@@ -167,6 +167,7 @@ def test_broken_files_are_told(tree, tmp_path):
         read(tree)
 
 
+@pytest.mark.slow
 def test_models_come_in_and_go_out(stills, exported, imported, tmp_path):
     known = {model.key: model for model in stills.models}
     assert [model.key for model in imported.models] == list(known)

@@ -229,6 +229,7 @@ def test_the_rest_of_info(people, clips):
     assert {clip.parts[-4] for clip in clips} == {"train", "val"}
 
 
+@pytest.mark.slow
 def test_videos_show_the_pictures(clips):
     for clip, samples in clips.items():
         frames = ffmpeg.read_frames(f"{clip}.mp4")

@@ -79,7 +79,7 @@ def test_depth_lifts_to_the_worlds_points(world, request, tmp_path):
         compare(sample, *lifted(own, pair[3], pose), "tum")
 
 
-@pytest.mark.parametrize("world", ["stills", "videos"])
+@pytest.mark.parametrize("world", quick(["stills", "videos"], "stills"))
 def test_icl_nuim_is_mirrored(world, request, tmp_path):
     dataset = request.getfixturevalue(world)
     folder = written(dataset, tmp_path, "icl-nuim")
@@ -108,6 +108,7 @@ def test_seconds_ascend_in_every_sequence(videos, tmp_path):
         assert all(len(row) == 8 for row in rows(file))
 
 
+@pytest.mark.slow
 def test_lenses_and_what_it_refuses(tmp_path):
     def made(name, **lens):
         return make(tmp_path / name, intrinsics=LENS.model_copy(update=lens))

@@ -232,6 +232,7 @@ def test_check_finds_times_that_are_not_those_of_the_sweep(tmp_path):
     assert "lidar" in {finding.check for finding in check(Dataset(out), rays=False).findings}
 
 
+@pytest.mark.slow
 def test_points_are_drawn_from_above():
     """Ahead at the top; a preview shows them beside the camera's picture."""
     car = {"source": "zoo:car", "category": "car", "scale": {"length": 1.8}}

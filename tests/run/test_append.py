@@ -511,6 +511,7 @@ def test_without_the_option_another_recipe_is_refused_with_a_hint(out):
     assert state(out) == before
 
 
+@pytest.mark.slow
 def test_two_appends_at_once_do_not_mix(out):
     other = recipe(models=models(4))
 
@@ -610,6 +611,7 @@ def moving_recipe(viewpoints, **changes):
     return vs.Recipe.model_validate({**said, **changes})
 
 
+@pytest.mark.slow
 def test_appended_sequences_have_names_of_their_own(tmp_path):
     generate(moving_recipe({"azimuth": 30}), tmp_path / "out", workers=0)
     for azimuth in ([90, 30], 60):

@@ -285,6 +285,7 @@ def test_equal_models_merge_and_others_stay_apart(folder):
         assert report.ok, report
 
 
+@pytest.mark.slow
 def test_a_time_step_has_the_key_of_no_other_model(folder):
     (folder / "walker-f0013.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n")
     still = {"source": str(folder / "walker-f0013.obj"), "category": "sheet"}

@@ -101,6 +101,7 @@ def test_appending_keeps_the_options_of_the_exports_that_are_there(tmp_path):
     assert is_proved(tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_changed_options_are_damage(small_dataset):
     file = small_dataset.root / "coco" / "checksums.xxh128"
     text = file.read_text()

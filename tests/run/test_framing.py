@@ -269,6 +269,7 @@ def test_a_merged_data_set_has_the_highest_threshold(tmp_path):
     assert not check(dataset).findings
 
 
+@pytest.mark.slow
 def test_only_frames_of_the_recipe_are_counted_as_hidden(tmp_path):
     views = {"kind": "jitter", "azimuth": 0, "elevation": 0, "distance": 2.5, "plus_minus": {"azimuth": 3}}
     row = {"company": {"layout": [[0, -0.6, 0], [0.6, 0.6, 0]], "gap": 0}, "ground": "off"}

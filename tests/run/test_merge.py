@@ -183,6 +183,7 @@ def test_channels_that_were_not_added_to_the_end_are_an_unfinished_data_set(sour
     assert not (tmp_path / "e").exists()
 
 
+@pytest.mark.slow
 def test_one_model_in_two_categories_is_two_models(sources, tmp_path):
     letter_box = {"source": "zoo:post_box", "category": "letter box", "count": 1, "scale": {"length": 0.18}}
     viewpoints = {"azimuth": 30, "elevation": 15, "distance": 1.0}
@@ -213,6 +214,7 @@ def test_scenery_goes_along(tmp_path):
     assert not any("surface" in note for note in report.notes)
 
 
+@pytest.mark.slow
 def test_names_that_sentences_tell_are_not_respelled(tmp_path):
     for name, spelled in (("a", "bin"), ("b", "Bin")):
         generate(

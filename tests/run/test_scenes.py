@@ -62,6 +62,7 @@ def whole(files, tmp_path_factory):
     return recipe, Dataset(out)
 
 
+@pytest.mark.slow
 def test_a_scene_is_rendered_checked_and_resumed(files, whole):
     recipe, dataset = whole
     report = check(dataset)
@@ -171,6 +172,7 @@ def test_what_cannot_stand_there_is_refused_in_one_line(files, tmp_path):
         list(render(small_recipe(scene={"place": str(tmp_path / "bad.glb")})))
 
 
+@pytest.mark.slow
 def test_a_model_left_out_takes_the_shots_it_would_be_in_with_it(files, tmp_path):
     (tmp_path / "bad.obj").write_text("nothing")
     (tmp_path / "good.glb").write_bytes(glb_bytes(blocks(((-0.1, -0.2, 0), (0.1, 0.2, 0.2)))))

@@ -63,6 +63,7 @@ def test_what_is_looked_at_is_where_the_recipe_says(distance):
         np.testing.assert_allclose(a.camera.R, b.camera.R, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_had_is_told_with_how_near_it_came(tmp_path):
     summary = generate(wanted(models=[{**BOX[0], "count": 1}], wanted={"visibility": [0.1, 0.2]}), tmp_path)
     (note,) = (note for note in summary.notes if "wanted" in note)

@@ -223,6 +223,7 @@ def dataset(tmp_path_factory):
     return vs.open(out)
 
 
+@pytest.mark.slow
 def test_a_data_set_of_scenes_is_proved(dataset):
     report = check(dataset)
     assert report.ok, report.findings
@@ -260,6 +261,7 @@ def test_workers_appending_and_memory_make_the_same_pictures(dataset, tmp_path):
     assert check(added, rays=False).ok
 
 
+@pytest.mark.slow
 def test_channels_are_added_to_scenes_of_the_same_models(tmp_path):
     out = tmp_path / "out"
     vs.generate(recipe(2, channels=["rgb"], scenes={"objects": 2}), out)

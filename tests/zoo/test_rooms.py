@@ -162,6 +162,7 @@ def test_the_free_floor_is_free_and_cameras_have_room_around_it(name: str) -> No
                 assert not inside.any(), piece.name
 
 
+@pytest.mark.slow
 def test_the_table_top_is_the_floor_and_empty() -> None:
     for seed in range(4):
         made = place("table_top", seed)
