@@ -13,7 +13,7 @@ from hypothesis import settings
 from deadline import DEADLINE
 from small import small_recipe
 
-EXAMPLES = 100 if os.environ.get("CI") == "true" else 25
+EXAMPLES = 100 if os.environ.get("CI") == "true" else 10
 """That each property is tried with, but where it says so itself; CI has the time for more."""
 
 ARGUMENTS = (
