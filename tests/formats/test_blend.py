@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cube_dataset import make
+from cube_dataset import FEW, make
 from small import small_recipe
 from viewsphere import Dataset, generate, plan, plugins
 from viewsphere.assets.cache import load_normalised
@@ -89,7 +89,7 @@ def test_the_models_are_the_stores(asked, small_run, tmp_path):
 
 
 def test_a_data_set_without_scenes_is_lit_anyhow(asked, tmp_path):
-    dataset = make(tmp_path / "blocks", several=True, short=False)
+    dataset = make(tmp_path / "blocks", several=True, short=False, channels=FEW)
     assert dataset.store.shot("several-000000") is None
     export(dataset.root, ["blend"])
     (told,) = asked.values()
@@ -187,7 +187,7 @@ def test_frames_that_cannot_be_staged_are_one_line(asked, foreign, tmp_path):
 
 
 def test_frames_that_are_left_out_and_unknown_light_are_notes(asked, tmp_path):
-    dataset = make(tmp_path / "blocks", several=True, short=False)
+    dataset = make(tmp_path / "blocks", several=True, short=False, channels=FEW)
     file = dataset.store.shot_folder("several-000000") / "frames.json"
     records = json.loads(file.read_text())
     for o in records[0]["objects"]:
@@ -245,7 +245,7 @@ def test_without_blender_nothing_is_rendered(monkeypatch, tmp_path):
 @pytest.mark.parametrize("elevation", [-90.0, -30.0, 0.0, 75.0, 90.0])
 def test_the_rig_stands_where_the_camera_does(elevation, tilt, tmp_path):
     """Blender's rotations, X then Z, and the camera's own about its axis, are the sample's camera."""
-    dataset = make(tmp_path / "blocks")
+    dataset = make(tmp_path / "blocks", channels=FEW)
     sample = dataset[1]
     angles = np.radians([200.0, elevation, tilt])
     rotation = orbit_rotation(*angles)

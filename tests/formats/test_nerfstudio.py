@@ -12,7 +12,7 @@ import pytest
 import trimesh
 from PIL import Image
 
-from cube_dataset import LENS, make
+from cube_dataset import FEW, LENS, make
 from proven import close, equal
 from quick import quick
 from small import small_recipe
@@ -148,7 +148,9 @@ def test_lenses(name, kind, tmp_path):
     distortion = LENSES[name]
     if name == "barrel" and kind == "instant-ngp":
         distortion = distortion.model_copy(update={"coefficients": distortion.coefficients[:4]})
-    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": distortion, "cx": 47.25}))
+    dataset = make(
+        tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": distortion, "cx": 47.25}), channels=FEW
+    )
     found = everything(written(dataset, tmp_path / "made", kind=kind), kind)
     for sample in dataset:
         points = np.random.default_rng(sample.index).uniform(-0.5, 0.5, (200, 3))
@@ -193,7 +195,7 @@ def test_drawn_lenses(tmp_path):
     ],
 )
 def test_what_it_refuses(lens, options, message, tmp_path):
-    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update=lens))
+    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update=lens), channels=FEW)
     with pytest.raises(UserError, match=f"format nerfstudio: .*{message}"):
         written(dataset, tmp_path / "made", **options)
     assert not (tmp_path / "made").exists()
@@ -230,7 +232,7 @@ def test_lenses_come_in(name, kind, tmp_path):
     bent = LENSES[name]
     if name == "barrel" and kind == "instant-ngp":
         bent = bent.model_copy(update={"coefficients": bent.coefficients[:4]})
-    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": bent}))
+    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": bent}), channels=FEW)
     import_dataset("nerfstudio", written(dataset, tmp_path / "made", kind=kind) / "several", tmp_path / "in")
     for sample in Dataset(tmp_path / "in"):
         assert sample.camera.distortion == bent

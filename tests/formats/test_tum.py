@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from cube_dataset import LENS, make
+from cube_dataset import FEW, LENS, make
 from proven import close, equal
 from quick import quick
 from small import small_recipe
@@ -111,7 +111,7 @@ def test_seconds_ascend_in_every_sequence(videos, tmp_path):
 @pytest.mark.slow
 def test_lenses_and_what_it_refuses(tmp_path):
     def made(name, **lens):
-        return make(tmp_path / name, intrinsics=LENS.model_copy(update=lens))
+        return make(tmp_path / name, intrinsics=LENS.model_copy(update=lens), channels=FEW)
 
     barrel = made("barrel", distortion=LENSES["barrel"])
     for file in written(barrel, tmp_path / "made").rglob("calibration.txt"):
@@ -161,7 +161,9 @@ def test_a_sequence_comes_in_as_it_went_out(videos, kind, tmp_path):
 
 
 def test_lenses_come_in(tmp_path):
-    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": LENSES["barrel"]}))
+    dataset = make(
+        tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": LENSES["barrel"]}), channels=FEW
+    )
     import_dataset("tum", written(dataset, tmp_path / "made") / "several", tmp_path / "in")
     assert all(sample.camera.distortion == LENSES["barrel"] for sample in Dataset(tmp_path / "in"))
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from command_line import viewsphere
-from cube_dataset import make
+from cube_dataset import FEW, make
 from sealing import seal_again
 from viewsphere.check import check
 from viewsphere.codecs.png_tiff import decode_png, encode_png
@@ -28,7 +28,6 @@ from viewsphere.store.texts import parsed
 from viewsphere.urls.inside import is_inside
 
 SECRET = b"nobody's business"
-FEW = ("rgb", "depth", "instances")
 OUT = "../../../../../../"
 """Up from any folder of a store, to where the tests keep their data sets, and further."""
 
