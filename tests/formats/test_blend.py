@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cube_dataset import FEW, make
+from quick import quick
 from small import small_recipe
 from viewsphere import Dataset, generate, plan, plugins
 from viewsphere.assets.cache import load_normalised
@@ -242,7 +243,7 @@ def test_without_blender_nothing_is_rendered(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("tilt", [0.0, -20.0, 110.0])
-@pytest.mark.parametrize("elevation", [-90.0, -30.0, 0.0, 75.0, 90.0])
+@pytest.mark.parametrize("elevation", quick([-90.0, -30.0, 0.0, 75.0, 90.0], -90.0, -30.0))
 def test_the_rig_stands_where_the_camera_does(elevation, tilt, tmp_path):
     """Blender's rotations, X then Z, and the camera's own about its axis, are the sample's camera."""
     dataset = make(tmp_path / "blocks", channels=FEW)
