@@ -78,7 +78,7 @@ FITS = [
 @pytest.fixture(scope="module")
 def ramp_files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ramps")
-    large = write(folder / "ramps.jpg", ramps(3600, 2400), quality=95)
+    large = write(folder / "ramps.jpg", ramps(1800, 1200), quality=95)
     return {"png": write(folder / "ramps.png", ramps(900, 600)), "jpg": large}
 
 

@@ -123,6 +123,7 @@ def proved(shot: Shot, samples) -> None:
             assert np.abs(seen - sample.depth[o.mask]).max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHOTS)
 def test_labels_of_what_moves_and_of_every_sensor_are_what_embree_sees(name):
     shot = SHOTS[name]()

@@ -100,6 +100,7 @@ def test_a_shard_that_finds_all_finished_writes_only_exports_that_lack_something
     assert tree_hash(out) == whole
 
 
+@pytest.mark.slow
 def test_what_shards_left_out_is_what_one_run_leaves_out(tmp_path):
     (tmp_path / "models").mkdir()
     good = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
