@@ -215,6 +215,7 @@ def room(reflectance: float, window: bool = True, partition: bool = False) -> Me
     return mesh_of(np.concatenate([box(*solid) for solid in solids + front]), matt(reflectance))
 
 
+@pytest.mark.slow
 def test_light_through_a_window_is_less_than_the_sky():
     """No place of a room under a sky of radiance 1 is brighter than that sky, and where more is reflected more bounces."""
     places, normals = walls((0, 0, 0), (4, 3, 2.4))
@@ -274,6 +275,7 @@ def test_no_ring_shows_where_probes_end():
     assert np.abs(np.diff(row) / row[1:]).max() < 0.015
 
 
+@pytest.mark.slow
 def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():
     """A probe within it, a little below the ceiling that closes it, knows nothing of the ceiling beside it."""
     small = mesh_of(box((3.0, 1.0, 0.5), (3.2, 1.2, 0.7)), matt(0.5))

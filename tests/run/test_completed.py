@@ -69,6 +69,7 @@ def test_what_cannot_be_computed_is_told(tmp_path):
         lacking(dataset, module, FormatEntry(name="yolo"))
 
 
+@pytest.mark.slow
 def test_exports_of_few_channels_are_those_of_many(few, tmp_path, tmp_path_factory):
     whole = Dataset(rendered("stills", shared_place(tmp_path_factory)))
     for root, place in ((whole.root, "whole"), (few, "computed")):
@@ -102,6 +103,7 @@ def test_parts_of_which_only_some_keep_a_label_are_completed(tmp_path):
         assert len(list((tmp_path / f"{name} out" / "tum").rglob("depth/*.png"))) == 8
 
 
+@pytest.mark.slow
 def test_what_an_unfinished_neighbour_would_tell_is_asked_for(few_moving, tmp_path):
     dataset = Dataset(shutil.copytree(few_moving, tmp_path / "few"))
     second = [key for key, _ in dataset.shots()][1]
