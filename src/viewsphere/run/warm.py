@@ -10,6 +10,7 @@ import sys
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,8 +79,9 @@ def _caches() -> set[str]:
     """Folders that hold the kernels of the modules which this process has imported."""
     from numba.core.dispatcher import Dispatcher  # takes long to load; who renders has it
 
-    known = (value for module in list(sys.modules.values()) for value in list(vars(module).values()))
-    return {path for kernel in known if isinstance(kernel, Dispatcher) and (path := kernel.stats.cache_path)}
+    modules = [vars(module) for module in list(sys.modules.values()) if isinstance(module, ModuleType)]
+    known = (value for names in modules for value in list(names.values()) if issubclass(type(value), Dispatcher))
+    return {path for kernel in known if (path := kernel.stats.cache_path)}
 
 
 @contextmanager
