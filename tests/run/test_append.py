@@ -326,7 +326,8 @@ def stop_in(phase, done):
     return listen
 
 
-@pytest.mark.parametrize("append", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.slow
+@pytest.mark.parametrize("append", [True, False])
 def test_an_interrupted_append_goes_on_with_and_without_the_option(append, bigger, out):
     with pytest.raises(Stopped):
         generate(recipe(**BIGGER), out, append=True, listener=stop_in("frames", 18))
@@ -624,6 +625,7 @@ def test_appended_sequences_have_names_of_their_own(tmp_path):
     assert report.ok, report.findings
 
 
+@pytest.mark.slow
 def test_another_motion_of_the_camera_is_another_sequence(tmp_path):
     for distance in (1.5, 2.5):
         orbit = moving_recipe({"kind": "orbit", "elevation": 20, "distance": distance})

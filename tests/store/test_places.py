@@ -111,6 +111,7 @@ def test_nothing_is_done_to_the_disk_by_mistake(url):
     assert not hasattr(located(url), "rename")
 
 
+@pytest.mark.slow
 def test_data_sets_on_a_disk_need_no_fsspec(few):
     code = f"import sys, viewsphere; viewsphere.open({str(few)!r})[0].rgb; print('fsspec' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
