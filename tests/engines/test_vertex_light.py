@@ -117,6 +117,7 @@ def read_at(points: np.ndarray) -> np.ndarray:
     return points[:, 1:10] / points[:, :1]
 
 
+@pytest.mark.slow
 def test_what_is_within_a_thing_takes_no_site_from_what_is_seen():
     walls, within = inside_out(box((-1.0, -0.8, -0.6), (1.0, 0.8, 0.6))), corners_of(ball(0.2, (0.0, 0.0, 0.0)))
     deeper = corners_of(ball(0.195, (0.0, 0.0, 0.0)))

@@ -109,6 +109,7 @@ def test_draws_differ_and_one_seed_gives_the_same_bytes():
 # The rig.
 
 
+@pytest.mark.slow
 def test_joints_are_smpls_in_surreals_order():
     assert JOINTS == SMPL
     assert all(above < number for number, above in enumerate(PARENTS))
@@ -253,6 +254,7 @@ def test_a_foot_that_is_down_stays_where_it_is_in_the_world(walked):
     assert (moved < 0.02).all() and (hips > 0.1).all()
 
 
+@pytest.mark.slow
 def test_surreals_format_takes_its_joints_and_parts(walked, tmp_path):
     pytest.importorskip("scipy")
     from viewsphere.formats.surreal.body import joints, part_numbers
