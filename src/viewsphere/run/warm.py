@@ -77,10 +77,10 @@ def _kernels(folder: Path) -> list[str]:
 
 def _caches() -> set[str]:
     """Folders that hold the kernels of the modules which this process has imported."""
-    from numba.core.dispatcher import Dispatcher  # takes long to load; who renders has it
+    from numba.extending import is_jitted  # takes long to load; who renders has it
 
     modules = [vars(module) for module in list(sys.modules.values()) if isinstance(module, ModuleType)]
-    known = (value for names in modules for value in list(names.values()) if issubclass(type(value), Dispatcher))
+    known = (value for names in modules for value in list(names.values()) if is_jitted(value))
     return {path for kernel in known if (path := kernel.stats.cache_path)}
 
 
