@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import signal
@@ -12,7 +13,7 @@ from hypothesis import settings
 from deadline import DEADLINE
 from small import small_recipe
 
-EXAMPLES = 100 if os.environ.get("CI") == "true" else 25
+EXAMPLES = 100 if os.environ.get("CI") == "true" else 10
 """That each property is tried with, but where it says so itself; CI has the time for more."""
 
 ARGUMENTS = (
@@ -45,6 +46,12 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if "blender" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.slow)
+
+
+def pytest_collection_finish():
+    """What thousands of tests are made of stays to the end: the garbage collector need not look at it again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

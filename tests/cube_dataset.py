@@ -34,6 +34,8 @@ from viewsphere.truth.visibility import rasterize
 HALVES = ((0, 1, 2), (0, 2, 3))
 TRIANGLES = np.array([[face[i] for i in half] for face in FACES.values() for half in HALVES], np.int32)
 CHANNELS = still_channels()
+FEW = ("rgb", "depth", "instances")
+"""For tests of what is in none of the others, which take half the time."""
 PLAIN = Files()
 LENS = Intrinsics(width=96, height=72, fx=80, fy=80, cx=48, cy=36)
 CATEGORIES = (Category(1, "hair_drier", "appliance"), Category(2, "gizmo", ""), Category(3, "car", "vehicle"))

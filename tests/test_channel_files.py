@@ -262,6 +262,7 @@ def test_it_is_imported_and_merged(small_run, other_run, tmp_path):
     np.testing.assert_array_equal(both[12].depth, made[0].depth)
 
 
+@pytest.mark.slow
 def test_appended_frames_and_channels_may_have_other_files(tmp_path):
     out, poses = tmp_path / "out", {"azimuth": [0, 120], "elevation": 15, "distance": 1.0}
     generate(small_recipe(channels=["rgb", "depth"], viewpoints=poses), out, formats=["coco"])

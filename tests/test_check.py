@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import viewsphere.check
-from cube_dataset import LENS, make
+from cube_dataset import FEW, LENS, make
 from sealing import seal_again
 from small import small_recipe
 from viewsphere import generate
@@ -42,10 +42,16 @@ def whole_records(tmp_path_factory):
     return make(tmp_path_factory.mktemp("check") / "out", ground=True, short=False)
 
 
+@pytest.fixture(scope="module")
+def few_channels(tmp_path_factory):
+    """Whole records, and beside them only what they are proved by."""
+    return make(tmp_path_factory.mktemp("check") / "out", ground=True, short=False, channels=FEW)
+
+
 @pytest.fixture
-def spelled(whole_records, tmp_path):
+def spelled(few_channels, tmp_path):
     """A copy whose records say everything, as those of data sets that were merged do; so it has no shots."""
-    return Dataset(shutil.copytree(whole_records.root, tmp_path / "spelled"))
+    return Dataset(shutil.copytree(few_channels.root, tmp_path / "spelled"))
 
 
 def failures(dataset, **options):

@@ -78,6 +78,7 @@ def test_the_paper_s_plans(name, poses, frames):
     assert f"{poses:,} poses = {frames:,} frames" in run.stdout
 
 
+@pytest.mark.slow
 def test_render_export_check_preview(tmp_path):
     recipe = tmp_path / "recipe.yaml"
     recipe.write_text(small_recipe(viewpoints={"azimuth": [0, 90], "elevation": [20], "distance": 1.0}).to_yaml())

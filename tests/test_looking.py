@@ -290,6 +290,7 @@ def test_keys_of_drawings_are_the_colours_that_are_drawn():
     assert len({color for _, color in known["flow_state"].key}) == 5
 
 
+@pytest.mark.slow
 def test_what_an_unfinished_data_set_lacks_is_said(tmp_path):
     sensors = {"left": {}, "right": {"position": [0.1, 0, 0], "channels": ["rgb"]}}
     made = eventful_recipe(

@@ -176,6 +176,7 @@ def test_memory_is_a_few_times_what_the_file_unpacks_to():
     assert peak(of(flags(2), none, A, element(5, 1, code="i"), fields)) < 6 * count
 
 
+@pytest.mark.slow
 def test_a_bomb_is_not_unpacked():
     bomb = zlib.compress(bytes(MOST_BYTES * 50), 9)
     data = b"MATLAB 5.0".ljust(124) + b"\0\1IM" + struct.pack("<II", 15, len(bomb)) + bomb

@@ -51,6 +51,7 @@ def tracked(*folders):
 needs_git = pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="no clone")
 
 
+@pytest.mark.slow
 @needs_git
 def test_the_wheel_holds_the_package_and_nothing_else(archives):
     packed, _, _ = archives
@@ -61,12 +62,14 @@ def test_the_wheel_holds_the_package_and_nothing_else(archives):
     assert told == {"METADATA", "WHEEL", "RECORD", "entry_points.txt", *licences}
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_what_is_no_code(archives):
     packed, _, _ = archives
     assert {"viewsphere/py.typed", "viewsphere/recipe/starts/poses/recipe.yaml"} <= packed
     assert any(name.startswith("viewsphere/report/web/") and name.endswith(".js") for name in packed)
 
 
+@pytest.mark.slow
 @needs_git
 def test_the_sdist_holds_what_tests_and_docs_need(archives):
     _, source, _ = archives
@@ -74,11 +77,13 @@ def test_the_sdist_holds_what_tests_and_docs_need(archives):
     assert {name for name in tracked("src", "tests", "docs", "recipes", "scripts") if (ROOT / name).exists()} <= source
 
 
+@pytest.mark.slow
 def test_no_archive_holds_what_is_made(archives):
     for names in archives[:2]:
         assert not [name for name in names if set(PurePosixPath(name).parts) & set(NOT_SHIPPED)]
 
 
+@pytest.mark.slow
 def test_the_metadata_names_the_pythons_that_are_tried(archives):
     told = archives[2]
     assert "Requires-Python: >=3.11" in told
@@ -100,6 +105,7 @@ def clone(tmp_path):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("git") is None, reason="no git")
 def test_the_version_is_the_tag_s(clone, tmp_path):
     assert re.fullmatch(r"0\.0\.1\.dev1\+g[0-9a-f]+", hatch("version", folder=clone))

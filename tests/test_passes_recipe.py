@@ -25,16 +25,19 @@ def dataset(tmp_path_factory):
     return vs.open(out)
 
 
+@pytest.mark.slow
 def test_passes_are_stored_and_proved(dataset):
     assert check(dataset, sample=1).ok
     assert {*NAMES} <= {*dataset[0].channels}
 
 
+@pytest.mark.slow
 def test_passes_are_drawn(dataset):
     assert draw_sample(dataset[0], NAMES).shape == (72, 96 * (1 + len(NAMES)), 3)
     assert {*NAMES} <= {*layers(dataset[0], SCALES[-1])}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "wrong"), [("albedo", 1.5), ("shading", -0.1), ("roughness", np.nan), ("residual", np.inf)])
 def test_what_is_no_light_or_share_is_found(dataset, name, wrong):
     array = np.array(dataset[0].channels[name])

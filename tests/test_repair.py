@@ -136,6 +136,7 @@ def test_a_picture_spoilt_in_store_and_exports_alike(small_run, spoilt, workers)
     assert tree_hash(spoilt) == tree_hash(small_run)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["coco", "native"])
 def test_a_damaged_export_is_written_again(small_run, spoilt, name):
     file = next((spoilt / name).rglob("*.json"))
@@ -164,6 +165,7 @@ def with_files(root, **changes):
     return root / "out"
 
 
+@pytest.mark.slow
 def test_a_recipe_s_folder_is_found_by_its_models(tmp_path):
     out = with_files(tmp_path)
     whole = tree_hash(out)
@@ -246,6 +248,7 @@ def test_exports_are_left_alone_while_frames_are_lost(small_run, tmp_path):
     assert tree_hash(tmp_path / "out" / "coco") == exported
 
 
+@pytest.mark.slow
 def test_a_shot_without_records_is_made_again(small_run, spoilt):
     file = sorted(spoilt.glob("store/shots/*/*/frames.json"))[0]
     file.write_text("{}")

@@ -56,6 +56,7 @@ def test_failures_cost_what_they_cost_in_the_mean():
     assert all(course.lost > 0 for course in courses)
 
 
+@pytest.mark.slow
 @given(
     shots=st.integers(1, 200),
     seconds=st.lists(st.floats(0.1, 50), min_size=1, max_size=5),

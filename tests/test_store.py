@@ -118,6 +118,7 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
         assert {p.name for p in writing.iterdir()} == {alive.name, "otherhost~1~x"}
 
 
+@pytest.mark.slow
 def test_runs_that_replace_one_folder_at_once_do_not_hinder_one_another(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())

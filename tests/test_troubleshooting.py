@@ -224,6 +224,7 @@ def test_a_data_set_s_message(said, small_run, words):
     assert_shown(words, said(ON_DATA[words]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", sorted(IN_THE_SOURCE))
 def test_a_message_of_the_source(words, templates):
     expected = re.compile(pattern(heading_with(words)))

@@ -46,9 +46,8 @@ def load(kind: Kind, name: str) -> Any:
     for entry in entry_points(group=f"viewsphere.{kind}"):
         if entry.name == name:
             return entry.load()
-    known = names(kind)
-    if name not in known:
-        raise _unknown(kind[:-1], name, known)
+    if name.startswith("_") or name not in (own for own, _ in _listed(PACKAGES[kind])):
+        raise _unknown(kind[:-1], name, names(kind))
     return importlib.import_module(f"{PACKAGES[kind]}.{name}")
 
 

@@ -120,6 +120,7 @@ def test_normalising_an_exported_glb_gives_the_same_vertices(sorted_mesh, tmp_pa
     np.testing.assert_allclose(corners(again, "vertices"), corners(sorted_mesh, "vertices"), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_obj_reads_back_to_the_same_floats(sorted_mesh, tmp_path):
     path = export_obj(sorted_mesh, tmp_path, "a")
     back, _ = load_model(path)

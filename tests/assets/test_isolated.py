@@ -105,14 +105,16 @@ def test_a_reader_says_what_is_wrong(spec, write):
 @pytest.mark.parametrize(
     ("body", "said"),
     [
-        ("import os; os.abort()", "reading it crashed (SIGABRT)"),
+        pytest.param("import os; os.abort()", "reading it crashed (SIGABRT)", marks=pytest.mark.slow),
         ("import ctypes; ctypes.string_at(0)", "reading it crashed (SIGSEGV)"),
         ("import os; os.kill(os.getpid(), 9)", "reads it ended unexpectedly: it was killed (SIGKILL), perhaps"),
-        ("import os; os.kill(os.getpid(), 15)", "try again with more memory free, or fewer --workers"),
-        ("import os; os._exit(3)", "reading it crashed (exit code 3)"),
-        ("raise SystemExit('no\\nmore')", "the process that reads it failed (more)"),
+        pytest.param(
+            "import os; os.kill(os.getpid(), 15)", "try again with more memory free, or fewer --workers", marks=pytest.mark.slow
+        ),
+        pytest.param("import os; os._exit(3)", "reading it crashed (exit code 3)", marks=pytest.mark.slow),
+        pytest.param("raise SystemExit('no\\nmore')", "the process that reads it failed (more)", marks=pytest.mark.slow),
         ("raise TypeError('a\\nb')", "its reader failed (TypeError: a b)"),
-        ("f = lambda x: f(x) + 1; f(0)", "within one another (recursion)"),
+        pytest.param("f = lambda x: f(x) + 1; f(0)", "within one another (recursion)", marks=pytest.mark.slow),
     ],
 )
 def test_a_crash_costs_one_message(spec, reader, body, said):
@@ -133,7 +135,13 @@ def test_a_loop_that_keeps_the_interpreter_to_itself_is_stopped(spec, reader, mo
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not enforce it")
-@pytest.mark.parametrize("body", ["import numpy; numpy.ones(1 << 40)", "x = [bytearray(1 << 20) for _ in range(1 << 20)]"])
+@pytest.mark.parametrize(
+    "body",
+    [
+        "import numpy; numpy.ones(1 << 40)",
+        pytest.param("x = [bytearray(1 << 20) for _ in range(1 << 20)]", marks=pytest.mark.slow),
+    ],
+)
 def test_a_flood_of_memory_is_stopped(spec, reader, monkeypatch, body):
     reader(body)
     monkeypatch.setenv("VIEWSPHERE_MAX_READ_BYTES", str(1 << 30))
@@ -195,7 +203,9 @@ load_normalised(ModelSpec(key="a", source=sys.argv[1], category="x", category_id
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "how", [signal.SIGKILL, *(pytest.param(way, marks=pytest.mark.slow) for way in (signal.SIGTERM, signal.SIGINT))]
+)
 def test_no_child_outlives_its_parent(spec, reader, tmp_path, how):
     pid_file = tmp_path / "pid"
     reader("import os, pathlib, re", f"pathlib.Path({str(pid_file)!r}).write_text(str(os.getpid()))", "while True: pass")

@@ -74,6 +74,7 @@ def test_it_is_said_to_be_killed_and_not_the_file_to_be_damaged(dying, file, rea
     assert "damaged" not in said
 
 
+@pytest.mark.slow
 def test_nothing_of_it_is_kept(dying, file, tmp_path):
     python, started = dying("KILL"), tmp_path / "started"
     python.write_text(python.read_text().replace("#!/bin/sh\n", f"#!/bin/sh\necho >> {started}\n"))
@@ -83,12 +84,14 @@ def test_nothing_of_it_is_kept(dying, file, tmp_path):
         assert len(started.read_text()) == count
 
 
+@pytest.mark.slow
 def test_a_script_that_starts_blender_tells_the_signal(dying, file):
     python = dying("KILL")
     python.write_text(python.read_text().replace("exec ", "") + "\nexit $?\n")
     assert refused("model", file).startswith(SAID.format(how="KILL"))
 
 
+@pytest.mark.slow
 def test_a_crash_of_its_own_may_be_the_file_s(dying, file):
     dying("SEGV")
     assert refused("model", file).startswith("reading it crashed (Blender died (signal SIGSEGV) after")

@@ -10,6 +10,7 @@ import pytest
 from light_stage import ball
 from test_raster import BLACK, DARK, SPEC, box, camera, mesh_of, rectangle
 
+from quick import quick
 from shots import painted, still_shot
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines import raster
@@ -214,6 +215,7 @@ def room(reflectance: float, window: bool = True, partition: bool = False) -> Me
     return mesh_of(np.concatenate([box(*solid) for solid in solids + front]), matt(reflectance))
 
 
+@pytest.mark.slow
 def test_light_through_a_window_is_less_than_the_sky():
     """No place of a room under a sky of radiance 1 is brighter than that sky, and where more is reflected more bounces."""
     places, normals = walls((0, 0, 0), (4, 3, 2.4))
@@ -273,6 +275,7 @@ def test_no_ring_shows_where_probes_end():
     assert np.abs(np.diff(row) / row[1:]).max() < 0.015
 
 
+@pytest.mark.slow
 def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():
     """A probe within it, a little below the ceiling that closes it, knows nothing of the ceiling beside it."""
     small = mesh_of(box((3.0, 1.0, 0.5), (3.2, 1.2, 0.7)), matt(0.5))
@@ -291,7 +294,7 @@ def test_a_lamp_at_the_ceiling_leaves_no_flecks_around_it():
     assert near < 1.15 * far
 
 
-@pytest.mark.parametrize("window", [True, False])
+@pytest.mark.parametrize("window", quick([True, False], True))
 def test_a_dark_room_beside_a_lit_one_stays_dark(window, monkeypatch):
     """A partition of 10 cm, less than half of what lies between probes; without a window a lamp stands in the first room."""
     monkeypatch.setattr(lightmaps, "CELL", 0.1)

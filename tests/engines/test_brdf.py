@@ -126,9 +126,14 @@ def test_one_bounce_is_reciprocal():
     assert np.allclose(reflected(a, c), reflected(c, a), rtol=1e-3, atol=1e-5)
 
 
-@pytest.mark.parametrize("rough", [0.35, 0.6, 1.0])
-@pytest.mark.parametrize("metal", [0.0, 0.5, 1.0])
-@pytest.mark.parametrize("coat", [0.0, 1.0])
+@pytest.mark.parametrize(
+    ("rough", "metal", "coat"),
+    [
+        *((0.35, metal, coat) for metal, coat in ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0))),
+        *((0.6, metal, coat) for metal, coat in ((0.0, 1.0), (0.5, 0.0), (1.0, 1.0))),
+        *((1.0, metal, coat) for metal, coat in ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0))),
+    ],
+)
 def test_distant_lights_all_around_are_a_furnace(rough, metal, coat):
     """Integrated over directions as the kernel's own light, not through the maps."""
     view = tilted(np.array([0.9, 0.6, 0.3]))
@@ -151,6 +156,7 @@ def test_distant_lights_all_around_are_a_furnace(rough, metal, coat):
     assert total == pytest.approx(np.ones(3), abs=0.02)
 
 
+@pytest.mark.slow
 def test_white_furnace():
     """Within 1 %: any roughness, metal, coat and angle."""
     surrounding = white_furnace()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_raster import CARD_UV, box, camera, card, mesh_of, picture, stage_of, unlit
 
+from quick import quick
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import linear as linear_light
 from viewsphere.engines.raster.samples import differs_behind, edge_samples, layers
@@ -93,7 +94,7 @@ def errors(mesh, lens):
     return tuple(np.abs(light_of(mesh, lens, 1, antialias)[is_edge] - mean) / step for antialias in (4, 1))
 
 
-@pytest.mark.parametrize(("name", "pane", "lens"), PAIRS)
+@pytest.mark.parametrize(("name", "pane", "lens"), quick(PAIRS, *PAIRS[::2]))
 def test_outlines_behind_a_pane_are_smooth(name, pane, lens):
     """Of a straight edge's coverage four samples know 0.09 or so, and at worst 0.25; one sample 0.25 and 0.5."""
     smooth, jagged = errors(behind(pane)[name], LENSES[lens])

@@ -86,6 +86,7 @@ def test_a_ceiling_that_glows(place):
     np.testing.assert_allclose(light[far], known[far], rtol=0.05, atol=0.01)
 
 
+@pytest.mark.slow
 def test_the_sky_through_a_window():
     """On the wall opposite, in a black room: the share of what both ends of the opening leave, all above the horizon."""
     small = mesh_of(box((3.0, 1.0, 0.5), (3.05, 1.05, 0.55)), matt(0.0))

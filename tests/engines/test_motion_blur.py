@@ -123,6 +123,7 @@ def sharp_instants(shot: Shot) -> Shot:
     return shot.model_copy(update={"shutter": 0.0, "exposures": ()})
 
 
+@pytest.mark.slow
 def test_what_labels_are_made_of_stays_as_it_was():
     shot = drive(3)
     stage = raster.stage(shot, load(STILL))

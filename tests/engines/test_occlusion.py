@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from light_stage import LightStage, Samples, ball, cuboid, distances, flat, points, quad
 
+from quick import quick
 from viewsphere import zoo
 from viewsphere.engines.raster.occlusion import NO_OCCLUSION, bake_occlusion, sky_directions, with_ground_light
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
@@ -45,7 +46,7 @@ def some(s: Samples, which) -> Samples:
     return Samples(s.place[which], s.smooth[which], s.normal[which], s.pixel[which], s.is_ground[which])
 
 
-@pytest.mark.parametrize("quality", ["fast", "fine"])
+@pytest.mark.parametrize("quality", quick(["fast", "fine"], "fast"))
 @pytest.mark.parametrize("ground", [True, False])
 def test_a_car_against_rays(quality, ground):
     pytest.importorskip("embreex")

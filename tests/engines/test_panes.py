@@ -77,6 +77,7 @@ def plate(roughness: float = 0.02):
     return np.array(rectangle((-1.2, PLATE, -0.4), (2.4, 0, 0), (0, 0, 2))), metal(roughness)
 
 
+@pytest.mark.slow
 def test_a_mirror_shows_what_stands_behind_the_camera_as_a_camera_beyond_the_mirror_sees_it():
     """Bands, a sunlit wall and the shadow on it: as the mirror image of the scene looks where the mirror is taken away."""
     wanted = light(behind(mirrored_y), Scene(sun=sun(160), sky=DARK))[SHOWN]
@@ -87,6 +88,7 @@ def test_a_mirror_shows_what_stands_behind_the_camera_as_a_camera_beyond_the_mir
     assert np.mean(np.abs(blurred - wanted).max(axis=2) < 0.02) < 0.7
 
 
+@pytest.mark.slow
 def test_a_ball_mirrors_the_brighter_half_of_a_room_where_its_mirrored_rays_end():
     """A room that shines twice as brightly on the side of +X, and a ball with smooth normals: closed form, ray by ray."""
     room = np.asarray(box((-3, -3, -3), (3, 4, 4)))
@@ -115,13 +117,16 @@ def test_a_ball_mirrors_the_brighter_half_of_a_room_where_its_mirrored_rays_end(
     assert np.mean(np.abs(found[at[clear], 0] - wanted) < 0.03) > 0.99
 
 
-@pytest.mark.parametrize(("how", "roughness"), [("on", 0.2), ("on", 0.5), ("off", 0.02)])
+@pytest.mark.parametrize(
+    ("how", "roughness"), [*(pytest.param("on", rough, marks=pytest.mark.slow) for rough in (0.2, 0.5)), ("off", 0.02)]
+)
 def test_what_is_rough_and_what_nothing_bounces_off_stays_as_it_was(how, roughness):
     parts = [plate(roughness), *behind()]
     plain = light(parts, Scene(sun=sun(), sky=DARK), how, panes=False)
     np.testing.assert_array_equal(light(parts, Scene(sun=sun(), sky=DARK), how), plain)
 
 
+@pytest.mark.slow
 def test_between_smooth_and_rough_less_and_less_of_the_ray_counts():
     scene = Scene(sun=sun(), sky=DARK)
     changes = []
@@ -131,6 +136,7 @@ def test_between_smooth_and_rough_less_and_less_of_the_ray_counts():
     assert changes[0] > 1.3 * changes[1] > 1.3 * 1.3 * changes[2] > 0
 
 
+@pytest.mark.slow
 def test_a_picture_is_the_same_beside_passes_of_its_light():
     """And a picture of the stage has what panes mirror."""
     stage = stage_of(AWAY, Scene(sun=sun(), sky=DARK), painted_mesh(plate(), *behind()))
@@ -141,6 +147,7 @@ def test_a_picture_is_the_same_beside_passes_of_its_light():
     assert alone[SHOWN].std() > 20
 
 
+@pytest.mark.slow
 def test_a_target_in_a_place_and_what_is_unlit_stay_as_they_were():
     mirror = plate()
     unlit = replace(metal(), unlit=True)
@@ -154,6 +161,7 @@ def test_a_target_in_a_place_and_what_is_unlit_stay_as_they_were():
         np.testing.assert_allclose(*pictures, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_through_a_blended_sheet_a_mirror_shows_what_is_behind_it():
     """A black sheet of opacity 0.25 before the wall takes a quarter of its light."""
     sheet = rectangle((-8, 4.3, -6), (16, 0, 0), (0, 0, 14))
@@ -163,6 +171,7 @@ def test_through_a_blended_sheet_a_mirror_shows_what_is_behind_it():
     np.testing.assert_allclose(found, 0.375, rtol=0.03)
 
 
+@pytest.mark.slow
 def test_what_is_far_from_a_mirror_is_as_blurred_as_its_pixels_are_wide():
     """A wall of checks that are less than half as wide as a pixel is there, lit evenly: grey."""
     fine = np.indices((256, 256)).sum(axis=0, keepdims=True).repeat(4, axis=0) % 2 * 255

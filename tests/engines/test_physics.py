@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from light_stage import ball, cuboid, flat, quad
 
+from quick import quick
 from shots import painted, still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.srgb import encoded, linear
@@ -100,9 +101,14 @@ MATERIALS = [
 ]
 
 
-def furnace(tmp_path, mesh: Mesh, material: Material, distance: float, **options) -> np.ndarray:
-    """Light that a mesh all of this material sends out where light 1 comes from everywhere."""
-    sky = sky_file(tmp_path / "even.hdr", np.ones((16, 32, 3)))
+@pytest.fixture(scope="module")
+def even(tmp_path_factory) -> Environment:
+    """A sky from which light 1 comes from everywhere, baked once."""
+    return sky_file(tmp_path_factory.mktemp("sky") / "even.hdr", np.ones((16, 32, 3)))
+
+
+def furnace(sky: Environment, mesh: Mesh, material: Material, distance: float, **options) -> np.ndarray:
+    """Light that a mesh all of this material sends out under such a sky."""
     white = replace(mesh, materials=(material,) * len(mesh.materials), colors=None, images=())
     light, seen = light_of(white, Scene(sun=None, sky=sky), camera(60, 45, 50, 30, 20, distance), **options)
     assert np.allclose(light[seen < 0], 1, atol=0.005)
@@ -113,35 +119,36 @@ def furnace(tmp_path, mesh: Mesh, material: Material, distance: float, **options
     ("material", "occlusion"),
     [*((material, "off") for material in MATERIALS), *((MATERIALS[i], "fast") for i in (0, 3, 7)), (MATERIALS[0], "fine")],
 )
-def test_white_furnace_of_a_ball(tmp_path, material, occlusion):
+def test_white_furnace_of_a_ball(even, material, occlusion):
     """Occlusion is baked alike for all materials."""
-    light = furnace(tmp_path, ball(0.5, (0, 0, 0), 48), material, 1.6, ambient_occlusion=occlusion)
+    light = furnace(even, ball(0.5, (0, 0, 0), 48), material, 1.6, ambient_occlusion=occlusion)
     assert np.abs(light - 1).max() < 0.01
 
 
 @pytest.mark.parametrize(
     "material", [m if i in {0, 3, 7} else pytest.param(m, marks=pytest.mark.slow) for i, m in enumerate(MATERIALS)]
 )
-def test_white_furnace_of_a_box(tmp_path, material):
+def test_white_furnace_of_a_box(even, material):
     """The shading loses nothing, nor does occlusion, though it comes from depths on a grid; nothing is gained."""
     box = flat(cuboid((-0.5, -0.4, -0.3), (0.5, 0.4, 0.3)))
-    assert np.abs(furnace(tmp_path, box, material, 1.8, ambient_occlusion="off") - 1).max() < 0.01
-    occluded = furnace(tmp_path, box, material, 1.8)
+    assert np.abs(furnace(even, box, material, 1.8, ambient_occlusion="off") - 1).max() < 0.01
+    occluded = furnace(even, box, material, 1.8)
     assert occluded.max() < 1.005
     assert occluded.min() > 0.985
     assert np.mean(np.abs(occluded - 1) < 0.01) > 0.99
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("material", [MATERIALS[0], MATERIALS[4], pytest.param(MATERIALS[-2], marks=pytest.mark.slow)])
-def test_white_furnace_of_a_car(tmp_path, material):
+def test_white_furnace_of_a_car(even, material):
     """Dents of shading normals that look away from what is seen may darken single pixels; occlusion only ever darkens."""
     from viewsphere.zoo import build
 
     car = build("car", np.random.default_rng(4))
-    light = furnace(tmp_path, car, material, 7.0, ambient_occlusion="off")
+    light = furnace(even, car, material, 7.0, ambient_occlusion="off")
     assert np.mean(np.abs(light - 1) < 0.01) > 0.995
     assert light.max() < 1.01
-    assert furnace(tmp_path, car, material, 7.0).max() < 1.01
+    assert furnace(even, car, material, 7.0).max() < 1.01
 
 
 @pytest.mark.parametrize("elevation", [5, 20, 45, 70, 90])
@@ -184,15 +191,15 @@ def lost_light(normal_view, alpha, n=500):
     return 1 - 2 * math.pi * np.mean(ggx_metal(nl, normal_view, half[2], view_half, alpha, 1.0) * nl)
 
 
-@pytest.mark.parametrize("rough", [0.4, 0.6, 1.0])
+@pytest.mark.parametrize("rough", quick([0.4, 0.6, 1.0], 0.4, 1.0))
 @pytest.mark.parametrize(("elevation", "azimuth"), [(60, 180), (60, 120), (35, 180), (80, 10)])
-def test_ggx_highlight_of_a_metal_plate(tmp_path, rough, elevation, azimuth):
+def test_ggx_highlight_of_a_metal_plate(even, rough, elevation, azimuth):
     """Every pixel of a plate seen at 45 degrees; light that bounces twice between facets counts as Turquin 2019 has it."""
     sun = Sun(azimuth_deg=azimuth, elevation_deg=elevation, strength=1.0, color=(1, 1, 1), angle_deg=0)
     color = np.array([0.95, 0.6, 0.25])
     plate = flat(quad((-4, -4, 0), (8, 0, 0), (0, 8, 0)), Material(base_color=(*color, 1.0), metallic=1.0, roughness=rough))
     view = camera(24, 24, 30, 0, 45, 4)
-    black = sky_file(tmp_path / "even.hdr", np.ones((16, 32, 3))).model_copy(update={"strength": 0.0})
+    black = even.model_copy(update={"strength": 0.0})
     light, seen = light_of(plate, Scene(sun=sun, sky=black), view, ambient_occlusion="off")
     assert (seen >= 0).all()
     v = view.center - places(view, 0.0)
@@ -209,15 +216,19 @@ def test_ggx_highlight_of_a_metal_plate(tmp_path, rough, elevation, azimuth):
     assert (np.abs(light - expected) < 0.02 * expected + 1e-4).all()
 
 
-@pytest.mark.parametrize("turn", [0.0, 60.0])
-def test_a_mirror_ball_shows_the_sky_where_the_reflected_ray_goes(tmp_path, turn):
-    """The sky's colour is its direction, so a pixel tells which texel it shows."""
+@pytest.fixture(scope="module")
+def directions(tmp_path_factory) -> Environment:
+    """A sky whose colour is its direction."""
     rows, columns = np.meshgrid((np.arange(256) + 0.5) / 256, (np.arange(512) + 0.5) / 512, indexing="ij")
     elevation, angle = (0.5 - rows) * math.pi, (0.5 - columns) * 2 * math.pi
     sky = np.stack([np.cos(elevation) * np.cos(angle), np.cos(elevation) * np.sin(angle), np.sin(elevation)], axis=-1)
-    scene = Scene(
-        sun=None, sky=sky_file(tmp_path / "directions.hdr", sky * 0.4 + 0.5).model_copy(update={"rotation_deg": turn})
-    )
+    return sky_file(tmp_path_factory.mktemp("sky") / "directions.hdr", sky * 0.4 + 0.5)
+
+
+@pytest.mark.parametrize("turn", [0.0, 60.0])
+def test_a_mirror_ball_shows_the_sky_where_the_reflected_ray_goes(directions, turn):
+    """A pixel tells which texel it shows."""
+    scene = Scene(sun=None, sky=directions.model_copy(update={"rotation_deg": turn}))
     mirror = replace(ball(0.5, (0, 0, 0), 96), materials=(Material(metallic=1.0, roughness=0.0),))
     view = camera(160, 160, 280, 25, 15, 2.2)
     light, seen = light_of(mirror, scene, view, ambient_occlusion="off")
@@ -280,7 +291,9 @@ def blocked(scene, origins: np.ndarray, toward: np.ndarray) -> np.ndarray:
     return np.asarray(scene.run(origins.astype(np.float32), directions.astype(np.float32), query="INTERSECT")) >= 0
 
 
-@pytest.mark.parametrize(("kind", "azimuth", "elevation"), [("car", 70, 35), ("chair", 200, 55), ("bicycle", 300, 25)])
+@pytest.mark.parametrize(
+    ("kind", "azimuth", "elevation"), quick([("car", 70, 35), ("chair", 200, 55), ("bicycle", 300, 25)], ("chair", 200, 55))
+)
 def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevation):
     from viewsphere.zoo import build
 
@@ -329,7 +342,7 @@ def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevatio
     assert agrees[certain & (triangle < count)].mean() >= 0.99  # the objects themselves, whose parts shade one another
 
 
-@pytest.mark.parametrize("height", [0.5, 1.0, 2.0, 5.0])
+@pytest.mark.parametrize("height", quick([0.5, 1.0, 2.0, 5.0], 0.5, 2.0))
 @pytest.mark.parametrize("kind", ["point", "spot", "area"])
 def test_lamps_fall_off_with_the_square_of_the_distance(kind, height):
     """Light of the ground below a small lamp: strength / pi at one metre."""
@@ -418,7 +431,7 @@ def test_a_magnified_blended_texture_fades_from_texel_to_texel(wrap, antialias):
     assert np.abs(seen.astype(int) - expected).max() <= 2
 
 
-@pytest.mark.parametrize("lit", ["sun", "low sun", "sky"])
+@pytest.mark.parametrize("lit", [pytest.param("sun", marks=pytest.mark.slow), "low sun", "sky"])
 def test_a_catcher_darkens_as_the_ground_does(lit):
     """Over a plain background of the open ground's colour a catcher looks like the ground; light and ground are grey."""
     box = flat(cuboid((-0.4, -0.3, 0), (0.4, 0.3, 0.7)), Material(base_color=(0.5, 0.5, 0.5, 1)))
@@ -441,7 +454,7 @@ def test_a_catcher_darkens_as_the_ground_does(lit):
 
 
 @pytest.mark.parametrize("behind", [(0.9, 0.1, 0.1), (0.02, 0.02, 0.02), (0.8, 0.8, 0.8)])
-def test_coloured_glass_tints_what_is_behind_it(tmp_path, behind):
+def test_coloured_glass_tints_what_is_behind_it(even, behind):
     """One thin pane: what does not mirror lets each colour through by its tint, whatever the surroundings."""
     tint = np.array([0.7, 0.9, 0.4])
     glass = Material(base_color=(*tint, 1.0), roughness=0.0, transmission=1.0)
@@ -451,7 +464,7 @@ def test_coloured_glass_tints_what_is_behind_it(tmp_path, behind):
         triangle_material=np.repeat([0, 1], 2).astype(np.int32),
         materials=(glass, Material(unlit=True, base_color=(*behind, 1.0))),
     )
-    dark = sky_file(tmp_path / "even.hdr", np.ones((16, 32, 3))).model_copy(update={"strength": 0.0})
+    dark = even.model_copy(update={"strength": 0.0})
     light, seen = light_of(mesh, Scene(sun=None, sky=dark), camera(9, 9, 60, 0, 0, 4), ambient_occlusion="off")
     assert (seen < 2).all()
     assert light == pytest.approx(np.broadcast_to(0.96 * tint * behind / EXPOSURE, light.shape), rel=0.02)

@@ -111,7 +111,12 @@ def test_stills_of_what_moves_are_those_of_what_stands(has_scenery):
 
 @pytest.mark.parametrize(
     "scene, occlusion, most, share",
-    [("sun", "off", 0.6, 0.02), ("lamp", "off", 0.3, 0.01), ("sun", "fast", 2.0, 0.03), ("lamp", "fast", 2.0, 0.03)],
+    [
+        ("sun", "off", 0.6, 0.02),
+        ("lamp", "off", 0.3, 0.01),
+        pytest.param("sun", "fast", 2.0, 0.03, marks=pytest.mark.slow),
+        pytest.param("lamp", "fast", 2.0, 0.03, marks=pytest.mark.slow),
+    ],
 )
 def test_a_sequence_looks_like_stills(scene, occlusion, most, share):
     """But for the shadows' edges, as maps are a little coarser where they stay in place for a while; and for ambient
@@ -150,6 +155,7 @@ def test_what_stands_still_is_drawn_once():
     assert sum(len(part().triangles) for part in maps[0].still) + 12 == len(stage.at(0).triangles)
 
 
+@pytest.mark.slow
 def test_what_is_in_no_picture_has_no_rows_but_casts_shadows():
     """A wall behind the camera, which shades the ground before it, beside one that is looked at."""
     behind = Motion.still(((1, 0, 0, 0.0), (0, 1, 0, -8.0), (0, 0, 3, 1.0), (0, 0, 0, 1)))

@@ -46,6 +46,7 @@ def light(how: str, roughness: float, is_mirrored: bool):
     return radiance[:, :3].reshape(VIEW.height, VIEW.width, 3), seen
 
 
+@pytest.mark.slow
 def test_a_floor_mirrors_a_sign_where_its_mirror_image_is_by_fresnel():
     found, seen = light("on", 0.05, True)
     (pixel,), _ = project(VIEW.intrinsics, np.array([[2.0, 2.2, 0.02 - 0.6]]) @ VIEW.R.T + VIEW.t)
@@ -59,12 +60,14 @@ def test_a_floor_mirrors_a_sign_where_its_mirror_image_is_by_fresnel():
     assert found[y, 3, 0] < 0.1 * found[y, x, 0]  # beside the image
 
 
+@pytest.mark.slow
 def test_the_rougher_the_less_sharply():
     pixels = [light("on", rough, True)[0][38:, 44:52, 0] for rough in (0.05, 0.3, 0.45)]  # the mirror image's middle
     steps = [float(np.abs(np.diff(p, axis=0)).max() / p.max()) for p in pixels]
     assert steps[0] > steps[1] > steps[2]
 
 
+@pytest.mark.slow
 def test_matt_floors_and_pictures_without_bounces_stay_as_they_are():
     for how, rough in (("on", 0.6), ("off", 0.1)):
         plain, _ = light(how, rough, False)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from light_stage import ball, cuboid, flat, quad
-from test_physics import camera, furnace, light_of, picture, sky_file, stage_of
+from test_physics import camera, even, furnace, light_of, picture, sky_file, stage_of  # noqa: F401 (a fixture)
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines.raster.painting import paint
@@ -94,10 +94,10 @@ def test_a_wall_lets_through_what_its_two_faces_leave():
 
 
 @pytest.mark.parametrize("inner", [0.0, 0.45, 0.49])
-def test_light_neither_comes_nor_goes(tmp_path, inner):
+def test_light_neither_comes_nor_goes(even, inner):  # noqa: F811
     """In a white surrounding a ball vanishes; of a hollow one the rim, within whose wall rays are caught, may be dark."""
     mesh = shell(inner) if inner else ball(0.5, (0, 0, 0), 64)
-    light = furnace(tmp_path, mesh, GLASS, 1.6, ambient_occlusion="off")
+    light = furnace(even, mesh, GLASS, 1.6, ambient_occlusion="off")
     assert light.max() < 1.01
     assert np.mean(np.abs(light - 1) < 0.01) > (0.97 if inner else 0.999)
 

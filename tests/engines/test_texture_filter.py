@@ -278,6 +278,7 @@ def test_gradients_are_the_finite_differences_of_the_seen_place():
         np.testing.assert_allclose(found, across, rtol=5e-3, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_board_at_elevation_five_neither_shimmers_nor_blurs():
     """Against 32 x 32 samples a pixel of a checkerboard."""
     size, texels, period = 192, 64, 1.0

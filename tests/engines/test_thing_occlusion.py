@@ -79,6 +79,7 @@ def test_a_target_in_any_tilt_against_rays(tilt):
     assert np.abs(asking.occlusion(occlusion, s)[:, 0] - truth).mean() < 0.07
 
 
+@pytest.mark.slow
 def test_two_cars_beside_each_other_against_rays():
     pytest.importorskip("embreex")
     cars = {"car": zoo.build("car", np.random.default_rng(3))}
@@ -92,6 +93,7 @@ def test_two_cars_beside_each_other_against_rays():
     assert np.corrcoef(found[sure], truth[sure])[0, 1] > 0.7
 
 
+@pytest.mark.slow
 def test_what_is_beside_a_wall_loses_light():
     """More the nearer it is, none far away, and nothing of it depends on the order."""
     s = step_samples(pose())
@@ -110,6 +112,7 @@ def test_a_target_is_baked_once_in_all_of_its_places():
     assert len(occlusion.volume) == np.prod(occlusion.grid[0, 1:]) and (occlusion.grid == occlusion.grid[0]).all()
 
 
+@pytest.mark.slow
 def test_a_target_that_rises_darkens_the_ground_less():
     below = points([[0.0, 0.0, 0.0]], (0, 0, 1), is_ground=True)
     shares = []

@@ -87,6 +87,7 @@ def waves(side: int) -> np.ndarray:
     return faces if side > 0 else faces[:, ::-1]
 
 
+@pytest.mark.slow
 def test_both_sides_of_a_curtain_have_light_of_their_own():
     lamp = rectangle((-4, 1, -4), (9, 0, 0), (0, 0, 9))
     curtain = np.concatenate([waves(1), waves(-1)])
@@ -116,6 +117,7 @@ def read_at(points: np.ndarray) -> np.ndarray:
     return points[:, 1:10] / points[:, :1]
 
 
+@pytest.mark.slow
 def test_what_is_within_a_thing_takes_no_site_from_what_is_seen():
     walls, within = inside_out(box((-1.0, -0.8, -0.6), (1.0, 0.8, 0.6))), corners_of(ball(0.2, (0.0, 0.0, 0.0)))
     deeper = corners_of(ball(0.195, (0.0, 0.0, 0.0)))
@@ -230,6 +232,7 @@ def test_between_points_light_is_linear(parts):
     np.testing.assert_allclose(glow, expected, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_what_is_flat_keeps_its_chart():
     within = corners_of(ball(0.2, (0.0, 0.0, 0.0)))
     walls = inside_out(box((-1.0, -0.8, -0.6), (1.0, 0.8, 0.6)))

@@ -103,7 +103,7 @@ def project(k, points):
     return found[:, :2] / found[:, 2:]
 
 
-@pytest.mark.parametrize("world", ["stills", "poses", "videos"])
+@pytest.mark.parametrize("world", ["stills", "poses", pytest.param("videos", marks=pytest.mark.slow)])
 def test_poses_take_points_of_models_to_their_pixels(written, world, request):
     """The coordinates map says which point of the model a pixel shows; pose and K take it to the centre of that pixel."""
     dataset = request.getfixturevalue(world)
@@ -255,6 +255,7 @@ def test_sequences_are_scenes_of_one_sensor(videos, written):
         assert len(list((scene / "rgb").iterdir())) == 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["stills", "videos"])
 def test_layouts_hold_the_same(written, world, request):
     dataset = request.getfixturevalue(world)

@@ -128,14 +128,31 @@ def test_of_others_less_is_known(tree, tmp_path):
     ("name", "change", "problem"),
     [
         ("scene_camera.json", lambda said: said["0"].pop("cam_K"), "image 0: .*found no 'cam_K'"),
-        ("scene_camera.json", lambda said: said.update({"77": said["0"]}), "image 77: .*found no picture"),
+        pytest.param(
+            "scene_camera.json",
+            lambda said: said.update({"77": said["0"]}),
+            "image 77: .*found no picture",
+            marks=pytest.mark.slow,
+        ),
         ("scene_gt.json", lambda said: said["1"][0].update(cam_R_m2c=[1] * 9), "image 1: .*rotation"),
-        ("scene_gt.json", lambda said: said["1"][0].update(obj_id="x"), "image 1: .*found obj_id 'x'"),
-        ("scene_camera.json", lambda said: said["1"].update(depth_scale=-1), "image 1: .*found depth_scale -1"),
+        pytest.param(
+            "scene_gt.json", lambda said: said["1"][0].update(obj_id="x"), "image 1: .*found obj_id 'x'", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "scene_camera.json",
+            lambda said: said["1"].update(depth_scale=-1),
+            "image 1: .*found depth_scale -1",
+            marks=pytest.mark.slow,
+        ),
         ("scene_camera.json", lambda said: said.update({"9" * 5000: said["0"]}), "image 9+: .*found"),
         ("scene_gt.json", lambda said: said.update({"1": 5}), "image 1: .*found|image 1: .*int"),
         ("scene_gt_info.json", lambda said: said["1"][0].update(px_count_all=float("inf")), "image 1: .*infinity"),
-        ("scene_gt.json", lambda said: said["1"][0].pop("cam_t_m2c"), "image 1: .*found no 'cam_t_m2c'"),
+        pytest.param(
+            "scene_gt.json",
+            lambda said: said["1"][0].pop("cam_t_m2c"),
+            "image 1: .*found no 'cam_t_m2c'",
+            marks=pytest.mark.slow,
+        ),
         ("scene_gt_info.json", lambda said: said["1"][0].update(visib_fract=2), "image 1: .*where counts, a share and boxes"),
     ],
 )
@@ -167,6 +184,7 @@ def test_broken_files_are_told(tree, tmp_path):
         read(tree)
 
 
+@pytest.mark.slow
 def test_models_come_in_and_go_out(stills, exported, imported, tmp_path):
     known = {model.key: model for model in stills.models}
     assert [model.key for model in imported.models] == list(known)

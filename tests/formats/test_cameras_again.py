@@ -202,6 +202,7 @@ def test_nerfstudios_cameras_are_the_same_again(tmp_path):
         assert lens.distortion.coefficients[:4] == (0.05, -0.01, 1e-3, 0.0)
 
 
+@pytest.mark.slow
 def test_lenses_of_each_frame_and_a_mesh_with_cameras_inside(tmp_path):
     """As of phones: a lens in every frame; the mesh is the room in which the cameras are."""
     frames = transforms(tmp_path / "scene")

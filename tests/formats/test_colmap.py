@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import shutil
+from itertools import cycle, product
 
 import numpy as np
 import pycolmap
 import pytest
 
-from cube_dataset import LENS, make
+from cube_dataset import FEW, LENS, make
 from proven import close, equal
+from quick import quick
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
@@ -20,10 +22,27 @@ from viewsphere.run.importing import import_dataset
 from viewsphere.sampling.pose_files.colmap import read_colmap
 from viewsphere.store.choice import Choice
 
+KINDS = ("binary", "text")
+BENT = ("barrel", "rational", "fisheye")
+
 
 def written(dataset, place, kind, **more):
     export(dataset.root, [{"colmap": {"kind": kind}}], output=place, **more)
     return place / "colmap"
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    """A function that gives an export of a world, made once; do not change it."""
+    made = {}
+
+    def get(dataset, kind):
+        key = (dataset.root, kind)
+        if key not in made:
+            made[key] = written(dataset, tmp_path_factory.mktemp("colmap"), kind)
+        return made[key]
+
+    return get
 
 
 def models(folder):
@@ -41,9 +60,9 @@ def images(dataset, folder):
 
 @pytest.mark.parametrize("kind", ["text", "binary"])
 @pytest.mark.parametrize("world", ["stills", "poses", "videos"])
-def test_pycolmap_reads_cameras_and_poses(world, kind, request, tmp_path):
+def test_pycolmap_reads_cameras_and_poses(world, kind, request, shared):
     dataset = request.getfixturevalue(world)
-    folder = written(dataset, tmp_path, kind)
+    folder = shared(dataset, kind)
     for sample, model, image in images(dataset, folder):
         camera = model.cameras[image.camera_id]
         pose = image.cam_from_world().matrix()
@@ -56,8 +75,8 @@ def test_pycolmap_reads_cameras_and_poses(world, kind, request, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["text", "binary"])
-def test_rigs(videos, kind, tmp_path):
-    folder = written(videos, tmp_path, kind)
+def test_rigs(videos, kind, shared):
+    folder = shared(videos, kind)
     for model in models(folder).values():
         assert model.num_rigs() == 1 and model.num_cameras() == 2 and model.num_frames() == 6 and model.num_reg_images() == 12
         assert all(frame.num_data_ids() == 2 for frame in model.frames.values())
@@ -84,14 +103,15 @@ def reprojected(model):
 
 
 @pytest.mark.parametrize("kind", ["text", "binary"])
-def test_points_lie_where_images_show_them(stills, videos, kind, tmp_path):
-    for dataset, place in ((stills, tmp_path / "stills"), (videos, tmp_path / "videos")):
-        for model in models(written(dataset, place, kind)).values():
+def test_points_lie_where_images_show_them(stills, videos, kind, shared):
+    for dataset in (stills, videos):
+        for model in models(shared(dataset, kind)).values():
             found, expected = reprojected(model)
             assert len(found) > 40
             close("colmap", f"pycolmap {kind}: points", found, expected, "px", atol=1e-3)
 
 
+@pytest.mark.slow
 def test_followed_points_have_all_images_that_show_them(videos, tmp_path):
     folder = written(videos, tmp_path, "text")
     moving = 0
@@ -119,11 +139,10 @@ def test_colours_are_those_of_the_picture(stills, tmp_path):
             equal("colmap", "colours", model.points3D[point.point3D_id].color, sample.rgb[row, column])
 
 
-@pytest.mark.parametrize("name", LENSES)
-@pytest.mark.parametrize("kind", ["text", "binary"])
+@pytest.mark.parametrize(("name", "kind"), quick([*product(LENSES, KINDS)], *zip(LENSES, cycle(KINDS), strict=False)))
 def test_lenses(name, kind, tmp_path):
     lens = LENS.model_copy(update={"distortion": LENSES[name], "cx": 47.25})
-    dataset = make(tmp_path / "out", several=True, intrinsics=lens, ground=True)
+    dataset = make(tmp_path / "out", several=True, intrinsics=lens, ground=True, channels=FEW)
     folder = written(dataset, tmp_path / "made", kind)
     (model,) = models(folder).values()
     (camera,) = model.cameras.values()
@@ -137,15 +156,15 @@ def test_lenses(name, kind, tmp_path):
 
 def test_four_coefficients_are_the_model_opencv(tmp_path):
     brown = LENSES["barrel"].model_copy(update={"coefficients": (-0.2, 0.05, 0.001, -0.002)})
-    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update={"distortion": brown}))
+    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update={"distortion": brown}), channels=FEW)
     found = models(written(dataset, tmp_path / "made", "text"))
     assert sorted(found) == ["block-0", "block-1", "block-2"]
     for model in found.values():
         assert [camera.model.name for camera in model.cameras.values()] == ["OPENCV"]
 
 
-def test_splits_are_listed(stills, tmp_path):
-    folder = written(stills, tmp_path, "text")
+def test_splits_are_listed(stills, shared):
+    folder = shared(stills, "text")
     for split in stills.splits:
         names = [name for file in folder.glob(f"*/sparse/0/{split}.txt") for name in file.read_text().split()]
         assert sorted(names) == [f"{sample.index:08d}.png" for sample in stills if sample.split == split]
@@ -162,6 +181,7 @@ def test_a_part_of_an_instant(videos, tmp_path):
         close("colmap", "a part", image.cam_from_world().matrix(), np.column_stack((camera.R, camera.t)), "m", atol=1e-12)
 
 
+@pytest.mark.slow
 def test_pictures_of_other_lenses_have_cameras_of_their_own(tmp_path):
     camera = {"size": [96, 72], "fov_deg": {"uniform": [30, 50]}}
     generate(small_recipe(camera=camera, channels=["rgb", "depth"], formats=[]), tmp_path / "out", workers=0)
@@ -181,8 +201,8 @@ def test_what_it_refuses(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["text", "binary"])
-def test_a_model_comes_in_as_it_went_out(videos, kind, tmp_path):
-    folder = written(videos, tmp_path, kind)
+def test_a_model_comes_in_as_it_went_out(videos, kind, shared, tmp_path):
+    folder = shared(videos, kind)
     for world in videos.sequences:
         import_dataset("colmap", folder / world, tmp_path / world)
         own = sorted((sample for sample in videos if sample.sequence == world), key=lambda sample: sample.sensor)
@@ -194,18 +214,19 @@ def test_a_model_comes_in_as_it_went_out(videos, kind, tmp_path):
             assert sample.split == was.split
 
 
-@pytest.mark.parametrize("kind", ["text", "binary"])
-@pytest.mark.parametrize("name", ["barrel", "rational", "fisheye"])
+@pytest.mark.parametrize(("name", "kind"), quick([*product(BENT, KINDS)], *zip(BENT, cycle(KINDS), strict=False)))
 def test_lenses_come_in(name, kind, tmp_path):
-    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": LENSES[name]}))
+    dataset = make(
+        tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": LENSES[name]}), channels=FEW
+    )
     import_dataset("colmap", written(dataset, tmp_path / "made", kind) / "several", tmp_path / "in")
     for sample, was in zip(Dataset(tmp_path / "in"), dataset, strict=True):
         assert sample.camera.intrinsics == was.camera.intrinsics and sample.split == was.split
 
 
 @pytest.mark.parametrize("kind", ["text", "binary"])
-def test_what_pycolmap_writes_comes_in(stills, kind, tmp_path):
-    world = written(stills, tmp_path, kind) / "scene-000001"
+def test_what_pycolmap_writes_comes_in(stills, kind, shared, tmp_path):
+    world = shared(stills, kind) / "scene-000001"
     place = tmp_path / "theirs"
     (place / "sparse" / "0").mkdir(parents=True)
     shutil.copytree(world / "images", place / "images")

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from torchvision_readers import torchvision_datasets
 
 from proven import close, equal
+from quick import quick
 from viewsphere.errors import UserError
 from viewsphere.formats import falling_things
 from viewsphere.formats.falling_things import Options
@@ -96,7 +97,7 @@ def check_object(found, classes, o, sample, k, matrix):
 
 
 @pytest.mark.parametrize("naming", ["fat", "ndds"])
-@pytest.mark.parametrize("world", ["stills", "poses", "videos"])
+@pytest.mark.parametrize("world", quick(["stills", "poses", "videos"], "stills"))
 def test_objects_cameras_depth_and_classes(written, world, naming, request):
     dataset, fat = request.getfixturevalue(world), naming == "fat"
     root, single = written(dataset, naming), world == "poses" and fat

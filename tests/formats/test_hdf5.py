@@ -39,7 +39,7 @@ def opened(folder, sample):
         return {key: json.loads(value[()]) if value.dtype.kind == "S" else value[()] for key, value in file.items()}
 
 
-@pytest.mark.parametrize(("world", "keys"), [("stills", STILL), ("videos", SOURCES)])
+@pytest.mark.parametrize(("world", "keys"), [("stills", STILL), pytest.param("videos", SOURCES, marks=pytest.mark.slow)])
 def test_arrays(request, written, world, keys):
     dataset, folder = request.getfixturevalue(world), written(world, keys)
     moved = 0

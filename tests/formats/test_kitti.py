@@ -95,6 +95,7 @@ def nearest(found, expected):
     return np.linalg.norm(found[:, None] - expected[None], axis=2).min(axis=1)
 
 
+@pytest.mark.slow
 def test_boxes_of_a_level_camera(levelled):
     dataset, folder = levelled
     for sample in dataset:

@@ -47,6 +47,7 @@ def match(sample):
     return there[..., 0], inside
 
 
+@pytest.mark.slow
 def test_pictures(videos, written, pairs):
     for kind, folders in {"scene_flow_2015": ("image_2", "image_3"), "stereo_flow_2012": ("colored_0", "colored_1")}.items():
         for folder, sensor in zip(folders, ("left", "right"), strict=True):

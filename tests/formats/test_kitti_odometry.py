@@ -87,6 +87,7 @@ def test_splits_are_listed(drives, written):
         assert (written("drives") / f"ImageSets/{split}.txt").read_text().split() == own
 
 
+@pytest.mark.slow
 def test_one_camera_is_its_own_partner(tmp_path):
     from worlds import videos
 

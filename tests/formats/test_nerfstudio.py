@@ -12,8 +12,9 @@ import pytest
 import trimesh
 from PIL import Image
 
-from cube_dataset import LENS, make
+from cube_dataset import FEW, LENS, make
 from proven import close, equal
+from quick import quick
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
@@ -76,7 +77,7 @@ def everything(folder, kind):
 
 
 @pytest.mark.parametrize("kind", ["nerfstudio", "instant-ngp", "nerf-synthetic"])
-@pytest.mark.parametrize("world", ["stills", "poses", "videos"])
+@pytest.mark.parametrize("world", ["stills", "poses", pytest.param("videos", marks=pytest.mark.slow)])
 def test_world_points_come_to_their_pixels(world, kind, request, tmp_path):
     dataset = request.getfixturevalue(world)
     found = everything(written(dataset, tmp_path, kind=kind), kind)
@@ -94,7 +95,7 @@ def test_world_points_come_to_their_pixels(world, kind, request, tmp_path):
         assert picture.samefile(dataset.path(sample.files["rgb"]))
 
 
-@pytest.mark.parametrize("kind", ["nerfstudio", "instant-ngp"])
+@pytest.mark.parametrize("kind", quick(["nerfstudio", "instant-ngp"], "instant-ngp"))
 def test_depth_lifts_to_the_points(videos, kind, tmp_path):
     found = everything(written(videos, tmp_path, kind=kind), kind)
     for sample in videos:
@@ -111,6 +112,7 @@ def test_depth_lifts_to_the_points(videos, kind, tmp_path):
         close("nerfstudio", "depth: lifted points beyond rounding", over, 0, "m", atol=1e-6)
 
 
+@pytest.mark.slow
 def test_splits_points_and_masks(poses, stills, tmp_path):
     for dataset, place in ((poses, tmp_path / "poses"), (stills, tmp_path / "stills")):
         folder = written(dataset, place, masks=True)
@@ -146,7 +148,9 @@ def test_lenses(name, kind, tmp_path):
     distortion = LENSES[name]
     if name == "barrel" and kind == "instant-ngp":
         distortion = distortion.model_copy(update={"coefficients": distortion.coefficients[:4]})
-    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": distortion, "cx": 47.25}))
+    dataset = make(
+        tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": distortion, "cx": 47.25}), channels=FEW
+    )
     found = everything(written(dataset, tmp_path / "made", kind=kind), kind)
     for sample in dataset:
         points = np.random.default_rng(sample.index).uniform(-0.5, 0.5, (200, 3))
@@ -191,7 +195,7 @@ def test_drawn_lenses(tmp_path):
     ],
 )
 def test_what_it_refuses(lens, options, message, tmp_path):
-    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update=lens))
+    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update=lens), channels=FEW)
     with pytest.raises(UserError, match=f"format nerfstudio: .*{message}"):
         written(dataset, tmp_path / "made", **options)
     assert not (tmp_path / "made").exists()
@@ -228,7 +232,7 @@ def test_lenses_come_in(name, kind, tmp_path):
     bent = LENSES[name]
     if name == "barrel" and kind == "instant-ngp":
         bent = bent.model_copy(update={"coefficients": bent.coefficients[:4]})
-    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": bent}))
+    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": bent}), channels=FEW)
     import_dataset("nerfstudio", written(dataset, tmp_path / "made", kind=kind) / "several", tmp_path / "in")
     for sample in Dataset(tmp_path / "in"):
         assert sample.camera.distortion == bent

@@ -79,6 +79,7 @@ def off(file):
     return np.array(numbers[:vertices]), np.array([row[1:] for row in numbers[vertices:]]) + 1
 
 
+@pytest.mark.slow
 def test_models_of_all_files_are_the_same(stills, written):
     folder, points = written(stills), 0
     assert (folder / "Image_sets/classes.txt").read_text().split() == [category.name for category in stills.categories]

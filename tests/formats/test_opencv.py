@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cube_dataset import LENS, make
+from cube_dataset import FEW, LENS, make
 from proven import close, equal
 from small import small_recipe
 from truth_scenes import LENSES
@@ -47,7 +47,7 @@ FOUR = FIVE.model_copy(update={"coefficients": FIVE.coefficients[:4]})
 @pytest.mark.parametrize("name", [*LENSES, "four"])
 def test_cv2_projects_alike(name, tmp_path):
     lens = LENS.model_copy(update={"distortion": {**LENSES, "four": FOUR}[name], "cx": 47.25, "fy": 81.5})
-    dataset = make(tmp_path / "out", several=True, intrinsics=lens)
+    dataset = make(tmp_path / "out", several=True, intrinsics=lens, channels=FEW)
     folder = written(dataset, tmp_path / "made")
     for sample in dataset:
         found = loaded(folder / "pictures" / sample.split / f"{sample.index:08d}.yaml")
@@ -95,6 +95,7 @@ def test_q_p1_and_p2_are_those_of_stereo_rectify(videos, tmp_path):
 BENT = {"model": "fisheye", "coefficients": LENSES["fisheye"].coefficients}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", ["pinhole", "fisheye"])
 def test_any_pair_and_that_rigs_take_it(first, tmp_path):
     sensors = {
@@ -126,13 +127,13 @@ def test_lidars_have_no_files(drives, tmp_path):
 
 def test_small_and_negative_numbers_are_read_exactly(tmp_path):
     small = FIVE.model_copy(update={"coefficients": (1e-7, -2.5e-11, 3e-300, -0.0, 12345.678e-9)})
-    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update={"distortion": small}))
+    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update={"distortion": small}), channels=FEW)
     found = loaded(written(dataset, tmp_path / "made") / "cameras" / "camera.yaml")
     equal("opencv", "small numbers", found["distortion_coefficients"][0], small.coefficients)
 
 
 def test_what_it_refuses(tmp_path):
-    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update={"skew": 2.5}))
+    dataset = make(tmp_path / "out", intrinsics=LENS.model_copy(update={"skew": 2.5}), channels=FEW)
     with pytest.raises(UserError, match=r"format opencv: expected cameras without skew; found 2\.5 of camera"):
         written(dataset, tmp_path / "made")
     assert not (tmp_path / "made").exists()

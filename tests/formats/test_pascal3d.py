@@ -78,6 +78,7 @@ def test_rolled_cameras_are_theta(tmp_path):
         close("pascal3d", "scipy: theta", said.viewpoint.theta, sample.pose.tilt_deg, "deg", atol=1e-9)
 
 
+@pytest.mark.slow
 def test_models_beside_the_axis_are_near_and_exact_by_the_true_camera(stills, written):
     folder, farthest = written(stills), 0.0
     for sample, _, record, objects, seen in shown(stills, folder):

@@ -101,6 +101,7 @@ def test_pictures_are_the_objects_boxes(stills, written):
         assert found.shape == (y1 - y0, x1 - x0, 3) and np.abs(found - sample.rgb[y0:y1, x0:x1]).mean() < 8
 
 
+@pytest.mark.slow
 def test_its_renderer_would_see_the_same(tmp_path):
     """Its models look along x where ours look along -y."""
     recipe = poses_recipe(

@@ -284,6 +284,7 @@ def generate_one(out, channels):
     return out
 
 
+@pytest.mark.slow
 def test_vkitti_1(one_eye, tmp_path):
     root = written(one_eye, tmp_path, "vkitti", version="1.3.1")
     for sequence, samples in scenes(one_eye).items():
@@ -357,7 +358,7 @@ def tilted(tmp_path_factory):
     return Dataset(out)
 
 
-@pytest.fixture(scope="module", params=["stills", "tilted"])
+@pytest.fixture(scope="module", params=["stills", pytest.param("tilted", marks=pytest.mark.slow)])
 def views(request):
     return request.getfixturevalue(request.param)
 
@@ -807,7 +808,7 @@ def rfc_name(name):
     return synset, md5, [angle % 360 for angle in angles[:3]], angles[3], [int(part) for part in rest[4:6]]
 
 
-@pytest.mark.parametrize("world", ["poses", "tilted"])
+@pytest.mark.parametrize("world", ["poses", pytest.param("tilted", marks=pytest.mark.slow)])
 def test_render_for_cnn(world, request, tmp_path):
     dataset = request.getfixturevalue(world)
     root = written(dataset, tmp_path, "render_for_cnn")

@@ -22,7 +22,7 @@ from worlds import stills as recipe
 NUMBERS = {"ground": 2, "scenery": 3, "building": 3, "chair": 6, "sky": 0}
 
 
-@pytest.fixture(scope="module", params=["view", "world"])
+@pytest.fixture(scope="module", params=[pytest.param(axes, marks=pytest.mark.slow) for axes in ("view", "world")])
 def both(request, tmp_path_factory):
     place = tmp_path_factory.mktemp(request.param)
     kept = {"channels": ["rgb", "depth", "semantic", "voxels"], "labels": {"voxels": {"axes": request.param}}}

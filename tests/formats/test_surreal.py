@@ -229,6 +229,7 @@ def test_the_rest_of_info(people, clips):
     assert {clip.parts[-4] for clip in clips} == {"train", "val"}
 
 
+@pytest.mark.slow
 def test_videos_show_the_pictures(clips):
     for clip, samples in clips.items():
         frames = ffmpeg.read_frames(f"{clip}.mp4")
@@ -279,6 +280,7 @@ def long(tmp_path_factory):
     return Dataset(folder / "out")
 
 
+@pytest.mark.slow
 def test_clips_have_at_most_a_hundred_pictures(long, tmp_path):
     export(long.root, ["surreal"], output=tmp_path)
     first, second = sorted((tmp_path / "surreal").rglob("*_info.mat"))
@@ -290,6 +292,7 @@ def test_clips_have_at_most_a_hundred_pictures(long, tmp_path):
     equal("surreal", "scipy: segm, Mixamo's names", last["segm_2"], long[-1].body_parts)
 
 
+@pytest.mark.slow
 def test_a_clip_s_pictures_are_not_in_memory_together(long):
     tree = surreal.Surreal(long)
     clip = tree._clip_of(long[0])

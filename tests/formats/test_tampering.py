@@ -41,7 +41,7 @@ FORMATS = [name for name in plugins.names("formats") if _proves_itself(plugins.l
 OF_CAMERAS = {"gltf", "native", "pointcloud"}
 """Those that would hold nothing of pictures of unknown cameras."""
 
-EVERY = [pytest.param(1, marks=pytest.mark.slow, id="all"), pytest.param(10, id="some")]
+EVERY = [pytest.param(1, marks=pytest.mark.slow, id="all"), pytest.param(20, id="some")]
 """Of so many values, or kinds of file, one is tried."""
 
 FLIPS = 4

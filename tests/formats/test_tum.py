@@ -9,8 +9,9 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from cube_dataset import LENS, make
+from cube_dataset import FEW, LENS, make
 from proven import close, equal
+from quick import quick
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
@@ -62,7 +63,7 @@ def compare(sample, steps, points, rays, kind):
     assert np.abs(points - cloud).max() < 2e-4
 
 
-@pytest.mark.parametrize("world", ["stills", "poses", "videos"])
+@pytest.mark.parametrize("world", quick(["stills", "poses", "videos"], "stills", "poses"))
 def test_depth_lifts_to_the_worlds_points(world, request, tmp_path):
     dataset = request.getfixturevalue(world)
     folder = written(dataset, tmp_path)
@@ -78,7 +79,7 @@ def test_depth_lifts_to_the_worlds_points(world, request, tmp_path):
         compare(sample, *lifted(own, pair[3], pose), "tum")
 
 
-@pytest.mark.parametrize("world", ["stills", "videos"])
+@pytest.mark.parametrize("world", quick(["stills", "videos"], "stills"))
 def test_icl_nuim_is_mirrored(world, request, tmp_path):
     dataset = request.getfixturevalue(world)
     folder = written(dataset, tmp_path, "icl-nuim")
@@ -107,9 +108,10 @@ def test_seconds_ascend_in_every_sequence(videos, tmp_path):
         assert all(len(row) == 8 for row in rows(file))
 
 
+@pytest.mark.slow
 def test_lenses_and_what_it_refuses(tmp_path):
     def made(name, **lens):
-        return make(tmp_path / name, intrinsics=LENS.model_copy(update=lens))
+        return make(tmp_path / name, intrinsics=LENS.model_copy(update=lens), channels=FEW)
 
     barrel = made("barrel", distortion=LENSES["barrel"])
     for file in written(barrel, tmp_path / "made").rglob("calibration.txt"):
@@ -159,7 +161,9 @@ def test_a_sequence_comes_in_as_it_went_out(videos, kind, tmp_path):
 
 
 def test_lenses_come_in(tmp_path):
-    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": LENSES["barrel"]}))
+    dataset = make(
+        tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": LENSES["barrel"]}), channels=FEW
+    )
     import_dataset("tum", written(dataset, tmp_path / "made") / "several", tmp_path / "in")
     assert all(sample.camera.distortion == LENSES["barrel"] for sample in Dataset(tmp_path / "in"))
 

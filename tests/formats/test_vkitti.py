@@ -181,6 +181,7 @@ def test_texts_of_version_2(videos, two):
         assert tables["info"].columns.tolist() == ["trackID", "label", "model", "color"]
 
 
+@pytest.mark.slow
 def test_version_1(lone, one):
     truncated = 0
     for sample in lone:

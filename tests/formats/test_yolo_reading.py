@@ -79,6 +79,7 @@ def test_what_is_read_goes_out_equal(task, tmp_path):
     assert report.ok, report.findings
 
 
+@pytest.mark.slow
 def test_an_export_comes_back_byte_for_byte(stills, tmp_path):
     for task in LINES:
         export(stills.root, [{"yolo": {"task": task}}], output=tmp_path / task)

@@ -42,6 +42,7 @@ def test_passes_its_points_at_its_knots(closed):
     np.testing.assert_allclose(curve.at(curve.knots), there, atol=1e-9)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.booleans())
 @settings(max_examples=20, deadline=None)
 def test_length_is_the_length_of_short_chords(seed, closed):

@@ -102,6 +102,7 @@ def test_polygons_of_all_masks_of_3_by_4():
         np.testing.assert_array_equal(rasterised(mask_polygons(mask), mask.shape), mask)
 
 
+@pytest.mark.slow
 def test_polygons_of_200_random_masks_with_holes():
     rng = np.random.default_rng(7)
     holes = 0

@@ -82,7 +82,7 @@ def test_pictures_follow_from_seed_and_moment_alone():
     assert (picture(RAIN) != picture(RAIN.model_copy(update={"seed": 4}))).any()
 
 
-@pytest.mark.parametrize("falling", [RAIN, SNOW])
+@pytest.mark.parametrize("falling", [RAIN, pytest.param(SNOW, marks=pytest.mark.slow)])
 def test_nothing_is_seen_in_front_of_what_is_nearer(falling):
     assert picture(falling).any()
     assert not picture(falling, nearest=1 / 0.3).any()

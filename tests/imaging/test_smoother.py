@@ -82,6 +82,7 @@ def test_transparent_pictures_melt_into_nothing():
     assert smooth_border(picture, DISC, Smoother(kind="poisson")) is picture
 
 
+@pytest.mark.slow
 def test_poisson_takes_a_constant_off():
     """An object that is its background plus a constant (of the square roots) becomes its background."""
     behind = 0.3 + 0.3 * X / W + 0.1 * Y / H

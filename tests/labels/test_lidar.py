@@ -232,6 +232,7 @@ def test_check_finds_times_that_are_not_those_of_the_sweep(tmp_path):
     assert "lidar" in {finding.check for finding in check(Dataset(out), rays=False).findings}
 
 
+@pytest.mark.slow
 def test_points_are_drawn_from_above():
     """Ahead at the top; a preview shows them beside the camera's picture."""
     car = {"source": "zoo:car", "category": "car", "scale": {"length": 1.8}}
@@ -387,6 +388,7 @@ def test_a_sweep_in_which_nothing_moves_has_the_same(wall):
     assert (np.abs(one["intensity"] - other["intensity"]) > 1e-4 * one["intensity"]).mean() < 0.002
 
 
+@pytest.mark.slow
 def test_changes_to_materials_change_it_and_are_checked(wall, tmp_path):
     """Tints, and pictures; labels computed again from exported models have the same, and so the same points drop out."""
     _, rows = points_of(wall())

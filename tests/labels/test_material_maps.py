@@ -76,6 +76,7 @@ def test_its_proof_notices_others(name):
         assert proof(LABEL, changed(sample, "materials", change))
 
 
+@pytest.mark.slow
 def test_names_are_in_the_data_set_and_proved(tmp_path):
     generate(small_recipe(channels=["rgb", "instances", "triangles", "materials"], formats=[]), tmp_path)
     dataset = Dataset(tmp_path)

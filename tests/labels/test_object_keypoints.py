@@ -104,6 +104,7 @@ def test_points_outside_and_behind():
     assert OUTSIDE in states
 
 
+@pytest.mark.slow
 def test_without_slack_what_lies_inside_is_hidden():
     """Wheel centres lie inside of wheels: fewer points are seen where nothing may lie before them."""
 

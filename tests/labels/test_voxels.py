@@ -272,6 +272,7 @@ def test_check_computes_grids_again(tmp_path):
     assert grid.grid.size == (30, 20, 30) and {0, 1} <= set(np.unique(grid.instances).tolist())
 
 
+@pytest.mark.slow
 def test_channels_that_are_added_later_have_their_options(tmp_path):
     views = {"azimuth": [0, 120], "elevation": 15, "distance": 1.0}
     first = small_recipe(channels=["rgb", "depth", "instances"], formats=[], viewpoints=views)

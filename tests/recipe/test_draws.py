@@ -63,6 +63,7 @@ def test_normal_has_its_mean_and_deviation():
     assert abs(found.std() - 0.5) < 0.03
 
 
+@pytest.mark.slow
 def test_normal_keeps_within_its_limits_and_the_field_s_without_piling_up_there():
     found = np.array(draws("share", {"normal": [0.1, 0.2]}))
     assert 0 <= found.min() < 0.001
@@ -118,6 +119,7 @@ def test_colours_are_drawn_from_names_and_codes():
     assert Entry(light=[2, 0, 0]).light == (2, 0, 0)
 
 
+@pytest.mark.slow
 def test_arguments_may_be_distributions():
     found = np.array(draws("number", {"uniform": [{"choice": [10, 20]}, {"uniform": [20, 30]}]}))
     assert 10 <= found.min() < 10.5

@@ -188,6 +188,7 @@ def validator() -> jsonschema.Draft202012Validator:
     return jsonschema.Draft202012Validator(schema())
 
 
+@pytest.mark.slow
 def test_the_schema_is_one_and_describes_every_field():
     whole = schema()
     jsonschema.Draft202012Validator.check_schema(whole)

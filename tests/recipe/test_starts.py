@@ -116,6 +116,7 @@ def test_company_needs_the_models_that_its_comment_says(kind, count, enough, tmp
     assert {len(planned.cast(subject, 0)) for subject in planned.subjects} == {planned.recipe.scene.company.number + 1}
 
 
+@pytest.mark.slow
 def test_the_detector_s_floors_are_grey_to_sand(tmp_path):
     (tmp_path / "recipe.yaml").write_text(start("detector")["recipe.yaml"])
     planned = vs.plan(vs.Recipe.load(tmp_path / "recipe.yaml"))

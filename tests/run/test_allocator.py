@@ -100,7 +100,14 @@ except SystemExit as end:
 """
 
 
-@pytest.mark.parametrize(("process", "is_kept"), [(IN_MEMORY, False), (WORKER, True), (COMMAND, True)])
+@pytest.mark.parametrize(
+    ("process", "is_kept"),
+    [
+        pytest.param(IN_MEMORY, False, marks=pytest.mark.slow),
+        pytest.param(WORKER, True, marks=pytest.mark.slow),
+        (COMMAND, True),
+    ],
+)
 def test_workers_and_the_command_line_keep_memory_and_not_the_users_process(process, is_kept):
     told, (most, left) = answered(process + GIVEN_BACK.replace(TELL, "told = True\n"))
     assert told

@@ -250,6 +250,7 @@ def test_backgrounds_and_splits_by_frame_do_not_change(tmp_path):
         generate(recipe(**fixed, models=models(4)), tmp_path / "out", append=True)
 
 
+@pytest.mark.slow
 def test_company_stands_in_appended_frames(tmp_path):
     scene = {"scene": {"ground": True, "company": {"count": 1, "layout": [[1.0, 0, 30]]}}, "splits": {"by": "frame"}}
     far = {"azimuth": [0, 120], "elevation": [30], "distance": 3.0}
@@ -325,7 +326,8 @@ def stop_in(phase, done):
     return listen
 
 
-@pytest.mark.parametrize("append", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.slow
+@pytest.mark.parametrize("append", [True, False])
 def test_an_interrupted_append_goes_on_with_and_without_the_option(append, bigger, out):
     with pytest.raises(Stopped):
         generate(recipe(**BIGGER), out, append=True, listener=stop_in("frames", 18))
@@ -510,6 +512,7 @@ def test_without_the_option_another_recipe_is_refused_with_a_hint(out):
     assert state(out) == before
 
 
+@pytest.mark.slow
 def test_two_appends_at_once_do_not_mix(out):
     other = recipe(models=models(4))
 
@@ -525,6 +528,7 @@ def test_two_appends_at_once_do_not_mix(out):
     assert report.ok, report.findings
 
 
+@pytest.mark.slow
 def test_large_data_sets_are_planned_fast_and_kept_small():
     views = {"azimuth": {"start": 0, "stop": 359, "step": 1}, "elevation": list(range(0, 80, 4)), "distance": 3.0}
     large = vs.plan(recipe(models=[{"source": "zoo:car", "count": 38}], viewpoints=views, shot_frames=None))
@@ -608,6 +612,7 @@ def moving_recipe(viewpoints, **changes):
     return vs.Recipe.model_validate({**said, **changes})
 
 
+@pytest.mark.slow
 def test_appended_sequences_have_names_of_their_own(tmp_path):
     generate(moving_recipe({"azimuth": 30}), tmp_path / "out", workers=0)
     for azimuth in ([90, 30], 60):
@@ -620,6 +625,7 @@ def test_appended_sequences_have_names_of_their_own(tmp_path):
     assert report.ok, report.findings
 
 
+@pytest.mark.slow
 def test_another_motion_of_the_camera_is_another_sequence(tmp_path):
     for distance in (1.5, 2.5):
         orbit = moving_recipe({"kind": "orbit", "elevation": 20, "distance": distance})

@@ -38,6 +38,7 @@ def few_moving(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["stills", "videos"])
 def test_what_is_computed_is_what_would_have_been_kept(world, request, tmp_path_factory):
     whole = Dataset(rendered(world, shared_place(tmp_path_factory)))
@@ -68,6 +69,7 @@ def test_what_cannot_be_computed_is_told(tmp_path):
         lacking(dataset, module, FormatEntry(name="yolo"))
 
 
+@pytest.mark.slow
 def test_exports_of_few_channels_are_those_of_many(few, tmp_path, tmp_path_factory):
     whole = Dataset(rendered("stills", shared_place(tmp_path_factory)))
     for root, place in ((whole.root, "whole"), (few, "computed")):
@@ -87,6 +89,7 @@ def test_a_choice_of_frames_is_computed_as_all_are(few, tmp_path):
     assert all(text == labels["all"][name] for place in ("some", "cars") for name, text in labels[place].items())
 
 
+@pytest.mark.slow
 def test_parts_of_which_only_some_keep_a_label_are_completed(tmp_path):
     generate(stills(channels=["rgb"], **SHORT), tmp_path / "few")
     generate(stills(channels=["rgb", "depth"], **{**SHORT, "annotations": ["keypoints"]}, seed=4), tmp_path / "more")
@@ -100,6 +103,7 @@ def test_parts_of_which_only_some_keep_a_label_are_completed(tmp_path):
         assert len(list((tmp_path / f"{name} out" / "tum").rglob("depth/*.png"))) == 8
 
 
+@pytest.mark.slow
 def test_what_an_unfinished_neighbour_would_tell_is_asked_for(few_moving, tmp_path):
     dataset = Dataset(shutil.copytree(few_moving, tmp_path / "few"))
     second = [key for key, _ in dataset.shots()][1]

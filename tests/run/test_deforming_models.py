@@ -120,6 +120,7 @@ def test_both_engines_show_them(folder, blender):
     assert pictures == [s.rgb.tobytes() for alone in one_by_one(cycles) for s in Stages().render(alone)]
 
 
+@pytest.mark.slow
 def test_what_is_seen_is_the_mesh_of_the_time_step(folder):
     """Coordinates of pixels lie in the box of the model at the time step, which reaches as far as its file says."""
     for sample, frame in zip(Stages().render(shot_of_three(folder)), FRAMES, strict=True):
@@ -152,6 +153,7 @@ def test_motions_say_what_stays():
 # Data sets.
 
 
+@pytest.mark.slow
 def test_a_data_set_keeps_one_model_of_all_time_steps(folder):
     generate(recipe(folder, formats=["coco", "native"]), folder / "out")
     dataset = Dataset(folder / "out")
@@ -174,6 +176,7 @@ def test_a_data_set_keeps_one_model_of_all_time_steps(folder):
     assert report.ok, report
 
 
+@pytest.mark.slow
 def test_exports_name_the_files_and_come_back(folder):
     generate(recipe(folder, formats=["coco", "native"]), folder / "out")
     (instances,) = (folder / "out" / "coco" / "annotations").glob("instances_*.json")
@@ -227,6 +230,7 @@ def test_appending_adds_time_steps_and_changes_nothing_that_was_there(folder):
     assert not [*(out / "store" / "writing").iterdir()]
 
 
+@pytest.mark.slow
 def test_a_model_whose_file_changed_is_not_added_to(folder, monkeypatch):
     generate(recipe(folder, frames=[1, 25]), folder / "out")
     (folder / "walker.fbx").write_bytes(b"limps")
@@ -236,6 +240,7 @@ def test_a_model_whose_file_changed_is_not_added_to(folder, monkeypatch):
     assert check(Dataset(folder / "out")).ok
 
 
+@pytest.mark.slow
 def test_a_model_that_was_being_replaced_comes_back(folder):
     """A run that died between putting the old folder aside and the new one in its place."""
     out = folder / "out"
@@ -249,6 +254,7 @@ def test_a_model_that_was_being_replaced_comes_back(folder):
     assert not [*(store.folder / "writing").iterdir()]
 
 
+@pytest.mark.slow
 def test_another_time_step_s_vertices_are_found_by_check(folder):
     """Two OBJ files, then two nodes of the GLB, change places; digests are made anew, so only labels can tell."""
     out = folder / "out"
@@ -279,6 +285,7 @@ def test_equal_models_merge_and_others_stay_apart(folder):
         assert report.ok, report
 
 
+@pytest.mark.slow
 def test_a_time_step_has_the_key_of_no_other_model(folder):
     (folder / "walker-f0013.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n")
     still = {"source": str(folder / "walker-f0013.obj"), "category": "sheet"}

@@ -91,6 +91,7 @@ def test_an_export_that_is_written_again_keeps_its_options(small_dataset):
     assert category_id(root) == POST_BOX["contiguous"] and is_proved(root)
 
 
+@pytest.mark.slow
 def test_appending_keeps_the_options_of_the_exports_that_are_there(tmp_path):
     small = {"channels": ["rgb"], "formats": []}
     generate(small_recipe(**small), tmp_path / "out", formats=[COCOS_OWN])
@@ -100,6 +101,7 @@ def test_appending_keeps_the_options_of_the_exports_that_are_there(tmp_path):
     assert is_proved(tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_changed_options_are_damage(small_dataset):
     file = small_dataset.root / "coco" / "checksums.xxh128"
     text = file.read_text()

@@ -147,6 +147,7 @@ def test_appended_frames_show_as_much_of_their_models(name, tmp_path):
 DRAWN = {"min_visibility": 0.6, "viewpoints": {**LOW, "count": 5}, "empty": 0.2}
 
 
+@pytest.mark.slow
 def test_the_draws_do_not_depend_on_how_shots_are_cut(tmp_path):
     recipe = recipe_of(**DRAWN)
     vs.generate(recipe, tmp_path / "one")
@@ -244,6 +245,7 @@ def test_an_export_is_proved_by_the_threshold_that_it_was_made_with(tmp_path):
     assert {finding.check for finding in check(vs.open(out)).findings} == {"coco"}
 
 
+@pytest.mark.slow
 def test_the_data_set_is_read_once_for_all_formats_that_leave_annotations_out(tmp_path, monkeypatch):
     vs.generate(recipe_of(**LEFT_OUT, keep_annotations_above=0.5), tmp_path / "out", formats=[])
     made, begin = [], Exported.__init__
@@ -267,6 +269,7 @@ def test_a_merged_data_set_has_the_highest_threshold(tmp_path):
     assert not check(dataset).findings
 
 
+@pytest.mark.slow
 def test_only_frames_of_the_recipe_are_counted_as_hidden(tmp_path):
     views = {"kind": "jitter", "azimuth": 0, "elevation": 0, "distance": 2.5, "plus_minus": {"azimuth": 3}}
     row = {"company": {"layout": [[0, -0.6, 0], [0.6, 0.6, 0]], "gap": 0}, "ground": "off"}

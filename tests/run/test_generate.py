@@ -245,6 +245,7 @@ def losing(monkeypatch):
     monkeypatch.setattr("viewsphere.run.generate.hired", lambda root, portion, *_: Losing(root, portion, 0))
 
 
+@pytest.mark.slow
 def test_shots_lost_with_their_workers_are_told_when_all_others_are_made(losing, monkeypatch, small_run, tmp_path):
     with pytest.raises(WorkerDied) as caught:
         generate(small_recipe(), tmp_path / "out")

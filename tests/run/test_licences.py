@@ -84,6 +84,7 @@ def test_without_a_credit_nothing_is_said(folder, tmp_path):
     assert [("credit" in json.loads(file.read_text("utf-8"))) for file in models] == [False, False]
 
 
+@pytest.mark.slow
 def test_a_credit_said_later_is_written_without_rendering(folder, licensed, tmp_path):
     generate(recipe(folder), tmp_path / "out")
     before = tree_hash(tmp_path / "out" / "store" / "shots")
@@ -96,6 +97,7 @@ def test_a_credit_said_later_is_written_without_rendering(folder, licensed, tmp_
     assert credits_of(tmp_path / "out") == {"0": MAKER, "1": MAKER}
 
 
+@pytest.mark.slow
 def test_other_credits_renew_all_exports_that_name_them_and_no_other(folder, tmp_path):
     out, formats = tmp_path / "out", ["coco", "native", "csv"]
     generate(recipe(folder, credit=Credit(licence="CC0-1.0")), out, formats=formats)
@@ -113,6 +115,7 @@ def test_other_credits_renew_all_exports_that_name_them_and_no_other(folder, tmp
     assert generate(recipe(folder, credit=MAKER), out, formats=["coco"]).formats == ("coco",)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_before_its_exports_leaves_other_credits_to_the_next(folder, tmp_path, monkeypatch):
     out = tmp_path / "out"
     generate(recipe(folder), out, formats=["native"])
@@ -126,6 +129,7 @@ def test_a_run_that_ends_before_its_exports_leaves_other_credits_to_the_next(fol
     assert check(Dataset(out), rays=False).ok
 
 
+@pytest.mark.slow
 def test_appended_and_merged_models_keep_their_credits(folder, tmp_path):
     other = Credit(licence="CC0-1.0")
     generate(recipe(folder, "0.glb"), tmp_path / "a")
@@ -144,6 +148,7 @@ def test_native_s_credits_are_imported(licensed, tmp_path):
     assert (tmp_path / "out" / CREDITS).read_bytes() == (licensed / CREDITS).read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [lambda file: file.unlink(), lambda file: file.write_text("| mine |")])
 def test_check_proves_the_file_and_repair_writes_it_again(spoil, licensed, tmp_path):
     out = shutil.copytree(licensed, tmp_path / "out")

@@ -107,6 +107,7 @@ def test_the_same_model_is_kept_once(sources, tmp_path):
     assert joined.plan.poses == 7
 
 
+@pytest.mark.slow
 def test_merging_again_finds_it_done_and_a_merge_can_be_merged(sources, merged, tmp_path):
     before = tree_hash(merged / "store")
     merge(sources, merged)
@@ -125,6 +126,7 @@ BAD = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("change", "message"), BAD)
 def test_other_cameras_and_channels_are_refused_unless_asked_for(sources, tmp_path, change, message):
     generate(recipe(**change), tmp_path / "d")
@@ -181,6 +183,7 @@ def test_channels_that_were_not_added_to_the_end_are_an_unfinished_data_set(sour
     assert not (tmp_path / "e").exists()
 
 
+@pytest.mark.slow
 def test_one_model_in_two_categories_is_two_models(sources, tmp_path):
     letter_box = {"source": "zoo:post_box", "category": "letter box", "count": 1, "scale": {"length": 0.18}}
     viewpoints = {"azimuth": 30, "elevation": 15, "distance": 1.0}
@@ -211,6 +214,7 @@ def test_scenery_goes_along(tmp_path):
     assert not any("surface" in note for note in report.notes)
 
 
+@pytest.mark.slow
 def test_names_that_sentences_tell_are_not_respelled(tmp_path):
     for name, spelled in (("a", "bin"), ("b", "Bin")):
         generate(

@@ -123,6 +123,7 @@ def proved(shot: Shot, samples) -> None:
             assert np.abs(seen - sample.depth[o.mask]).max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHOTS)
 def test_labels_of_what_moves_and_of_every_sensor_are_what_embree_sees(name):
     shot = SHOTS[name]()
@@ -133,6 +134,7 @@ def test_labels_of_what_moves_and_of_every_sensor_are_what_embree_sees(name):
     assert len(set(positions.values())) == 3
 
 
+@pytest.mark.slow
 def test_any_cut_of_a_sequence_gives_the_same_samples():
     """One by one, from a stage that was warm for another instant, or all together."""
     shot, stages = moving_shot(), Stages()

@@ -102,6 +102,7 @@ def test_any_number_of_workers_makes_the_same_pictures(workers, pictures, whole,
     assert tree_hash(tmp_path / "out") == tree_hash(whole)
 
 
+@pytest.mark.slow
 def test_frames_come_out_alike_in_any_order(pictures):
     """Each frame, made after others and first of all in a fresh stage."""
     from viewsphere.run.stages import Stages

@@ -20,7 +20,7 @@ def frames_told(seen):
     return [(p.done, p.under_way) for p in seen if p.phase == "frames"]
 
 
-@pytest.mark.parametrize("workers", [0, 1])
+@pytest.mark.parametrize("workers", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_every_frame_is_told_before_its_shot_is_finished(tmp_path, workers):
     seen: list[Progress] = []
     generate(small_recipe(**WHOLE), tmp_path / "out", workers=workers, listener=seen.append)

@@ -62,6 +62,7 @@ def whole(files, tmp_path_factory):
     return recipe, Dataset(out)
 
 
+@pytest.mark.slow
 def test_a_scene_is_rendered_checked_and_resumed(files, whole):
     recipe, dataset = whole
     report = check(dataset)
@@ -87,6 +88,7 @@ def test_memory_and_store_hold_the_same(whole):
         assert stored.pose == sample.pose
 
 
+@pytest.mark.slow
 def test_labelled_scenery_becomes_objects_with_models(files, tmp_path):
     _, summary = made(files, tmp_path / "ds", labels="own", draw="per_frame")
     dataset = Dataset(tmp_path / "ds")
@@ -110,6 +112,7 @@ def test_any_number_of_workers_makes_the_same(files, whole, tmp_path):
     assert tree_hash(tmp_path / "ds") == tree_hash(whole[1].root)
 
 
+@pytest.mark.slow
 def test_the_proof_covers_the_scenery(whole, tmp_path):
     """A post that the store knows nothing of is found by its pixels; scenery that has changed is named."""
     _, dataset = whole
@@ -132,6 +135,7 @@ def test_the_proof_covers_the_scenery(whole, tmp_path):
     assert any("background not checked where scenery-yard" in note for note in report.notes)
 
 
+@pytest.mark.slow
 def test_what_cannot_stand_there_is_refused_in_one_line(files, tmp_path):
     def problem(scene, viewpoints=None):
         recipe = small_recipe(
@@ -168,6 +172,7 @@ def test_what_cannot_stand_there_is_refused_in_one_line(files, tmp_path):
         list(render(small_recipe(scene={"place": str(tmp_path / "bad.glb")})))
 
 
+@pytest.mark.slow
 def test_a_model_left_out_takes_the_shots_it_would_be_in_with_it(files, tmp_path):
     (tmp_path / "bad.obj").write_text("nothing")
     (tmp_path / "good.glb").write_bytes(glb_bytes(blocks(((-0.1, -0.2, 0), (0.1, 0.2, 0.2)))))

@@ -70,6 +70,7 @@ def test_there_may_be_more_shards_than_shots(small_run, tmp_path):
     assert tree_hash(tmp_path / "out") == tree_hash(small_run)
 
 
+@pytest.mark.slow
 def test_what_a_shard_has_does_not_depend_on_what_is_there(tmp_path):
     def shots(out):
         return set(Store(out).finished())
@@ -88,6 +89,7 @@ def test_a_shard_makes_the_models_of_its_shots_alone(tmp_path):
     assert [path.name for path in (tmp_path / "out" / "store" / "models").iterdir()] == [prepare(recipe).subjects[1]]
 
 
+@pytest.mark.slow
 def test_a_shard_that_finds_all_finished_writes_only_exports_that_lack_something(tmp_path):
     out = tmp_path / "out"
     recipe = small_recipe(formats=["csv", "coco"])
@@ -100,6 +102,7 @@ def test_a_shard_that_finds_all_finished_writes_only_exports_that_lack_something
     assert tree_hash(out) == whole
 
 
+@pytest.mark.slow
 def test_what_shards_left_out_is_what_one_run_leaves_out(tmp_path):
     (tmp_path / "models").mkdir()
     good = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"

@@ -76,6 +76,7 @@ def test_noise_of_one_shot_differs_between_variations() -> None:
     assert 0.3 < np.abs(one - other).mean() < 10
 
 
+@pytest.mark.slow
 def test_a_check_proves_the_data_set(made: Dataset) -> None:
     report = check(made)
     assert report.ok and report.checked["digests"]

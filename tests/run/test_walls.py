@@ -35,10 +35,12 @@ def way(*azimuths, distance):
     }
 
 
+@pytest.mark.slow
 def test_a_camera_in_the_room_is_free_to_go():
     assert len(list(render(recipe(**way(0, 40, distance=0.5))))) == 4
 
 
+@pytest.mark.slow
 def test_a_camera_beyond_the_walls_is_told():
     with pytest.raises(RecipeError, match=r"viewpoints: expected the camera in a room of the place.*beyond the walls"):
         list(render(recipe(**way(0, 40, distance=30))))

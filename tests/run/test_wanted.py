@@ -39,6 +39,7 @@ def test_company_between_hides_as_much_as_is_wanted(tmp_path):
     assert not check(vs.Dataset(tmp_path / "a")).findings
 
 
+@pytest.mark.slow
 def test_models_are_cut_off_as_much_as_is_wanted(tmp_path):
     jitter = {"off_center": {"uniform": [[-0.6, -0.5], [0.6, 0.5]]}}
     generate(wanted(scene={"jitter": jitter}, wanted={"truncation": [0.2, 0.5]}), tmp_path / "a")
@@ -62,6 +63,7 @@ def test_what_is_looked_at_is_where_the_recipe_says(distance):
         np.testing.assert_allclose(a.camera.R, b.camera.R, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_had_is_told_with_how_near_it_came(tmp_path):
     summary = generate(wanted(models=[{**BOX[0], "count": 1}], wanted={"visibility": [0.1, 0.2]}), tmp_path)
     (note,) = (note for note in summary.notes if "wanted" in note)

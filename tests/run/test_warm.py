@@ -7,12 +7,15 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from threading import Barrier
 
+import numpy as np
 import pytest
 
 from shots import unit_box
 from viewsphere import Recipe, plan
+from viewsphere.geometry.mask import decode_rle, encode_rle
 from viewsphere.kernels.kernel_cache import sources_digest
 from viewsphere.run import warm
 
@@ -62,6 +65,7 @@ def test_of_processes_that_need_kernels_at_once_one_compiles_them(monkeypatch, t
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(warm, "_render", compile_one)
+    monkeypatch.setattr(warm, "_caches", lambda: {str(tmp_path)})
     shot = next(iter(plan(RECIPE).shots(unit_box)))
     with ThreadPoolExecutor(2) as workers:  # locks are those of open files: threads are to them as processes are
         for done in [workers.submit(worker) for _ in range(2)]:
@@ -127,6 +131,7 @@ def test_a_mark_is_void_when_a_kernel_is_gone(tmp_path, monkeypatch):
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(warm, "_render", render)
+    monkeypatch.setattr(warm, "_caches", lambda: {str(tmp_path / "kernels" / "digest")})
     warm.compile_kernels(shot)
     warm.compile_kernels(shot)
     assert len(rendered) == 1
@@ -134,3 +139,15 @@ def test_a_mark_is_void_when_a_kernel_is_gone(tmp_path, monkeypatch):
     warm.compile_kernels(shot)
     warm.compile_kernels(shot)
     assert len(rendered) == 2
+
+
+def test_a_mark_lists_kernels_of_this_process_and_none_of_other_versions(tmp_path, monkeypatch):
+    decode_rle(2, 2, encode_rle(np.ones((2, 2), bool)))
+    (of_mask,) = (folder for folder in map(Path, warm._caches()) if list(folder.glob("kernels_mask.*.nbi")))
+    folder = of_mask.parent.parent
+    assert {f"{of_mask.relative_to(folder)}/{file.name}" for file in of_mask.glob("*.nbi")} <= set(warm._kernels(folder))
+    for digest in ("own", "old"):
+        (tmp_path / digest).mkdir()
+        (tmp_path / digest / "kernel.nbi").touch()
+    monkeypatch.setattr(warm, "_caches", lambda: {str(tmp_path / "own"), str(of_mask)})
+    assert warm._kernels(tmp_path) == ["own/kernel.nbi"]

@@ -30,6 +30,7 @@ def recipe(*models, **changes):
     return small_recipe(**{**values, **changes})
 
 
+@pytest.mark.slow
 def test_distractors_are_drawn_and_not_labelled(tmp_path):
     generate(recipe(), tmp_path)
     dataset = vs.Dataset(tmp_path)
@@ -53,6 +54,7 @@ def test_the_labelled_stand_where_they_stand_whoever_else_is_drawn():
         assert a.world_from_object == b.world_from_object and a.model.key == b.model.key
 
 
+@pytest.mark.slow
 def test_distractors_fall_with_the_others():
     models = [{**entry, "motion": {"kind": "fall"}} for entry in (OWN, OTHER)]
     scenes = {"count": 1, "layout": "fall", "distractors": 2}

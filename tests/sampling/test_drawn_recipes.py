@@ -76,6 +76,7 @@ def test_focal_lengths_and_principal_points_may_be_drawn(camera, fx, fy):
     assert all(30 <= cx <= 34 for cx, _ in centres)
 
 
+@pytest.mark.slow
 def test_a_drawn_camera_is_recorded_with_each_sample_and_proved(tmp_path):
     recipe = small_recipe(camera={"size": [96, 72], "fov_deg": [30, 45], "principal_point": [[45, 50], 36]})
     vs.generate(recipe, tmp_path / "out")
@@ -170,6 +171,7 @@ def test_rotations_are_uniform():
     assert abs(expected - np.linspace(0, 1, 3000)).max() < 1.63 / 3000**0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["scenes", "company"])
 def test_things_that_lie_any_way_lie_on_the_floor_clear_of_others(where):
     turned = {"orientation": "any", "gap": 0.2}

@@ -201,6 +201,7 @@ def falling(**changes):
     return small_recipe(**values, **changes)
 
 
+@pytest.mark.slow
 def test_all_shots_of_a_scene_take_what_was_simulated_once(tmp_path):
     """A run on another machine, whose physics ends elsewhere, goes on with what is kept."""
     recipe = falling()

@@ -93,6 +93,7 @@ def test_shares_are_drawn_uniformly_and_by_the_poses_name():
     assert fills(7, seed=1) != many[:7].tolist()
 
 
+@pytest.mark.slow
 def test_all_models_of_a_random_scene_fill_the_share_together():
     views = {"azimuth": [0, 50], "distance": {"fill": 0.7}}
     recipe = recipe_of(scenes={"count": 2, "objects": 3}, splits={"train": 1.0}, viewpoints=views)
@@ -100,6 +101,7 @@ def test_all_models_of_a_random_scene_fill_the_share_together():
         assert label_fill(sample, sample.objects) == pytest.approx(0.7, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_a_frames_model_fills_the_share_whatever_stands_beside_it():
     views = {"azimuth": [0, 200], "elevation": 40, "distance": {"fill": 0.12}}
     recipe = recipe_of(scene={"company": 2, "ground": "off"}, splits={"train": 1.0}, viewpoints=views)

@@ -98,6 +98,7 @@ def test_origin_scale_and_up_move_cameras_and_objects_alike(tmp_path):
             np.testing.assert_allclose(own.R @ world[:3, 3] + own.t, 2 * seen[:3, 3], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_shots_are_added_to_a_data_set_that_has_others(rendered, tmp_path):
     generate(recipe(tmp_path, LINES[:2]), tmp_path / "out", workers=0)
     with pytest.raises(Exception, match="append"):
@@ -109,6 +110,7 @@ def test_shots_are_added_to_a_data_set_that_has_others(rendered, tmp_path):
         np.testing.assert_array_equal(one.instances, other.instances)
 
 
+@pytest.mark.slow
 def test_a_camera_may_be_inside_of_scenery(tmp_path):
     line = shot(0, objects=1, split="train")
     line["objects"][0]["world_from_object"] = line["world_from_camera"]

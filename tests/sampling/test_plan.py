@@ -114,7 +114,9 @@ def test_a_million_frames_can_be_meant():
     assert plan(recipe(max_frames=10**9, viewpoints={"kind": "sphere", "count": 10**7, "distance": 5})).frames == 3 * 10**7
 
 
-@pytest.mark.parametrize(("by", "units"), [("model", 1000), ("pose", 36), ("frame", 36_000)])
+@pytest.mark.parametrize(
+    ("by", "units"), [("model", 1000), ("pose", 36), pytest.param("frame", 36_000, marks=pytest.mark.slow)]
+)
 def test_splits_have_their_shares_and_keep_together_what_they_should(by, units):
     planned = plan(
         recipe(models=[{"source": "zoo:car", "count": 1000}], splits={"by": by, "train": 0.7, "val": 0.2, "test": 0.1})

@@ -13,6 +13,7 @@ import pytest
 
 import viewsphere as vs
 from counting import counted
+from quick import quick
 from small import ROOT, small_recipe, tree_hash
 from viewsphere import plugins
 from viewsphere.check import check
@@ -64,7 +65,10 @@ def test_a_number_is_short_for_so_many_scenes():
     assert small_recipe().sampler == "product"
 
 
-@pytest.mark.parametrize(("by", "views"), [("model", None), ("model", 2), ("pose", 2), ("place", None), ("frame", 2)])
+@pytest.mark.parametrize(
+    ("by", "views"),
+    quick([("model", None), ("model", 2), ("pose", 2), ("place", None), ("frame", 2)], ("model", 2), ("place", None)),
+)
 def test_a_scene_is_the_same_however_many_there_are(by, views):
     more = {"splits": {"by": by, "train": 0.5, "val": 0.5}, "scenes": {"views": views}}
     more |= {"scene": {"place": {"source": "zoo:neighbourhood", "draw": "per_model"}, "sun": {"azimuth_deg": [0, 360]}}}
@@ -74,6 +78,7 @@ def test_a_scene_is_the_same_however_many_there_are(by, views):
     assert {key: shot.scene for key, shot in few.items()} == {key: many[key].scene for key in few}
 
 
+@pytest.mark.slow
 def test_a_model_more_takes_one_place_at_most():
     before, after = (shots(vs.plan(recipe(40, models, splits={"by": "frame"}))) for models in (20, 21))
     changed = 0
@@ -218,6 +223,7 @@ def dataset(tmp_path_factory):
     return vs.open(out)
 
 
+@pytest.mark.slow
 def test_a_data_set_of_scenes_is_proved(dataset):
     report = check(dataset)
     assert report.ok, report.findings
@@ -233,6 +239,7 @@ def test_a_data_set_of_scenes_is_proved(dataset):
     assert 0 < len(chosen) <= 9 and all(first in {o.key for o in sample.objects} for sample in chosen)
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_counted_in_scenes(dataset, tmp_path):
     vs.generate(recipe(3, scenes={"objects": [1, 3]}), tmp_path / "out")
     gone = next((tmp_path / "out" / "store" / "shots").glob("*/*/manifest.json"))
@@ -254,6 +261,7 @@ def test_workers_appending_and_memory_make_the_same_pictures(dataset, tmp_path):
     assert check(added, rays=False).ok
 
 
+@pytest.mark.slow
 def test_channels_are_added_to_scenes_of_the_same_models(tmp_path):
     out = tmp_path / "out"
     vs.generate(recipe(2, channels=["rgb"], scenes={"objects": 2}), out)
@@ -269,6 +277,7 @@ def test_channels_are_added_to_scenes_of_the_same_models(tmp_path):
         vs.generate(recipe(scenes={}).model_copy(update={"scenes": None}), out, append=True)
 
 
+@pytest.mark.slow
 def test_preview_and_estimate_know_scenes():
     samples = list(preview_samples(recipe(3), 6))
     assert len({(sample.objects[0].key, sample.pose.azimuth_deg) for sample in samples}) == 6
@@ -297,7 +306,7 @@ def test_the_sampler_in_the_docs_is_one_file(monkeypatch):
     assert [len(sample.objects) for sample in vs.render(pairs)] == [2] * 4
 
 
-@pytest.mark.parametrize(("models", "poses"), [(1, 10**8), (1000, 10**5)])
+@pytest.mark.parametrize(("models", "poses"), quick([(1, 10**8), (1000, 10**5)], (1, 10**8)))
 @pytest.mark.parametrize("by", ["model", "frame"])
 def test_a_hundred_million_frames_are_planned_in_little_memory(models, poses, by, tmp_path):
     big = small_recipe(

@@ -198,6 +198,7 @@ def shifts(steady, moved):
     return np.array([m[:3, 3] for m in by]), np.array(turned)
 
 
+@pytest.mark.slow
 def test_shake_is_bounded_smooth_and_seeded():
     times = np.arange(2000) / 200
     entry = {"kind": "mast", "position": [3, -4, 5]}

@@ -110,6 +110,7 @@ def test_a_million_poses_cost_nothing_until_asked_for():
     tracemalloc.stop()
 
 
+@pytest.mark.slow
 def test_the_sphere_is_uniform_by_area():
     views = [make(kind="sphere", count=4000).view(i) for i in range(4000)]
     sines = np.sin(np.radians([v.elevation for v in views]))

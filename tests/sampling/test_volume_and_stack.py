@@ -45,6 +45,7 @@ def test_a_side_that_separates_is_a_proof():
     assert said == {True, False}
 
 
+@pytest.mark.slow
 def test_too_many_for_the_air_are_told_with_what_was_found():
     with pytest.raises(
         RecipeError, match=r"scenes\.layout: expected room for 30 models in 0.8 x 0.8 x 0.8 m; found it for \d+"
@@ -120,6 +121,7 @@ def test_models_lie_in_a_scene():
     assert min(ups) < 0.1  # a post box lies on its side more often than it stands
 
 
+@pytest.mark.slow
 def test_hulls_stand_closer_than_boxes_and_not_in_one_another():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 0.6, 0], [0, 0, 1], [1, 0, 0.2]], float) - (0.5, 0.3, 0)
     sizes = {"boxes": [], "hulls": []}

@@ -3,7 +3,7 @@
 import pytest
 
 from command_line import viewsphere
-from cube_dataset import POSES, make
+from cube_dataset import FEW, POSES, make
 from viewsphere.check import check
 from viewsphere.check.repair import repair
 from viewsphere.errors import StoreError
@@ -42,7 +42,7 @@ def change(root, **fields):
 
 def endless(root, frames=ENDLESS):
     """A data set whose plan has so many poses of each of its three models, of which four are there of one."""
-    dataset = make(root, leave_out=(1, 2))
+    dataset = make(root, leave_out=(1, 2), channels=FEW)
     part = dataset.plan.parts[0]
     plain = unsealed((root / "store" / "plan.json").read_text("utf-8"))["parts"][0]
     plain |= {"blocks": [{"subjects": list(part.subjects), "positions": [[0, frames]], "each": 1}], "frames": 3 * frames}
@@ -67,7 +67,7 @@ def test_what_is_there_of_an_endless_plan_is_read_proved_shown_and_exported(tmp_
 
 def test_an_endless_plan_is_not_finished_and_neither_appended_to_nor_merged(tmp_path, rows_made):
     root = endless(tmp_path / "out")
-    make(tmp_path / "other")
+    make(tmp_path / "other", channels=FEW)
     with pytest.raises(StoreError, match="found 4: render it to the end"):
         merge([tmp_path / "other", root], tmp_path / "merged")
     gap = next(Dataset(root).store.gaps(Dataset(root).plan))
@@ -99,7 +99,7 @@ def test_repair_renders_no_endless_plan(tmp_path, rows_made):
     ],
 )
 def test_numbers_that_no_plan_has_are_refused_in_one_line(field, value, tmp_path):
-    root = make(tmp_path / "out", leave_out=(1, 2)).root
+    root = make(tmp_path / "out", leave_out=(1, 2), channels=FEW).root
     plain = unsealed((root / "store" / "plan.json").read_text("utf-8"))["parts"][0]
     change(root, parts=[plain | {field: value}])
     answer = viewsphere("check", root)

@@ -111,6 +111,7 @@ def test_nothing_is_done_to_the_disk_by_mistake(url):
     assert not hasattr(located(url), "rename")
 
 
+@pytest.mark.slow
 def test_data_sets_on_a_disk_need_no_fsspec(few):
     code = f"import sys, viewsphere; viewsphere.open({str(few)!r})[0].rgb; print('fsspec' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
@@ -143,6 +144,7 @@ def test_ranges_of_servers_that_have_none_or_end_before(url, monkeypatch):
     assert byte_range(file, 300, 20) == b""
 
 
+@pytest.mark.slow
 def test_a_rendered_data_set_is_the_same_at_a_url(few, url, monkeypatch):
     kind, written = fsspec.get_filesystem_class("memory"), {}
     works = kind.put_file

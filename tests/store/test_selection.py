@@ -164,6 +164,7 @@ def test_any_frame_costs_the_reading_of_one_shot(single, monkeypatch):
     assert len(read) == 3  # the shots of three models, the last of which was read before
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_what_was_read(single):
     """By a small share of what was read: tables of Python's own fill, and tracemalloc counts what its own snapshots hold."""
     selection = Dataset(single.root).select("rgb", "depth", "objects.box2d")

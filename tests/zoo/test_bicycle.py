@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from quick import quick
 from viewsphere import zoo
 from viewsphere.assets.glb import glb_bytes
 from viewsphere.zoo.bicycle import STYLES, Bicycle, bicycle, draw
@@ -32,7 +33,10 @@ def straight(style: str) -> Bicycle:
     return replace(STYLES[style], steering=0.0)
 
 
-@pytest.mark.parametrize(("style", "factor"), [("road", 1.0), ("road", 1.04), ("mountain", 1.03), ("step_through", 0.98)])
+@pytest.mark.parametrize(
+    ("style", "factor"),
+    quick([("road", 1.0), ("road", 1.04), ("mountain", 1.03), ("step_through", 0.98)], ("road", 1.04), ("step_through", 0.98)),
+)
 def test_a_bicycle_has_the_measures_that_were_asked_for(style: str, factor: float) -> None:
     p = straight(style)
     g = replace(p.geometry, wheelbase=p.geometry.wheelbase * factor, saddle=p.geometry.saddle * factor)
@@ -107,7 +111,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", quick(OTHERS, "road", "shock", "case"))
 def test_a_bicycle_is_sound_and_shows_its_outside(name: str) -> None:
     mesh = built(OTHERS[name])
     assert_sound(mesh, MOST)
@@ -230,7 +234,9 @@ def components(background: np.ndarray) -> Iterator[int]:
         yield size
 
 
-@pytest.mark.parametrize(("style", "spokes", "crosses"), [("road", 28, 3), ("mountain", 32, 3)])
+@pytest.mark.parametrize(
+    ("style", "spokes", "crosses"), [pytest.param("road", 28, 3, marks=pytest.mark.slow), ("mountain", 32, 3)]
+)
 def test_the_mask_has_a_hole_between_any_two_spokes(tmp_path: Path, style: str, spokes: int, crosses: int) -> None:
     p = straight(style)
     p = replace(p, wheel=replace(p.wheel, spokes=spokes, crosses=crosses))
@@ -265,6 +271,7 @@ def test_a_whole_bicycle_has_holes_in_its_frame_and_wheels(tmp_path: Path) -> No
     assert 0.5 * triangle < sizes[1] < 1.5 * triangle
 
 
+@pytest.mark.slow
 def test_one_seed_gives_one_mesh() -> None:
     a, b, other = drawn("bicycle", 4), zoo.build("bicycle", np.random.default_rng(4)), drawn("bicycle", 3)
     for name in ("vertices", "triangles", "normals", "triangle_material", "triangle_part"):
@@ -273,6 +280,7 @@ def test_one_seed_gives_one_mesh() -> None:
     assert a.vertices.tobytes() != other.vertices.tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [5, pytest.param(14, marks=pytest.mark.slow)])
 def test_draws_differ_in_shape_and_colour(count: int) -> None:
     meshes = [drawn("bicycle", seed) for seed in range(count)]

@@ -8,12 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from quick import quick
 from viewsphere import zoo
 from viewsphere.zoo.boat import Boat, MotorBoat, RowingBoat, SailingBoat, boat, draw
 from viewsphere.zoo.shapes.cut import cut
 from viewsphere.zoo.shapes.sheets import bar, moulding, sheet
 from viewsphere.zoo.shapes.solids import Solid, rounded_box
-from zoo_mesh import assert_sound, drawn, faces, outward_share, part_vertices
+from zoo_mesh import assert_sound, drawn, faces, outward_share, part_vertices, seeds
 
 BOATS: tuple[Boat, ...] = (
     RowingBoat(),
@@ -27,14 +28,14 @@ BOATS: tuple[Boat, ...] = (
     SailingBoat(rig="gaff", keel="long", tuck=0.5, wooden=True, lee=-1.0, length=7.0, mast=7.2, draft=1.05, beam=2.3),
 )
 NAMES = ("dinghy", "skiff", "bowrider", "cuddy", "console", "cruiser", "sloop", "day_sailer", "gaff")
+ENLARGED = tuple(replace(p, length=p.length * 1.05, beam=p.beam * 1.05) for p in BOATS)
 built = cache(boat)
-EACH = pytest.mark.parametrize("parameters", BOATS, ids=NAMES)
+EACH = pytest.mark.parametrize("parameters", quick(ENLARGED, *(ENLARGED[i] for i in (1, 3, 5, 8))), ids=NAMES)
 
 
 @EACH
 def test_a_boat_has_its_size_and_stands_on_the_ground(parameters: Boat) -> None:
-    p = replace(parameters, length=parameters.length * 1.05, beam=parameters.beam * 1.05)
-    mesh = boat(p)
+    p, mesh = parameters, built(parameters)
     shell = part_vertices(mesh, "hull", "antifouling", "boot_stripe", "sheer_stripe", "gunwale", "toe_rail", "rubbing")
     assert np.ptp(shell[:, 1]) == pytest.approx(p.length, rel=0.035)
     assert np.ptp(shell[:, 0]) == pytest.approx(p.beam, rel=0.06)
@@ -164,7 +165,7 @@ def test_one_seed_gives_one_boat() -> None:
 
 
 def test_draws_are_sound_and_differ() -> None:
-    meshes = [drawn("boat", seed) for seed in range(6)]
+    meshes = [drawn("boat", seed) for seed in seeds(6)]
     for mesh in meshes:
         assert_sound(mesh, 60_000)
     sizes = np.array([zoo.real_size(m) for m in meshes])

@@ -7,16 +7,16 @@ import pytest
 
 from viewsphere.zoo.indoors.plan import SIDES, Room
 from viewsphere.zoo.interior import Interior, draw, interior, rooms
-from zoo_mesh import assert_sound, drawn, part_vertices
+from zoo_mesh import assert_sound, drawn, part_vertices, seeds
 
-SEEDS = range(12)
+SEEDS = seeds(12, few=4)
 
 
 def parameters(seed: int) -> Interior:
     return draw(np.random.default_rng(seed))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(6))
 def test_draws_are_sound_and_differ(seed: int) -> None:
     mesh, p = drawn("interior", seed), parameters(seed)
     assert_sound(mesh, 25_000, least=500)

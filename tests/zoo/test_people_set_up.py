@@ -110,6 +110,7 @@ def test_a_mix_of_shapes_is_weighted(fetched):
     assert (mixed[1:] == data.base[1:]).all() and mixed[0, 0] > data.base[0, 0]
 
 
+@pytest.mark.slow
 def test_doctor_sets_people_up_and_says_so(fetched):
     before = CliRunner().invoke(app, ["doctor"]).output
     assert "mannequins; MakeHuman's bodies by viewsphere doctor --setup-people" in before and not fetched

@@ -8,15 +8,16 @@ import math
 import numpy as np
 import pytest
 
+from quick import quick
 from viewsphere import plugins, zoo
 from viewsphere.zoo.indoors.furnishing import overlap
 from viewsphere.zoo.places import Place, PlacePiece
 from viewsphere.zoo.places.town import town_random
 from viewsphere.zoo.town_ground import TownGround, town_ground
 from viewsphere.zoo.townscape import blocks
-from zoo_mesh import assert_sound, drawn, faces, part_vertices
+from zoo_mesh import assert_sound, drawn, faces, part_vertices, seeds
 
-SEEDS = range(6)
+SEEDS = seeds(6, few=3)
 
 
 def at(piece: PlacePiece) -> np.ndarray:
@@ -111,7 +112,7 @@ def test_nothing_stands_on_the_free_stretch_of_road(place: Place) -> None:
         assert piece.family in ("town_ground", "outskirts") or not (x0 < x < x1 and y0 < y < y1)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", quick(range(2), 1))
 def test_the_ground_is_sound_and_the_roads_are_level(seed: int) -> None:
     mesh = drawn("town_ground", seed)
     assert_sound(mesh, 40_000, least=5_000)
@@ -127,6 +128,7 @@ def test_the_ground_is_sound_and_the_roads_are_level(seed: int) -> None:
     assert mesh.vertices.tobytes() == town_ground(ground).vertices.tobytes()
 
 
+@pytest.mark.slow
 def test_the_country_begins_where_the_town_ends() -> None:
     ground = plugins.family("town_ground").draw(np.random.default_rng(4))
     land = drawn("outskirts", 4)

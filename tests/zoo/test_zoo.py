@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quick import quick
 from viewsphere import zoo
 from viewsphere.errors import UserError
 from viewsphere.zoo.car import SIZES, Car, car, draw
@@ -40,7 +41,7 @@ def test_an_unknown_family_names_the_nearest() -> None:
         zoo.build("cars", np.random.default_rng(0))
 
 
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body", quick(BODIES, "sedan", "pickup"))
 def test_a_car_has_the_size_that_was_asked_for(body: str) -> None:
     for factor in (1.0, 1.06):
         length, width, height = (factor * x for x in SIZES[body])
@@ -80,7 +81,7 @@ def test_a_car_faces_minus_y_and_has_its_parts(body: str) -> None:
     assert paint.clearcoat == 1.0
 
 
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body", quick(BODIES, "hatchback", "van"))
 def test_a_car_is_sound_and_symmetric(body: str) -> None:
     mesh = car(Car(body=body, roof_rack=True, rack_bars=True, rear_spoiler=True, exhausts=2))
     assert_sound(mesh, 44_500)
@@ -118,7 +119,7 @@ def test_a_drier_has_its_size_parts_and_sound_triangles(parameters: HairDrier) -
     assert outward_share(mesh) > 0.997
 
 
-@pytest.mark.parametrize("family", ["car", "hair_drier"])
+@pytest.mark.parametrize("family", [pytest.param("car", marks=pytest.mark.slow), "hair_drier"])
 def test_one_seed_gives_one_mesh(family: str) -> None:
     a, b, other = drawn(family, 4), zoo.build(family, np.random.default_rng(4)), drawn(family, 3)
     for name in ("vertices", "triangles", "normals", "triangle_material", "triangle_part"):
@@ -131,7 +132,7 @@ def test_one_seed_gives_one_mesh(family: str) -> None:
 @pytest.mark.parametrize(
     ("family", "ranges", "most"),
     [
-        ("car", ((1.75, 2.6), (1.38, 2.4), (3.6, 5.75)), 44_500),
+        pytest.param("car", ((1.75, 2.6), (1.38, 2.4), (3.6, 5.75)), 44_500, marks=pytest.mark.slow),
         ("hair_drier", ((0.07, 0.16), (0.2, 0.4), (0.1, 0.32)), 17_000),
     ],
 )

@@ -6,9 +6,11 @@ import hashlib
 import json
 import math
 import os
+import sys
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,8 +64,24 @@ def compile_kernels(shot: Shot) -> None:
             return
         _render(small)
         with suppress(OSError):  # a folder that others may not write
-            kernels = (file.relative_to(mark.parent).as_posix() for file in mark.parent.rglob("*.nbi"))
-            mark.write_text("\n".join(sorted(kernels)), "utf-8", newline="\n")
+            mark.write_text("\n".join(_kernels(mark.parent)), "utf-8", newline="\n")
+
+
+def _kernels(folder: Path) -> list[str]:
+    """Files below a folder of the kernels that this process has; those of other versions, thousands after some years, are none
+    of its business.
+    """
+    own = (kept for kept in map(Path, _caches()) if kept.is_relative_to(folder))
+    return sorted(file.relative_to(folder).as_posix() for kept in own for file in kept.glob("*.nbi"))
+
+
+def _caches() -> set[str]:
+    """Folders that hold the kernels of the modules which this process has imported."""
+    from numba.extending import is_jitted  # takes long to load; who renders has it
+
+    modules = [vars(module) for module in list(sys.modules.values()) if isinstance(module, ModuleType)]
+    known = (value for names in modules for value in list(names.values()) if is_jitted(value))
+    return {path for kernel in known if (path := kernel.stats.cache_path)}
 
 
 @contextmanager
