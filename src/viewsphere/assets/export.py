@@ -85,14 +85,16 @@ def _obj_runs(mesh: Mesh, names: list[str]) -> Iterable[str]:
         uv = _coordinates(mesh, mesh.materials[run.material])
         yield _lines("vt", np.zeros((len(run.vertices), 2), np.float32) if uv is None else uv[run.vertices])
         yield _lines("vn", mesh.normals[run.vertices])
-        corners = np.char.mod("%d", run.triangles + vertex)
-        yield "".join(f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}\n" for a, b, c in corners.tolist())
+        corners = np.repeat(run.triangles + vertex, 3, axis=1)
+        yield "f %d/%d/%d %d/%d/%d %d/%d/%d\n" * len(corners) % tuple(corners.ravel().tolist())
         vertex += len(run.vertices)
 
 
 def _lines(keyword: str, rows: NDArray[np.float32]) -> str:
-    """One line a row; the digits are the shortest that give the same float32."""
-    return "".join(f"{keyword} {' '.join(row)}\n" for row in rows.astype("U24").tolist())
+    """One line a row; the digits are the shortest that give the same float32. A number that occurs often is spelt once."""
+    bits, which = np.unique(np.ascontiguousarray(rows).view(np.uint32), return_inverse=True)
+    texts = np.array(bits.view(np.float32).astype("U24").tolist(), object)
+    return f"{keyword}{' %s' * rows.shape[1]}\n" * len(rows) % tuple(texts[which.ravel()].tolist())
 
 
 def _coordinates(mesh: Mesh, material: Material) -> NDArray[np.float32] | None:
