@@ -203,7 +203,7 @@ def main() -> None:
     asked.out.mkdir(parents=True, exist_ok=True)
     write_board(asked.out)
     found = {}
-    pairs = max(12, asked.views // 4)
+    pairs = max(6, asked.views // 4)
     for name, judge, views in (("camera", calibrate, asked.views), ("stereo", calibrate_rig, pairs)):
         vs.generate(recipe(asked.out, views, name == "stereo"), asked.out / name, workers=2)
         found[name] = judge(vs.open(asked.out / name))

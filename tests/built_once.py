@@ -7,6 +7,9 @@ from unittest.mock import patch
 
 from viewsphere import zoo
 
+QUICK = {"name": "raster", "bounces": "off", "ambient_occlusion": "off", "antialias": 1, "shadow_resolution": 64}
+"""An engine for recipes whose light is no matter: what bounces, hollows and shadows are, each bakes for as long as it draws."""
+
 
 @contextmanager
 def built_once():

@@ -32,7 +32,7 @@ def eventful_recipe(frames: int = 100, **changes) -> Recipe:
                 {"kind": "constant", "velocity": [{"uniform": [-0.02, 0.02]}, 0, 0]},
             ]},
             {"source": "zoo:chair", "category": "chair", "scale": {"length": 0.4}, "motion":
-                {"kind": "oscillate", "position": [0.3, 0, 0], "period": {"uniform": [1, 3]}, "leave": 2.9 * third}},
+                {"kind": "oscillate", "position": [0.3, 0, 0], "period": {"uniform": [1, 3]}, "leave": 2.8 * third}},
         ],
         "viewpoints": {"kind": "orbit", "azimuth": [0, 60], "elevation": [18, 30], "distance": [3, 2.6],
                        "shake": {"degrees": 0.4, "mm": 6}},

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from built_once import built_once
+from built_once import QUICK, built_once
 from like_trees import READ
 from quick import quick
 from small import ROOT
@@ -37,8 +37,7 @@ SYSTEMS = [
     "sun_saenko",
 ]
 
-SMALL = {"camera.size": [96, 72], "engine": {"name": "raster", "bounces": "off"}}
-"""Whether light bounces is no matter of a recipe's kind of content; its bake would take half of a room's time."""
+SMALL = {"camera.size": [96, 72], "engine": QUICK}
 
 # A street with a car, and what is made in no time in the place of another: the same one for all. A town takes ten times as long
 # to build.
@@ -95,7 +94,7 @@ FEW: dict[str, dict] = {
         "viewpoints.count": 2,
         "scene.place": "zoo:neighbourhood",
     },
-    "pascal3d": {"seed": 2, "scenes.count": 1, "scenes.objects": 3, "viewpoints.count": 2, "scene.place": "zoo:neighbourhood"},
+    "pascal3d": {"seed": 2, "scenes.count": 1, "scenes.objects": 2, "viewpoints.count": 2, "scene.place": "zoo:neighbourhood"},
     "objectnet3d": {"models[0].source": ["zoo:backpack", "zoo:can"], "models[1].source": ["zoo:laptop"], "viewpoints.count": 1},
     "liebelt": {"viewpoints.azimuth": [30, 200], "viewpoints.elevation": [20]},
     "falling_things": {**ROOM, "scenes.count": 1, "viewpoints.count": 1},
@@ -106,7 +105,8 @@ SOME = {
     "sintel": [0, 3],
     "surreal": [0, 2],
     "render_for_cnn": [2, 5, 6, 9],
-    "pascal3d": [0, 2, 3],
+    "pascal3d": [2, 3],
+    "objectnet3d": [0, 1, 3, 9, 10],
     "liebelt": [1, 2],
 }
 

@@ -2,15 +2,14 @@
 
 import pytest
 
-from built_once import built_once
+from built_once import QUICK, built_once
 from small import ROOT
 from viewsphere import Recipe, generate, plan
 from viewsphere.check import check
 from viewsphere.run.stages import Stages
 from viewsphere.store import Dataset
 
-SMALL = {"camera.size": [96, 72], "formats": [], "engine": {"name": "raster", "bounces": "off"}}
-"""Whether light bounces is no matter of what stands where."""
+SMALL = {"camera.size": [96, 72], "formats": [], "engine": QUICK}
 
 SCENES = {"tabletop_fall": 6, "bin_picking": 10, "flying_things": 6}
 FEW: dict[str, dict] = {

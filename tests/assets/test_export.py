@@ -1,5 +1,6 @@
 """What is exported reads back: by trimesh as an oracle, and by our own readers field by field."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -139,6 +140,20 @@ def test_the_obj_reads_back_to_the_same_floats(sorted_mesh, tmp_path):
     merged = back.images[every.metallic_roughness_texture.image].pixels
     np.testing.assert_array_equal(merged[..., 1:3], sorted_mesh.images[1].pixels[..., 1:3])
     np.testing.assert_allclose(corners(back, "colors")[..., :3], corners(sorted_mesh, "colors")[..., :3], atol=1e-6)
+
+
+def test_each_number_of_an_obj_has_the_fewest_digits_that_give_it_back(mesh, tmp_path):
+    odd = np.float32([0, -0.0, 1e-30, -1e-5, 0.1, 1 / 3, 12345.678, 1 << 24, 1e20])
+    plain = replace(mesh, vertices=np.random.default_rng(5).choice(odd, (120, 3)), colors=None)
+    lines = export_obj(plain, tmp_path, "a").read_text("utf-8").splitlines()
+    for keyword, rows in (("v", plain.vertices), ("vn", plain.normals)):
+        spelt = {f"{keyword} {' '.join(map(str, row))}" for row in rows}
+        assert {line for line in lines if line.startswith(f"{keyword} ")} == spelt
+    at = [np.float32(line.split()[1:]) for line in lines if line.startswith("v ")]
+    corners = [line.split()[1:] for line in lines if line.startswith("f ")]
+    assert all(corner == "/".join([corner.split("/")[0]] * 3) for triangle in corners for corner in triangle)
+    found = sorted([at[int(corner.split("/")[0]) - 1].tolist() for corner in triangle] for triangle in corners)
+    assert found == sorted(plain.vertices[plain.triangles].tolist())
 
 
 def test_trimesh_reads_the_obj_s_triangles(sorted_mesh, tmp_path):

@@ -36,6 +36,7 @@ def still_recipe(engine, *, motion=None, **changed):
         "scene": {"ground": True, "company": 1},
         "channels": ["rgb", *(name for name, label in channel_labels().items() if is_still(label))],
         "annotations": [name for name, label in on_request().items() if is_still(label)],
+        "labels": {"voxels": {"size": [80, 48, 80], "cell": 0.06}},
         "engine": engine,
         "formats": [],
         "splits": {"by": "frame", "train": 1},

@@ -74,7 +74,9 @@ def export_obj(mesh: Mesh, folder: Path, name: str, library: str = "") -> Path:
 def _obj_runs(mesh: Mesh, names: list[str]) -> Iterable[str]:
     parts = _plain_names(mesh.parts)
     colors = None if mesh.colors is None else encoded(mesh.colors[:, :3].astype(np.float64)).astype(np.float32)
-    positions = mesh.vertices if colors is None else np.column_stack([mesh.vertices, colors])
+    positions = _spelt(mesh.vertices if colors is None else np.column_stack([mesh.vertices, colors]))
+    normals = _spelt(mesh.normals)
+    spelt: dict[Texture | None, NDArray[np.object_]] = {}
     vertex, part = 1, -1
     for run in runs(mesh):
         if run.part != part:
@@ -82,25 +84,33 @@ def _obj_runs(mesh: Mesh, names: list[str]) -> Iterable[str]:
             yield f"g {parts[part]}\n"
         yield f"usemtl {names[run.material]}\n"
         yield _lines("v", positions[run.vertices])
-        uv = _coordinates(mesh, mesh.materials[run.material])
-        yield _lines("vt", np.zeros((len(run.vertices), 2), np.float32) if uv is None else uv[run.vertices])
-        yield _lines("vn", mesh.normals[run.vertices])
-        corners = np.char.mod("%d", run.triangles + vertex)
-        yield "".join(f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}\n" for a, b, c in corners.tolist())
+        texture = mesh.materials[run.material].base_color_texture
+        if texture not in spelt:
+            spelt[texture] = _spelt(_coordinates(mesh, texture))
+        yield _lines("vt", spelt[texture][run.vertices])
+        yield _lines("vn", normals[run.vertices])
+        corners = np.repeat(run.triangles + vertex, 3, axis=1)
+        yield "f %d/%d/%d %d/%d/%d %d/%d/%d\n" * len(corners) % tuple(corners.ravel().tolist())
         vertex += len(run.vertices)
 
 
-def _lines(keyword: str, rows: NDArray[np.float32]) -> str:
-    """One line a row; the digits are the shortest that give the same float32."""
-    return "".join(f"{keyword} {' '.join(row)}\n" for row in rows.astype("U24").tolist())
+def _spelt(rows: NDArray[np.float32]) -> NDArray[np.object_]:
+    """The shortest digits that give the same float32. A number that occurs often is spelt once."""
+    bits, which = np.unique(np.ascontiguousarray(rows).view(np.uint32), return_inverse=True)
+    return np.array(bits.view(np.float32).astype("U24").tolist(), object)[which.reshape(rows.shape)]
 
 
-def _coordinates(mesh: Mesh, material: Material) -> NDArray[np.float32] | None:
-    """OBJ's texture coordinates (v upwards) for a material's base colour; None when the mesh has none."""
-    texture = material.base_color_texture or Texture(0)
+def _lines(keyword: str, rows: NDArray[np.object_]) -> str:
+    """One line a row."""
+    return f"{keyword}{' %s' * rows.shape[1]}\n" * len(rows) % tuple(rows.ravel().tolist())
+
+
+def _coordinates(mesh: Mesh, texture: Texture | None) -> NDArray[np.float32]:
+    """OBJ's texture coordinates (v upwards) for a base colour's texture; zeros when the mesh has none."""
+    texture = texture or Texture(0)
     uv = mesh.uv1 if texture.texcoord == 1 else mesh.uv0
     if uv is None:
-        return None
+        return np.zeros((len(mesh.vertices), 2), np.float32)
     u, v = (uv.astype(np.float64) * texture.scale).T
     sine, cosine = math.sin(texture.rotation), math.cos(texture.rotation)
     x = cosine * u + sine * v + texture.offset[0]

@@ -61,9 +61,9 @@ class RayCaster:
         self._known: dict[str, _Soup] = {}
         self._around: dict[str, _Soup | None] = {}
         self._key: object = None
-        self._all: Any = None
         self._solid: Any = None
-        self._owner = np.zeros(0, np.int64)
+        self._clear: Any = None
+        self._owners = np.zeros(0, np.int64), np.zeros(0, np.int64)
         self._middle = np.zeros(3)
         self._lowest = 0.0
         self._has_ground = False
@@ -103,11 +103,11 @@ class RayCaster:
         slack = TOLERANCE * np.abs(np.where(np.isfinite(s), s, 0.0)) + rounded / np.abs(rays[rows, columns, 2])
         eye = sample.camera.center - self._middle
         start = np.where(np.isfinite(s), s - slack, 0.0)
-        found, owner = _cast(self._all, eye + start[:, None] * directions, directions)
+        found, owner = self._nearest(eye + start[:, None] * directions, directions)
         found = found + start
         first, _ = _cast(self._solid, np.broadcast_to(eye, directions.shape), directions)
         with np.errstate(invalid="ignore"):
-            there = (np.abs(found - s) <= slack) & (np.append(self._owner, -1)[owner] == ids)
+            there = (np.abs(found - s) <= slack) & (owner == ids)
             height = (eye + s[:, None] * directions)[:, 2]
             off = np.abs(height - self._lowest)
             on_ground = np.isfinite(s) & (off <= slack * np.maximum(1.0, np.abs(directions[:, 2])))
@@ -119,8 +119,14 @@ class RayCaster:
             nearest = min(found[i], first[i])
             yield (
                 f"{wrong.sum()} of {len(s)} {what}: at pixel ({columns[i]}, {rows[i]}) object {ids[i]} is "
-                f"stored at {s[i]:.6g} m along the ray, Embree finds {np.append(self._owner, 0)[owner[i]]} at {nearest:.6g} m"
+                f"stored at {s[i]:.6g} m along the ray, Embree finds {max(owner[i], 0)} at {nearest:.6g} m"
             )
+
+    def _nearest(self, origins: Float, directions: Float) -> tuple[Float, NDArray[np.int64]]:
+        """Distance along each ray (infinite where nothing is hit) and whose the surface is, 0 for scenery's, -1 for none."""
+        (solid, i), (clear, k) = _cast(self._solid, origins, directions), _cast(self._clear, origins, directions)
+        of_solid, of_clear = (np.append(own, -1)[which] for own, which in zip(self._owners, (i, k), strict=True))
+        return np.minimum(solid, clear), np.where(clear < solid, of_clear, of_solid)
 
     def _is_in_ground(self, eye: Float) -> bool:
         """Whether the camera stands in the plane of the ground, of which it then sees nothing."""
@@ -151,10 +157,12 @@ class RayCaster:
         nothing = np.zeros((0, 3, 3))
         corners = np.concatenate([nothing, *(transform(world, soup.corners) - self._middle for _, world, soup in placed)])
         opaque = np.concatenate([np.zeros(0, np.bool_), *(soup.opaque for _, _, soup in placed)])
-        self._owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
+        owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
         lowest = float(corners[..., 2].min(initial=np.inf))
         self._lowest = lowest if floor is None else floor.under(lowest + self._middle[2]) - self._middle[2]
-        self._all, self._solid = _scene(corners), _scene(corners[opaque])
+        # A surface is in one of two scenes: one of all, beside that of what hides others, would take twice as long to make.
+        self._solid, self._clear = _scene(corners[opaque]), _scene(corners[~opaque])
+        self._owners = owner[opaque], owner[~opaque]
         self._key = key
 
     def _exported(self, key: str) -> _Soup:
