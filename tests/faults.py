@@ -182,7 +182,7 @@ class Course:
         return self.place / "out"
 
     def moment(self, process: subprocess.Popen[str]) -> None:
-        """Wait until some moment of the work, often while it writes: until so many of its files are there, and a little more."""
+        """Wait until some moment of the work, often while it writes: until so many files are there, and a little more."""
         if self.rng.random() < 0.2:
             time.sleep(self.rng.uniform(0, STARTING))
             return
