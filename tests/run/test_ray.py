@@ -156,7 +156,7 @@ def test_ctrl_c_ends_all_workers_and_the_run_goes_on_elsewhere(sent, tmp_path, l
     assert not begun(tmp_path)
     kept = finished(tmp_path)
     assert 1 < kept < 12
-    summary = generate(small_recipe(**RECIPE), tmp_path / "out", workers=0)
+    summary = generate(small_recipe(**RECIPE), tmp_path / "out")
     assert summary.rendered == 24 - 2 * kept
     assert tree_hash(tmp_path / "out") == tree_hash(local)
 
@@ -173,7 +173,7 @@ def test_machines_that_do_not_see_the_data_set_render_nothing(tmp_path, cluster)
 def local(tmp_path_factory):
     """What a local run makes; do not change it."""
     root = tmp_path_factory.mktemp("local") / "local"
-    generate(small_recipe(**RECIPE), root, workers=0)
+    generate(small_recipe(**RECIPE), root)
     return root
 
 

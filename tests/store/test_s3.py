@@ -32,7 +32,7 @@ sys.path[:0] = ["tests", "tests/store"]
 from small import small_recipe
 from test_s3 import FEW, URL
 from viewsphere import generate
-generate(small_recipe(**FEW), URL, workers=1)
+generate(small_recipe(**FEW), URL)
 """
 
 
@@ -59,7 +59,7 @@ def faults(server, monkeypatch):
 @pytest.fixture(scope="module")
 def few(tmp_path_factory):
     root = tmp_path_factory.mktemp("few") / "out"
-    generate(small_recipe(**FEW), root, workers=0)
+    generate(small_recipe(**FEW), root)
     return root
 
 
@@ -95,7 +95,7 @@ def test_a_killed_run_goes_on(few, faults):
     for shot in Dataset(URL).rows:
         assert Dataset(URL).store.has_shot(shot.key)
     assert {finding.check for finding in check(Dataset(URL), fast=True).findings} <= {"counts", "credits"}
-    assert generate(small_recipe(**FEW), URL, workers=0).rendered < len(Dataset(few))
+    assert generate(small_recipe(**FEW), URL).rendered < len(Dataset(few))
     assert contents(located(URL)) == contents(few)
 
 
@@ -111,14 +111,13 @@ def test_what_never_answers_is_one_line(few, faults):
         assert "\n" not in str(told.value) and KEYS["AWS_SECRET_ACCESS_KEY"] not in str(told.value), kind
 
 
-def test_uploads_that_are_refused_leave_nothing_half_visible(few, faults, monkeypatch):
-    monkeypatch.setenv("VIEWSPHERE_MAX_REMOTE_TRIES", "3")
+def test_uploads_that_are_refused_leave_nothing_half_visible(few, faults):
     faults.always("500", "manifest.json", "PUT")
-    with pytest.raises(RemoteError, match="expected to write it, found, 3 times"):
-        generate(small_recipe(**FEW), URL, workers=1)
+    with pytest.raises(RemoteError, match="expected to write it, found, 5 times"):
+        generate(small_recipe(**FEW), URL)
     assert len(Dataset(URL)) == 0
     faults.none()
-    generate(small_recipe(**FEW), URL, workers=0)
+    generate(small_recipe(**FEW), URL)
     assert contents(located(URL)) == contents(few)
 
 
@@ -131,7 +130,7 @@ def test_a_missing_bucket_is_told(faults):
 def test_damage_is_found_and_mended(shots, few, faults, tmp_path):
     if shots == "tar":
         few = tmp_path / "packed"
-        generate(small_recipe(**FEW, files={"shots": "tar"}), few, workers=0)
+        generate(small_recipe(**FEW, files={"shots": "tar"}), few)
     root = located(URL)
     for path, data in contents(few).items():
         (root / path).write_bytes(data)
