@@ -72,10 +72,10 @@ def test_two_workers_make_the_same_through_all_faults(few, faults):
     kinds, seen = ("500", "503", "drop", "cut", "slow"), {}
 
     def fault(method, path):
-        """Every sixth request fails, of each kind in turn; the next one of the same does not."""
+        """Every ninth request fails, of each kind in turn; the next one of the same does not."""
         seen[method, path] = seen.get((method, path), 0) + 1
         number = len(faults.asked)
-        return kinds[number // 6 % len(kinds)] if number % 6 == 0 and seen[method, path] < 3 else ""
+        return kinds[number // 9 % len(kinds)] if number % 9 == 0 and seen[method, path] < 3 else ""
 
     faults.fault = fault
     generate(small_recipe(**FEW), URL, workers=2)
