@@ -30,6 +30,9 @@ from viewsphere.store.checksums import damaged_files
 from viewsphere.store.manifest import MANIFEST, Manifest
 
 CHANNELS = ["rgb", "depth", "instances"]
+STARTING = 2.0
+"""Seconds in which a work has just begun, or has not yet."""
+
 SPAWNED = b"spawn_main"
 """Stands in the command line of each worker."""
 
@@ -130,12 +133,11 @@ class Tally:
 
 @dataclass(frozen=True)
 class Undisturbed:
-    """The tree that a work makes, its digest, and for how many seconds it writes nothing yet, and writes."""
+    """The tree that a work makes, its digest, and how many files it has."""
 
     model: Path
     whole: str
-    lead: float
-    span: float
+    files: int
 
 
 @cache
@@ -143,13 +145,8 @@ def undisturbed(work: Work, stock: Path) -> Undisturbed:
     """What comes of a work that nothing hits; found once."""
     out = Path(tempfile.mkdtemp(dir=stock)) / "model"
     _begin(work, stock, out)
-    begun = time.monotonic()
-    process = work.start(stock, out)
-    _await(process, out)
-    lead = time.monotonic() - begun
-    said = process.communicate(timeout=DEADLINE)[1]
-    assert process.returncode == 0, said
-    return Undisturbed(out, tree_hash(out), lead, time.monotonic() - begun - lead)
+    work.finish(stock, out)
+    return Undisturbed(out, tree_hash(out), _files(out))
 
 
 def _begin(work: Work, stock: Path, out: Path) -> None:
@@ -158,10 +155,8 @@ def _begin(work: Work, stock: Path, out: Path) -> None:
         shutil.copytree(stock / work.base, out)
 
 
-def _await(process: subprocess.Popen[str], out: Path) -> None:
-    """Wait until the work writes something."""
-    writing = out / "store" / "writing"
-    until(lambda: process.poll() is not None or (writing.is_dir() and any(writing.iterdir())))
+def _files(out: Path) -> int:
+    return sum(len(files) for _, _, files in os.walk(out))
 
 
 @dataclass
@@ -172,6 +167,7 @@ class Course:
     stock: Path
     place: Path
     rng: random.Random
+    workers: int = 2
     tally: Tally = field(default_factory=Tally)
     is_begun: bool = False
 
@@ -186,12 +182,14 @@ class Course:
         return self.place / "out"
 
     def moment(self, process: subprocess.Popen[str]) -> None:
-        """Wait until some moment of the work, often while it writes."""
+        """Wait until some moment of the work, often while it writes: until so many files are there, and a little more."""
         if self.rng.random() < 0.2:
-            time.sleep(self.rng.uniform(0, self.undisturbed.lead))
+            time.sleep(self.rng.uniform(0, STARTING))
             return
-        _await(process, self.out)
-        time.sleep(self.rng.uniform(0, self.undisturbed.span))
+        there = _files(self.out)
+        awaited = there + self.rng.random() * (self.undisturbed.files - there)
+        until(lambda: process.poll() is not None or _files(self.out) > awaited)
+        time.sleep(self.rng.uniform(0, 0.1))
 
     def suffer(self, fault: Fault, times: int) -> None:
         """Let a fault hit the work so many times; a run that had ended before does not count."""
@@ -202,7 +200,7 @@ class Course:
 
     def hit(self, fault: Fault) -> None:
         """Start the work, let a fault hit it, and look at what there is."""
-        process, self.is_begun = self.work.start(self.stock, self.out), True
+        process, self.is_begun = self.work.start(self.stock, self.out, workers=self.workers), True
         self.moment(process)
         there = finished(self.out)
         self.tally.add(process, fault(process))

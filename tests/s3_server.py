@@ -86,7 +86,7 @@ def _handler(host: str, port: int, faults: Faults) -> type[BaseHTTPRequestHandle
                 self.close_connection = True
                 return
             if kind == "slow":
-                time.sleep(0.3)
+                time.sleep(0.05)
             upstream = HTTPConnection(host, port)
             upstream.request(self.command, self.path, body, dict(self.headers.items()))
             answer = upstream.getresponse()

@@ -498,7 +498,7 @@ def test_a_flipped_bit_in_any_file_of_the_store_is_found(whole, tmp_path):
     assert len(kinds) > 15
     for file in kinds.values():
         data = bytearray(file.read_bytes())
-        for at in rng.integers(0, 8 * len(data), 8).tolist():
+        for at in rng.integers(0, 8 * len(data), 3).tolist():
             data[at // 8] ^= 1 << at % 8
             file.write_bytes(data)
             assert damaged(Dataset(root))[1], f"{file}: bit {at}"
@@ -561,22 +561,33 @@ def place_of(record, where):
     return record, where[-1]
 
 
+BARE = ("depth", "instances")
+"""Channels of data sets whose records are spoilt: others are computed again each time, and find nothing more."""
+
+
 @pytest.fixture(scope="module")
-def merged(whole, whole_records, tmp_path_factory):
+def short(tmp_path_factory):
+    """Records that leave out what their shots say."""
+    return make(tmp_path_factory.mktemp("short") / "out", channels=BARE, ground=True)
+
+
+@pytest.fixture(scope="module")
+def merged(short, tmp_path_factory):
     """Records that say everything, and the shots that they are of."""
-    dataset = Dataset(shutil.copytree(whole_records.root, tmp_path_factory.mktemp("merged") / "out"))
-    for file in whole.root.glob("store/shots/*/*/shot.json"):
-        shutil.copy(file, dataset.root / file.relative_to(whole.root))
+    dataset = make(tmp_path_factory.mktemp("merged") / "out", channels=BARE, ground=True, short=False)
+    for file in short.root.glob("store/shots/*/*/shot.json"):
+        shutil.copy(file, dataset.root / file.relative_to(short.root))
     seal_again(dataset.root)
     assert check(dataset).ok
     return dataset
 
 
-def missed_leaves(dataset, places):
+def missed_leaves(dataset, places, monkeypatch):
     """Places of records where another value is not found, although digests are made to fit. Every frame is spoilt at one of
     them that it has, all frames at once; a frame in which nothing is found then is spoilt alone.
     """
     waiting, missed = list(places), []
+    monkeypatch.setattr(viewsphere.check, "differing", lambda *_: ())  # models, which take half the time, are whole
     while waiting:
         spoilt: dict[int, tuple] = {}
         for where in waiting:
@@ -633,9 +644,9 @@ def record_of(dataset, frame):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["short", "merged"])
-def test_every_leaf_of_every_record_is_proved(whole, merged, tmp_path, kind):
+def test_every_leaf_of_every_record_is_proved(short, merged, tmp_path, kind, monkeypatch):
     """Of each field of each label, and of each thing that is known of a frame."""
-    source = whole if kind == "short" else merged
+    source = short if kind == "short" else merged
     dataset = Dataset(shutil.copytree(source.root, tmp_path / "out"))
     record = record_of(dataset, 6)
     if kind == "merged":
@@ -643,7 +654,7 @@ def test_every_leaf_of_every_record_is_proved(whole, merged, tmp_path, kind):
     places = list(leaves(record))
     if kind == "short":
         places = {where[:3]: where for where in places}.values()  # all of them are in the merged records
-    assert missed_leaves(dataset, places) == []
+    assert missed_leaves(dataset, places, monkeypatch) == []
 
 
 def test_frames_of_another_split_than_the_plan_dealt(tmp_path):
@@ -663,7 +674,7 @@ ASKED = tuple(name for name, label in on_request().items() if replace(label.need
 
 @pytest.fixture(scope="module")
 def annotated(tmp_path_factory):
-    return make(tmp_path_factory.mktemp("annotated") / "set", several=True, annotations=ASKED)
+    return make(tmp_path_factory.mktemp("annotated") / "set", several=True, channels=BARE, annotations=ASKED)
 
 
 def test_labels_on_request_are_proved_where_they_were_asked_for(annotated):
@@ -674,11 +685,11 @@ def test_labels_on_request_are_proved_where_they_were_asked_for(annotated):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["short", "merged"])
-def test_every_leaf_of_labels_on_request_is_proved(annotated, tmp_path, kind):
+def test_every_leaf_of_labels_on_request_is_proved(annotated, tmp_path, kind, monkeypatch):
     """In a frame of objects that hide one another; records that say everything have their shots beside them."""
     dataset = Dataset(shutil.copytree(annotated.root, tmp_path / "out"))
     if kind == "merged":
-        whole = make(tmp_path / "whole", several=True, annotations=ASKED, short=False)
+        whole = make(tmp_path / "whole", several=True, channels=BARE, annotations=ASKED, short=False)
         shot = annotated.store.shot_folder("several-000000") / "shot.json"
         shutil.copy(shot, whole.store.shot_folder("several-000000"))
         seal_again(whole.root)
@@ -689,4 +700,4 @@ def test_every_leaf_of_labels_on_request_is_proved(annotated, tmp_path, kind):
     # Of an outline's many corners the first ones are enough.
     found = [where for where in leaves(record) if fields.intersection(where) and not is_late_corner(where)]
     assert {where[2] for where in found if where[0] == "objects"} >= {"amodal", "occluders"}
-    assert missed_leaves(dataset, found) == []
+    assert missed_leaves(dataset, found, monkeypatch) == []

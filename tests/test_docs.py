@@ -8,6 +8,7 @@ import sys
 import pytest
 
 import viewsphere as vs
+from built_once import built_once
 from command_line import viewsphere
 from deadline import DEADLINE
 from small import ROOT
@@ -33,7 +34,14 @@ def test_readme_s_scripts_exist():
         assert os.access(ROOT / name, os.X_OK)
 
 
+@pytest.fixture
+def models_built_once():
+    with built_once():
+        yield
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("models_built_once")
 def test_readme_s_commands_and_code_run(tmp_path, monkeypatch):
     monkeypatch.setattr("viewsphere.cli.making.cores", lambda: 0)
     monkeypatch.setattr("viewsphere.cli.datasets.cores", lambda: 1)

@@ -93,7 +93,7 @@ def test_the_chart_has_each_curve_of_each_run():
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="what is measured is read below /proc")
-@pytest.mark.parametrize(("kind", "frames", "workers"), [("stills", 256, 1), ("sequences", 160, 0), ("memory", 192, 0)])
+@pytest.mark.parametrize(("kind", "frames", "workers"), [("stills", 168, 1), ("sequences", 144, 0), ("memory", 144, 0)])
 def test_short_runs_keep_their_open_files_and_leave_nothing_aside(kind, frames, workers):
     course = soak.course(kind, frames, workers, models=3, texels=64)
     assert course[-1].frames > frames - 2 * soak.LEAST_APART

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
+from built_once import built_once
 from command_line import viewsphere
 from deadline import DEADLINE
 from small import ROOT
@@ -77,8 +78,9 @@ def empty_folder(tmp_path, monkeypatch):
         package = tmp_path / "stand-in" / "torch" / "utils" / "data"
         package.mkdir(parents=True)
         (package / "__init__.py").write_text(TORCH)
-        monkeypatch.setenv("PYTHONPATH", str(tmp_path / "stand-in"))
-    return folder
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path / "stand-in"), os.environ.get("PYTHONPATH", "")]))
+    with built_once():
+        yield folder
 
 
 def test_the_page_has_what_it_promises():

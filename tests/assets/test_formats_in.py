@@ -119,8 +119,8 @@ def test_known_kinds_that_are_not_read_say_what_to_do(suffix, tmp_path):
 
 @corpus
 @pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 def test_awkward_files_become_what_the_page_says(monkeypatch, tmp_path):
-    monkeypatch.delenv(READ_HERE)
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
     rows = awkward_rows()
     said = table("| File | Outcome | Remark |")
@@ -184,14 +184,10 @@ class Forks:
         self._process.communicate()
 
 
-@corpus
-@pytest.mark.slow
-def test_no_broken_file_does_harm(monkeypatch, tmp_path):
-    """Each in a process of its own: loaded, or one line that names the file; quick, small, and nothing written elsewhere."""
-    import resource
-
-    forks = threading.local()
-    crew = []
+@pytest.fixture
+def forked(monkeypatch):
+    """Files are read by `Forks`, each thread's own; a function that ends them."""
+    forks, crew = threading.local(), []
 
     def start(job):
         if not hasattr(forks, "own"):
@@ -199,16 +195,29 @@ def test_no_broken_file_does_harm(monkeypatch, tmp_path):
             crew.append(forks.own)
         return forks.own.start(job)
 
+    def end():
+        while crew:
+            crew.pop().end()
+
     monkeypatch.setattr(isolated, "_started", start)
     monkeypatch.delenv(READ_HERE)
+    yield end
+    end()
+
+
+@corpus
+@pytest.mark.slow
+def test_no_broken_file_does_harm(forked, monkeypatch, tmp_path):
+    """Each in a process of its own: loaded, or one line that names the file; quick, small, and nothing written elsewhere."""
+    import resource
+
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", str(float(DEADLINE)))
     files = broken_files()
     assert len(files) > 250
     with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as pool:
         outcomes = list(pool.map(lambda path: read_apart(path, tmp_path / "cache"), files))
-    for each in crew:
-        each.end()
+    forked()
     for path, said in zip(files, outcomes, strict=True):
         assert "MAX_READ_SECONDS" not in said
         assert "\n" not in said

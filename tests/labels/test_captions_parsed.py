@@ -19,6 +19,7 @@ import trimesh
 from trimesh.visual.material import PBRMaterial
 
 import viewsphere as vs
+from built_once import built_once
 from proven import equal, told
 
 COLORS = ("black", "gray", "white", "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown")
@@ -675,15 +676,16 @@ def test_what_is_above_and_below(folder, tmp_path):
 def test_a_street_is_told_of(folder, tmp_path):
     """With what stands around as objects with categories of their own, and as scenery."""
     forms = Counter()
-    for labels in ("own", "background"):
-        dataset = made(
-            tmp_path / labels,
-            entries(folder),
-            {"count": 20},
-            scenes={"count": 1, "objects": 4},
-            scene={"place": {"source": "zoo:neighbourhood", "labels": labels}, "sky": {"daylight": {}}},
-        )
-        forms += read(dataset, 20)[1]
+    with built_once():
+        for labels in ("own", "background"):
+            dataset = made(
+                tmp_path / labels,
+                entries(folder),
+                {"count": 20},
+                scenes={"count": 1, "objects": 4},
+                scene={"place": {"source": "zoo:neighbourhood", "labels": labels}, "sky": {"daylight": {}}},
+            )
+            forms += read(dataset, 20)[1]
     assert forms["surroundings"] and forms["hidden"] and forms["count"] == 4
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -34,8 +35,8 @@ def page_file(small_dataset) -> Path:
     return file
 
 
-@pytest.fixture
-def open_page(browser, page_file, settle):
+@contextmanager
+def opening(browser, page_file, settle):
     """A function that opens the report; at the end no error, warning or request may have come up."""
     contexts, troubles = [], []
 
@@ -57,3 +58,23 @@ def open_page(browser, page_file, settle):
     for context in contexts:
         context.close()
     assert troubles == []
+
+
+@pytest.fixture
+def open_page(browser, page_file, settle):
+    """A function that opens the report, until the test ends."""
+    with opening(browser, page_file, settle) as open_:
+        yield open_
+
+
+@pytest.fixture(scope="module")
+def open_for_all(browser, page_file, settle):
+    """A function that opens the report, which takes seconds, until all tests of a file have ended."""
+    with opening(browser, page_file, settle) as open_:
+        yield open_
+
+
+@pytest.fixture(scope="module")
+def page(open_for_all):
+    """The report, opened once: whoever clicks leaves it as it was."""
+    return open_for_all()

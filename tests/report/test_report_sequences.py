@@ -32,6 +32,12 @@ def page_of_sequences(moving):
     return file
 
 
+@pytest.fixture(scope="module")
+def moving_page(open_for_all, page_of_sequences):
+    """Opened once: whoever clicks leaves it as it was."""
+    return open_for_all(file=page_of_sequences)
+
+
 def film(name, instants, sensors=1):
     times, places = np.arange(instants) / 10, np.arange(instants * sensors).reshape(instants, sensors)
     return Film(
@@ -112,15 +118,9 @@ def test_the_page_holds_the_sequences(page_of_sequences):
             ]
 
 
-def test_still_pictures_have_no_player(open_page):
-    page = open_page()
-    assert page.is_hidden("#sequences")
-    assert page.is_hidden("#to-sequences")
-
-
 @pytest.mark.slow
-def test_the_player_steps_and_draws(open_page, page_of_sequences, settle):
-    page = open_page(file=page_of_sequences)
+def test_the_player_steps_and_draws(moving_page, settle):
+    page = moving_page
     player = page.locator("#player canvas").first
     assert page.locator("#player canvas").count() == 2
     assert page.locator("#filmstrip button").count() == 6
@@ -141,6 +141,7 @@ def test_the_player_steps_and_draws(open_page, page_of_sequences, settle):
     assert page.inner_text("#player output").startswith("instant 3,")
     page.select_option("select[name=sequence]", "post_box_001")
     assert page.inner_text("#player output").startswith("instant 0,")
+    page.select_option("select[name=sequence]", "post_box_000")
 
 
 @pytest.mark.slow
@@ -167,8 +168,8 @@ def test_the_player_plays_in_the_time_of_the_sequence_until_it_is_stopped(open_p
 
 
 @pytest.mark.slow
-def test_the_rig_is_drawn_in_3d_and_moves_with_the_instant(open_page, page_of_sequences, settle):
-    page = open_page(file=page_of_sequences)
+def test_the_rig_is_drawn_in_3d_and_moves_with_the_instant(moving_page, settle):
+    page = moving_page
     stage = page.locator("#rig-stage").first
     stage.scroll_into_view_if_needed()
     settle(page)
@@ -178,3 +179,4 @@ def test_the_rig_is_drawn_in_3d_and_moves_with_the_instant(open_page, page_of_se
     stage.scroll_into_view_if_needed()
     assert differs(stage, first, 0.0005)
     assert page.inner_text("#rig-caption").startswith("The rig's 2 sensors")
+    page.locator("#filmstrip button").first.click()

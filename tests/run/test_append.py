@@ -186,7 +186,7 @@ def test_several_appends_follow_one_another(out):
         after = state(out, "store/shots", "store/models")
         assert {file: after[file] for file in before} == before
         before = after
-        report = check(Dataset(out), rays=False)
+        report = check(Dataset(out), rays=False, fast=step is not steps[-1])
         assert report.ok, report.findings
     dataset = Dataset(out)
     fresh = {known_by(s): s for s in vs.render(recipe(**steps[-1]))}
@@ -283,7 +283,7 @@ def bigger_file(tmp_path):
     return file
 
 
-@pytest.mark.parametrize("workers", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 3))])
+@pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_any_number_of_workers_gives_the_same_bytes(workers, bigger_file, bigger, out):
     if workers:
         run = command(bigger_file, out, "--append", "--workers", str(workers))
@@ -308,7 +308,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(bigger_file, bigger, out):
     time.sleep(rng.uniform(0, 0.3))
     os.killpg(run.pid, signal.SIGKILL)
     run.wait(timeout=DEADLINE)
-    subprocess.run(command(bigger_file, out, "--append", "--workers", "2"), check=True, timeout=DEADLINE, capture_output=True)
+    assert viewsphere("render", bigger_file, "-o", out, "--append", "--workers", 0).returncode == 0
     assert tree_hash(out) == tree_hash(bigger)
     after = state(out, "store/shots", "store/models")
     assert {file: after[file] for file in before} == before

@@ -93,11 +93,10 @@ def whole(pictures, tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", [2, 4])
-def test_any_number_of_workers_makes_the_same_pictures(workers, pictures, whole, tmp_path):
+def test_workers_make_the_same_pictures_as_one_process(pictures, whole, tmp_path):
     file = tmp_path / "recipe.yaml"
     file.write_text(recipe(pictures).to_yaml())
-    command = [sys.executable, "-m", "viewsphere", "render", str(file), "-o", str(tmp_path / "out"), "--workers", str(workers)]
+    command = [sys.executable, "-m", "viewsphere", "render", str(file), "-o", str(tmp_path / "out"), "--workers", "2"]
     subprocess.run(command, check=True, timeout=DEADLINE, capture_output=True)
     assert tree_hash(tmp_path / "out") == tree_hash(whole)
 

@@ -1,6 +1,5 @@
 """A data set on a server that speaks S3, whose answers are wrong, slow, cut short or missing."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -23,13 +22,13 @@ FEW = {
     "channels": ["rgb", "depth", "instances"],
     "formats": ["coco"],
     "camera": {"size": [48, 36], "fov_deg": 35},
-    "viewpoints": {"azimuth": [0, 120, 240], "elevation": [15], "distance": 1.0},
+    "viewpoints": {"azimuth": [0, 120], "elevation": [15], "distance": 1.0},
 }
 URL = f"s3://{BUCKET}/cars/out"
 
 RUN = """
 import sys
-sys.path.insert(0, "tests")
+sys.path[:0] = ["tests", "tests/store"]
 from small import small_recipe
 from test_s3 import FEW, URL
 from viewsphere import generate
@@ -73,10 +72,10 @@ def test_two_workers_make_the_same_through_all_faults(few, faults):
     kinds, seen = ("500", "503", "drop", "cut", "slow"), {}
 
     def fault(method, path):
-        """Every fourth request fails, of each kind in turn; the next one of the same does not."""
+        """Every ninth request fails, of each kind in turn; the next one of the same does not."""
         seen[method, path] = seen.get((method, path), 0) + 1
         number = len(faults.asked)
-        return kinds[number // 4 % len(kinds)] if number % 4 == 0 and seen[method, path] < 3 else ""
+        return kinds[number // 9 % len(kinds)] if number % 9 == 0 and seen[method, path] < 3 else ""
 
     faults.fault = fault
     generate(small_recipe(**FEW), URL, workers=2)
@@ -89,14 +88,14 @@ def test_two_workers_make_the_same_through_all_faults(few, faults):
 
 
 def test_a_killed_run_goes_on(few, faults):
-    run = subprocess.Popen([sys.executable, "-c", RUN], env={**os.environ, "PYTHONPATH": "tests/store"})
+    run = subprocess.Popen([sys.executable, "-c", RUN])
     until(lambda: run.poll() is not None or any("PUT" in m and "manifest.json" in p and "shots" in p for m, p in faults.asked))
     run.send_signal(signal.SIGKILL)
     run.wait()
     for shot in Dataset(URL).rows:
         assert Dataset(URL).store.has_shot(shot.key)
-    assert check(Dataset(URL), sample=0, rays=False).checked["files"] == len(Dataset(URL))
-    assert generate(small_recipe(**FEW), URL).rendered < 6
+    assert {finding.check for finding in check(Dataset(URL), fast=True).findings} <= {"counts", "credits"}
+    assert generate(small_recipe(**FEW), URL).rendered < len(Dataset(few))
     assert contents(located(URL)) == contents(few)
 
 
@@ -136,12 +135,19 @@ def test_damage_is_found_and_mended(shots, few, faults, tmp_path):
     for path, data in contents(few).items():
         (root / path).write_bytes(data)
     inside = [path for path in contents(few) if path.startswith("store/") and path.count("/") > 2]
-    files = inside[::9] if shots == "files" else [path for path in inside if path.endswith(".tar")]
+    if shots == "files":  # of each folder its manifest or another file
+        folders = sorted({path.rpartition("/")[0] for path in inside if path.endswith("/manifest.json")})
+        files = [
+            next(path for path in inside if path.startswith(folder) and path.endswith("/manifest.json") == number % 2)
+            for number, folder in enumerate(folders)
+        ]
+    else:
+        files = [path for path in inside if path.endswith(".tar")]
     for path in files:
         data = bytearray((root / path).read_bytes())
         data[len(data) // 2] ^= 4
         (root / path).write_bytes(bytes(data))
     findings = [str(finding) for finding in check(Dataset(root), fast=True).findings]
-    assert len(files) > 3 and all(any(str(root / path) in text for text in findings) for path in files)
+    assert len(files) > 1 and all(any(str(root / path) in text for text in findings) for path in files)
     assert repair(root, fast=True).report.ok
     assert contents(root) == contents(few)

@@ -143,9 +143,9 @@ def test_every_kind_of_room_has_what_makes_it_one() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["room", "flat"])
-def test_the_free_floor_is_free_and_cameras_have_room_around_it(name: str) -> None:
-    for seed in range(2):
+@pytest.mark.parametrize(("name", "seeds"), [("room", 2), ("flat", 1)])
+def test_the_free_floor_is_free_and_cameras_have_room_around_it(name: str, seeds: int) -> None:
+    for seed in range(seeds):
         made = place(name, seed)
         x0, y0, x1, y1 = made.free
         assert min(x1 - x0, y1 - y0) >= 1.1
