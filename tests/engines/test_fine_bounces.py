@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from light_stage import ball
-from test_bounces import AWAY, both, matt, painted_mesh, stage_of
+from test_bounces import AWAY, EVEN, both, matt, painted_mesh, stage_of
 from test_panes import PLATE, behind, plate
 from test_raster import DARK, box, camera, rectangle
 
-from viewsphere.engines.raster import panes, volumes
+from viewsphere.assets.mesh import Material
+from viewsphere.engines.raster import kernels_mirror, panes, volumes
 from viewsphere.engines.raster.gathering_near import with_near
 from viewsphere.engines.raster.lobes import lobe_rays
 from viewsphere.engines.raster.painting import paint, view_of
@@ -94,7 +95,7 @@ def test_a_board_takes_from_the_floor_what_its_form_factor_says(height):
 def lobe_quadrature(toward: np.ndarray, normal: np.ndarray, alpha: float, radiance) -> float:
     """The mean of radiance (N, 3) -> (N,) over a GGX lobe with separable shadowing, by 400 x 400 directions."""
     z, angle = np.meshgrid((np.arange(400) + 0.5) / 400, (np.arange(400) + 0.5) / 400 * 2 * math.pi)
-    across = np.cross(normal, (0.0, 0.0, 1.0))
+    across = np.cross(normal, (1.0, 0.0, 0.0))
     axes = np.stack([across, np.cross(normal, across), normal])
     flat = np.sqrt(1 - z * z)
     ways = np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=-1).reshape(-1, 3) @ axes
@@ -152,15 +153,15 @@ def test_neighbours_of_a_lobe_have_different_rays_and_all_of_them_the_same_ones_
 @pytest.mark.parametrize("roughness", [0.15, 0.4])
 def test_a_rough_mirror_shows_the_mean_of_its_lobe(roughness, monkeypatch):
     """Bands that shine before a black wall, in a plate of white metal: by quadrature, pixel by pixel."""
-    monkeypatch.setattr(panes, "LOBE_RAYS", 256)
-    view = camera(24, 18, 12.5, 180, 5, 2.0, (0.0, 0.0, 0.5))
+    monkeypatch.setattr(panes, "LOBE_RAYS", 64)
+    view = camera(192, 144, 100, 180, 5, 2.0, (0.0, 0.0, 0.5))
     wall, _, *bands = behind()
     parts = [plate(roughness), (wall[0], matt(0.0)), *bands]
     stage = stage_of(AWAY, Scene(sun=None, sky=DARK), painted_mesh(*parts), bounces="fine")
     found = light(stage, view, lambda seen, values: mirror_in_panes(stage.baked(0), view, seen, NOWHERE, values))
     normal, wanted = np.array([0.0, 1.0, 0.0]), []
     rays = pixel_rays(view.intrinsics) @ view.R
-    rows, columns = np.mgrid[6:11, 8:16]
+    rows, columns = np.mgrid[48:88:8, 64:128:8]
     for row, column in zip(rows.ravel(), columns.ravel(), strict=True):
         ray = rays[row, column]
         place = view.center + ray * (PLATE - view.center[1]) / ray[1]
@@ -172,7 +173,53 @@ def test_a_rough_mirror_shows_the_mean_of_its_lobe(roughness, monkeypatch):
 
         toward = view.center - place
         wanted.append(lobe_quadrature(toward / np.linalg.norm(toward), normal, roughness**2, radiance))
-    seen, wanted = found[6:11, 8:16, 0].ravel(), np.array(wanted)
+    seen, wanted = found[48:88:8, 64:128:8, 0].ravel(), np.array(wanted)
     assert np.ptp(wanted) > 0.03
     assert seen.mean() == pytest.approx(wanted.mean(), rel=0.06)
     np.testing.assert_allclose(seen, wanted, atol=0.03)
+
+
+@pytest.mark.slow
+def test_a_rough_floor_mirrors_what_its_lobe_leans_to(monkeypatch):
+    """Five metres before a black wall that hides half of an even sky, a rough black floor is darker towards the wall than away
+    from it, as much as a lobe says whose facets reflect by Schlick.
+    """
+    monkeypatch.setattr(volumes, "MOST", 14_000)
+    floor = np.array(rectangle((-300, -300, 0), (600, 0, 0), (0, 600, 0)))
+    black = Material("asphalt", (0, 0, 0, 1), roughness=0.9)
+    place = painted_mesh((floor, black), (box((-300, 5, 0), (300, 6, 60)), matt(0.0)))
+    stage = stage_of(AWAY, Scene(sun=None, sky=EVEN), place)
+    normal, found, wanted = np.array([0.0, 0.0, 1.0]), [], []
+    for azimuth, side in ((0, -1), (180, 1)):
+        view = camera(16, 16, 200, azimuth, 12, 2.0, (0.0, 0.0, 0.0))
+        toward = view.center / np.linalg.norm(view.center)
+        assert toward[1] * side > 0.9
+        found.append(light(stage, view)[6:10, 6:10].mean())
+
+        def sky(ways, toward=toward):
+            half = ways + toward
+            half /= np.linalg.norm(half, axis=1, keepdims=True)
+            is_open = 60 * ways[:, 1] < 5 * ways[:, 2]
+            return is_open * (0.04 + 0.96 * (1 - half @ toward) ** 5)
+
+        wanted.append(lobe_quadrature(toward, normal, 0.9**2, sky))
+    assert found[0] < 0.7 * found[1]
+    # One number says how far all lobes lean.
+    assert found[0] / found[1] == pytest.approx(wanted[0] / wanted[1], abs=0.12)
+
+
+def test_lobes_are_shared_by_pixels_of_one_surface_alone():
+    """Of a row of six pixels: one material, another one, one that faces elsewhere, one whose light is not known."""
+    at = np.arange(6, dtype=np.int32)
+    normals = np.tile(np.array([[0, 0, 1]], np.float32), (6, 1))
+    normals[4] = 0, 1, 0
+    made_of, gloss = np.array([1, 1, 2, 1, 1, 1], np.int32), np.full((6, 13), 0.3, np.float32)
+    shown = np.arange(18, dtype=np.float32).reshape(6, 3)
+    is_known = np.array([True, True, True, True, True, False])
+    found = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, 6, 6)
+    np.testing.assert_allclose(found[:5, 0] / 3, [(0 + 1) / 2, (0 + 1 + 3) / 3, 2, (1 + 3) / 2, 4])
+    gloss[:, 6] = 0.05
+    np.testing.assert_array_equal(kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, 6, 6)[:5], shown[:5])
+    gloss[:, 6] = 0.3  # rows of three pixels: what is next in memory is not what is beside
+    found = kernels_mirror.shared(at[:4], normals[:4], made_of[:4] * 0, gloss, shown[:4], is_known[:4], 3, 4)
+    np.testing.assert_allclose(found[:, 0] / 3, [1.5, 1.5, 1.5, 1.5])

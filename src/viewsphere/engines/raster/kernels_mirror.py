@@ -8,10 +8,41 @@ import numba as nb
 import numpy as np
 
 from viewsphere.kernels.jit import njit
+from viewsphere.kernels.lanes import FAST
 
 f4 = nb.float32
 U = nb.uintp
 COLUMNS = 4  # of what is blurred: light, and how much of it is known
+
+
+ALIKE = 0.98  # cosine between the normals of pixels that share what their lobes see
+SHARED, REACH = 0.1, 2  # roughness from which on pixels share it, and how many pixels away
+
+
+@njit(fastmath=FAST, _nrt=True)
+def shared(at, normals, made_of, gloss, shown, is_known, width, pixels):
+    """The mean (n, 3) of what the lobes of pixels `at` (n,) around each of them see, shown (n, 3): of those of one material,
+    made_of (n,), that face alike. gloss (n, 13): see `kernels_split.gloss`; `width`: pixels in a row, of `pixels` in all.
+    """
+    rows, means = np.full(pixels, -1, np.int32), np.empty_like(shown)
+    for i in range(at.shape[0]):
+        rows[at[i]] = i
+    for i in range(at.shape[0]):
+        column, reach = at[i] % width, REACH if gloss[i, 6] > f4(SHARED) else 0
+        red = green = blue = count = f4(0)
+        for down in range(-reach, reach + 1):
+            for across in range(max(-reach, -column), min(reach, width - 1 - column) + 1):
+                p = at[i] + down * width + across
+                j = rows[p] if 0 <= p < pixels else np.int32(-1)
+                if j < 0 or made_of[j] != made_of[i] or not is_known[j]:
+                    continue
+                like = normals[i, 0] * normals[j, 0] + normals[i, 1] * normals[j, 1] + normals[i, 2] * normals[j, 2]
+                if like < f4(ALIKE):
+                    continue
+                red, green, blue, count = red + shown[j, 0], green + shown[j, 1], blue + shown[j, 2], count + f4(1)
+        per = f4(1) / max(count, f4(1))
+        means[i, 0], means[i, 1], means[i, 2] = red * per, green * per, blue * per
+    return means
 
 
 @njit

@@ -1,9 +1,10 @@
 """What smooth surfaces mirror of the things that stand still, where light bounces: window panes, mirrors, polished metal.
 
 Their material mirrors what probes see, as blurred as roughness 0.5 shows it. A ray from each pixel finds what is there instead:
-sharp, lit by sun, lamps and what bounces. Targets before scenery and what moves neither mirror in this way nor are mirrored;
-cut-out textures are solid; where a ray meets the ground, what probes say stays. Of level surfaces, the one that shows most has
-a mirror image of its own, which is of all things (`polish`).
+sharp, lit by sun, lamps and what bounces; where light bounces finely, rays in their lobes do so for rougher surfaces, too.
+Targets before scenery and what moves neither mirror in this way nor are mirrored; cut-out textures are solid; where a ray meets
+the ground, what probes say stays. Of level surfaces, the one that shows most has a mirror image of its own, which is of all
+things (`polish`).
 """
 
 from __future__ import annotations
@@ -57,35 +58,51 @@ def mirror_in_panes(
     panes = _panes(baked, baked.hall, visibility, left_out)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     view, light = view_of(baked, camera), (baked.surrounding, baked.occlusion, baked.bounces)
-    count, *borders = (LOBE_RAYS, FINE_SHARP, FINE_BLURRED) if baked.is_fine else (1, SHARP, BLURRED)
-    for start in range(0, len(panes), SOME // count):
-        at = panes[start : start + SOME // count]
+    borders = (FINE_SHARP, FINE_BLURRED) if baked.is_fine else (SHARP, BLURRED)
+    for start in range(0, len(panes), SOME):
+        at = panes[start : start + SOME]
         gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
         kernels_split.gloss(view, baked.surfaces, baked.textures, baked.floor, *light, at, triangle, depth, gloss)
-        ways, weights = _lobes(view, gloss, at, count)
         width = (view.pixel * view.scale / depth[at]).astype(np.float32)
-        sights = np.tile(gloss[:, 7:10], (count, 1)), ways.reshape(-1, 3), np.tile(width, count)
-        seen, is_known = _seen(baked, baked.hall, baked.tree, sights, float(view.pixel))
-        total = weights.sum(axis=0)
-        shown = (weights[..., None] * seen.reshape(count, -1, 3)).sum(axis=0) / np.maximum(total, np.float32(1e-6))[:, None]
-        known = (is_known.reshape(count, -1) | (weights == 0)).all(axis=0) & (total > 0)
-        at, gloss, shown = at[known].astype(np.intp), gloss[known], shown[known].astype(np.float32)
+        if baked.is_fine:
+            shown, is_known = _seen_in_lobes(baked, baked.hall, baked.tree, view, gloss, at, width)
+            normals, made_of = _normals(view, gloss)[1], baked.surfaces.material[triangle[at]]
+            shown = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, camera.width, triangle.size)
+        else:
+            sights = gloss[:, 7:10].copy(), gloss[:, 10:13].copy(), width
+            shown, is_known = _seen(baked, baked.hall, baked.tree, sights, float(view.pixel))
+        at, gloss, shown = at[is_known].astype(np.intp), gloss[is_known], shown[is_known]
         nearness = np.zeros(len(at), np.float32)
         kernels_mirror.polish(at, gloss, shown, shown, nearness, depth, *map(np.float32, borders), radiance)
 
 
-def _lobes(view: PictureRays, gloss: Float32, at: Int32, count: int) -> tuple[Float32, Float32]:
-    """So many rays (count, n, 3) from each of the pixels `at` (n,), and their weights (count, n): the mirrored ray where the
-    surface is smooth, or the only one; gloss (n, 13): see `kernels_split.gloss`.
-    """
-    mirrored = gloss[:, 10:13]
-    if count == 1:
-        return mirrored[None].copy(), np.ones((1, len(at)), np.float32)
+def _normals(view: PictureRays, gloss: Float32) -> tuple[Float32, Float32]:
+    """Directions towards the viewer, and normals, (n, 3) each; gloss (n, 13): see `kernels_split.gloss`."""
     toward = view.eye - gloss[:, 7:10]
     toward /= np.sqrt((toward * toward).sum(axis=1, keepdims=True))
-    normals = toward + mirrored
-    normals /= np.sqrt((normals * normals).sum(axis=1, keepdims=True))
-    return lobe_rays(toward, normals, gloss[:, 6], at, int(view.columns), count)
+    normals = toward + gloss[:, 10:13]
+    return toward, normals / np.sqrt((normals * normals).sum(axis=1, keepdims=True))
+
+
+def _seen_in_lobes(
+    baked: Baked, hall: Hall, tree: Tree, view: PictureRays, gloss: Float32, at: Int32, width: Float32
+) -> tuple[Float32, NDArray[np.bool_]]:
+    """The mean radiance (n, 3) of what `LOBE_RAYS` of each of the pixels `at` (n,) see, and where all of it is known (n,).
+
+    gloss (n, 13): see `kernels_split.gloss`; width (n,): of a pixel there.
+    """
+    shown, known = np.zeros((len(at), 3), np.float32), np.zeros(len(at), np.bool_)
+    toward, normals = _normals(view, gloss)
+    for start in range(0, len(at), SOME // LOBE_RAYS):
+        own = slice(start, start + SOME // LOBE_RAYS)
+        ways, weights = lobe_rays(toward[own], normals[own], gloss[own, 6], at[own], int(view.columns), LOBE_RAYS)
+        sights = np.tile(gloss[own, 7:10], (LOBE_RAYS, 1)), ways.reshape(-1, 3), np.tile(width[own], LOBE_RAYS)
+        seen, is_known = _seen(baked, hall, tree, sights, float(view.pixel))
+        total = weights.sum(axis=0)
+        light = (weights[..., None] * seen.reshape(*weights.shape, 3)).sum(axis=0)
+        shown[own] = light / np.maximum(total, np.float32(1e-6))[:, None]
+        known[own] = (is_known.reshape(weights.shape) | (weights == 0)).all(axis=0) & (total > 0)
+    return shown, known
 
 
 def _panes(baked: Baked, hall: Hall, visibility: Visibility, left_out: NDArray[np.intp]) -> Int32:
