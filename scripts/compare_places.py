@@ -4,7 +4,7 @@
 
 Both engines render the same shot; Cycles weighs all of a pixel's samples alike, as viewsphere does, and follows light around 24
 corners. Prints the mean difference in display values (of 255) and SSIM (Wang et al. 2004, 1 is equal; from the package
-`scikit-image`), without light between surfaces, with it, and with `FINE` options, and writes a sheet of the last: viewsphere,
+`scikit-image`), without light between surfaces, with it, and with fine light, and writes a sheet of the last: viewsphere,
 Cycles, four times their difference.
 """
 
