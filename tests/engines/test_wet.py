@@ -10,6 +10,7 @@ from test_bounces import stage_of as bounced_stage
 from test_physics import camera, stage_of
 from test_raster import box, mesh_of, rectangle
 
+from shots import with_camera
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.wetting import DARKEST, FILM, SMOOTH, UPRIGHT, darkened, wet, wetted
 from viewsphere.engines.raster.painting import paint
@@ -138,3 +139,29 @@ def test_where_light_bounces_a_film_loses_no_light_of_a_sky_that_it_does_not_mir
     dry, coated = radiance_of(0.0), radiance_of(FILM)
     assert dry[16:].min() > 0
     assert (coated[16:] > 0.5 * dry[16:]).all()
+
+
+def test_before_a_black_wall_a_film_leaves_the_light_that_the_ground_scatters():
+    """What the film is taken to mirror, the sky, is taken away by as much as it added: seen flat, a film that is a little rough
+    mirrors far less than smooth water does.
+    """
+    view, water = camera(48, 32, 40, 0, 6, 4.0), Wet(amount=1.0, puddles=0.0)
+    floor = replace(matt(0.3), clearcoat=FILM, clearcoat_roughness=SMOOTH)
+    wall = box((-60, 3, 0), (60, 4, 60)), matt(0.0)
+    place = painted_mesh((rectangle((-60, -60, 0), (120, 0, 0), (0, 63, 0)), floor), wall)
+    small = mesh_of(box((5, 5, 0), (5.2, 5.2, 0.2)), matt(0.5))
+    stage = bounced_stage(small, Scene(sun=None, sky=EVEN, finish=OUT), place, bounces="off", antialias=1)
+    stage = stage.of(with_camera(stage.shot, view))
+    seen, radiance = rasterize(stage.at(0), view), np.empty((view.width * view.height, 4), np.float32)
+    passes = stage.paint(0, 0, seen, ("albedo", "shading"))
+
+    def more(light):
+        before.append(light[:, 1].copy())
+        mirror_in_water(stage.baked(0), view, seen, water, light)
+
+    before = []
+    paint(stage.baked(0), view, seen, False, True, radiance, more=more)
+    is_floor = (seen.triangle >= 0) & (stage.at(0).triangle_normals[seen.triangle][..., 2] > 0.9)
+    scattered = (passes["albedo"] * passes["shading"])[..., 1][is_floor]
+    assert (before[0].reshape(is_floor.shape)[is_floor] > 1.1 * scattered).all()
+    np.testing.assert_allclose(radiance[:, 1].reshape(is_floor.shape)[is_floor], scattered, rtol=0.01)

@@ -37,6 +37,7 @@ COAT_F0 = np.float32(0.04)
 FULL_RIM = np.float32(50)  # one over the share mirrored straight on from which on a surface mirrors all light at its rim
 SMOOTHEST = np.float32(0.03)  # perceptual roughness, at least: in a perfect mirror a lamp would be a single point
 VIEWED = np.float32(0.25)  # squared roughness, as blurred as what probes see
+WIDE = np.float32(0.36)  # squared roughness from which on a lobe is as wide as a matt surface's
 BRIGHTEST = np.float32(60000.0)
 UNEXPOSED = np.float32(1 / EXPOSURE)  # an unlit colour is shown unchanged by the exposure
 
@@ -341,10 +342,10 @@ def _shine(b):
 @lanewise
 def _shine_bounced(b):
     """`_shine`, where light bounces: what probes see is as blurred as a mirror of roughness 0.5 shows it. The lobes of rougher
-    ones come ever closer to that of a matt surface that leans towards the mirrored ray, whose light is in LEAN.
+    ones soon come close to that of a matt surface that leans towards the mirrored ray, whose light is in LEAN.
     """
     lobe, rim, out, rough = b.get(LOBE, RIM, T7, ROUGH)
-    wide, known = clamp((rough * rough - VIEWED) * (1 / (1 - VIEWED))), most(b[INSIDE], b[MAPPED])
+    wide, known = clamp((rough * rough - VIEWED) * (1 / (WIDE - VIEWED))), most(b[INSIDE], b[MAPPED])
     for k in range(0, 3 * BLOCK, BLOCK):
         light = b[T3 + k] * out
         light = light + (b[LEAN_R + k] - light * known) * wide  # LEAN is as much less as it is known
@@ -433,7 +434,7 @@ def _keep_of_coat(b):
 def light_on_coat(count, surrounding, bounces, b):
     """T3 to T5: the light that clear coats mirror, of a block of which `ambient` could be asked."""
     _look(count, COATING, b)
-    _see(count, surrounding, bounces, True, b)
+    _see(count, surrounding, bounces, bounces.grid[0] > 0, b)
     _keep_of_coat(count, b)
 
 

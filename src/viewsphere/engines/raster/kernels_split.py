@@ -238,7 +238,8 @@ def _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bou
     material(count, view, surfaces, textures, b, which)
     weigh(count, surrounding.albedo, b)
     occlude(count, occlusion, b)
-    bounced(count, bounces, False, own, b)
+    if bounces.grid[0] > 0:
+        bounced(count, bounces, False, own, b)
 
 
 @njit(fastmath=FAST, _nrt=True)
@@ -267,8 +268,8 @@ def gloss(view, surfaces, textures, floor, surrounding, occlusion, bounces, slot
 
 @njit(fastmath=FAST, _nrt=True)
 def film(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots, triangle, depth, out):
-    """Set `out` (N, 3) float32 to the light that the clear coat of the samples in `slots` (N,) is taken to mirror, where light
-    bounces.
+    """Set `out` (N, 4) float32 to the light that the clear coat of the samples in `slots` (N,) is taken to mirror, and to the
+    share of all light that it mirrors.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -279,5 +280,7 @@ def film(view, surfaces, textures, floor, surrounding, occlusion, bounces, slots
         _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bounces, own, which, b)
         light_on_coat(count, surrounding, bounces, b)
         for i in range(U(count)):
+            share = b[U(TAKEN) + i]
             for c in range(U(3)):
-                out[U(start) + i, c] = b[U(T3) + c * U(BLOCK) + i]
+                out[U(start) + i, c] = share * b[U(T3) + c * U(BLOCK) + i]
+            out[U(start) + i, U(3)] = share

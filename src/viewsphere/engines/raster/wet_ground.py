@@ -55,22 +55,25 @@ def mirror_in_water(baked: Baked, camera: Camera, visibility: Visibility, wet: W
     deep = puddles(wet, place[:, 0], place[:, 1])
     radiance[at, :3] *= 1 - (UNDER_WATER * deep)[:, None]
     seen = mirrored(baked, camera, plane, low, at)
-    taken = _taken(baked, camera, visibility, at, seen.sky)
-    image = (water[:, None] * (seen.things + (1 - seen.hidden) * seen.sky - taken)).astype(np.float32)
+    image = (seen.things + (1 - seen.hidden) * seen.sky).astype(np.float32)
+    share, taken = _taken(baked, camera, visibility, at, (wet.amount * FILM * water).astype(np.float32), seen.sky)
     reach = max(1, camera.height // DRAWN_OUT[0]), max(1, camera.height // DRAWN_OUT[1])
-    film = wet.amount * FILM * (1 - deep)[:, None] * blurred(image, at, camera, reach)
-    pool = deep[:, None] * (image + (1 - wet.amount * FILM) * water[:, None] * taken)
-    radiance[at, :3] = np.maximum(radiance[at, :3] + film + pool, 0)
+    film = ((1 - deep) * share)[:, None] * blurred(image, at, camera, reach)
+    pool = (deep * water)[:, None] * image
+    radiance[at, :3] = np.maximum(radiance[at, :3] + film + pool - taken, 0)
 
 
-def _taken(baked: Baked, camera: Camera, visibility: Visibility, at: NDArray[np.intp], sky: Float32) -> Float32:
-    """What the material of pixels (n,) is taken to mirror, (n, 3): `sky`, where light does not bounce, and on the ground."""
-    if baked.bounces.grid[0] == 0:
-        return sky
+def _taken(
+    baked: Baked, camera: Camera, visibility: Visibility, at: NDArray[np.intp], share: Float32, sky: Float32
+) -> tuple[Float32, Float32]:
+    """The share of light that the films of pixels (n,) mirror, (n,), and the light that they were taken to mirror, (n, 3): on
+    the ground that share of the `sky`.
+    """
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    is_thing, taken = baked.kind[triangle[at]] != kernels_paint.FLOOR, sky.copy()
+    is_thing = baked.kind[triangle[at]] != kernels_paint.FLOOR
     slots = at[is_thing].astype(np.int32)
-    own, light = np.empty((len(slots), 3), np.float32), (baked.surrounding, baked.occlusion, baked.bounces)
+    own, light = np.empty((len(slots), 4), np.float32), (baked.surrounding, baked.occlusion, baked.bounces)
     kernels_split.film(view_of(baked, camera), baked.surfaces, baked.textures, baked.floor, *light, slots, triangle, depth, own)
-    taken[is_thing] = own
-    return taken
+    taken = share[:, None] * sky
+    share[is_thing], taken[is_thing] = own[:, 3], own[:, :3]
+    return share, taken
