@@ -13,7 +13,7 @@ from test_panes import PLATE, behind, plate
 from test_raster import DARK, box, camera, rectangle
 
 from viewsphere.assets.mesh import Material
-from viewsphere.engines.raster import kernels_mirror, panes, volumes
+from viewsphere.engines.raster import bounces, kernels_mirror, panes, volumes
 from viewsphere.engines.raster.gathering_near import with_near
 from viewsphere.engines.raster.lobes import lobe_rays
 from viewsphere.engines.raster.painting import paint, view_of
@@ -21,7 +21,7 @@ from viewsphere.engines.raster.panes import mirror_in_panes
 from viewsphere.engines.raster.polish import NOWHERE
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
-from viewsphere.model.scene import Scene
+from viewsphere.model.scene import Scene, Sun
 from viewsphere.truth.visibility import rasterize
 
 
@@ -61,6 +61,37 @@ def test_in_a_furnace_what_is_near_sends_what_it_takes_away():
     near = near_of(stage, view)
     assert (near[..., 0] < 0.8).mean() > 0.05
     np.testing.assert_allclose(light(stage, view), 0.5, rtol=0.02)
+
+
+def test_near_light_does_not_depend_on_what_was_painted_before():
+    """Rays of a place are kept from shot to shot, whose targets have other numbers of materials."""
+    pebbles = both(ball(0.5, (0, 0, 0), 16), ball(0.5, (0, 1.02, 0), 16))
+    pebbles = replace(pebbles, materials=tuple(matt(0.8) for _ in pebbles.materials))
+    two = painted_mesh(*((np.array(rectangle((0, 0, 40), (0.1, 0, 0), (0, 0.1, 0))), matt(shade)) for shade in (0.5, 0.6)))
+    view = camera(40, 40, 40, 90, 10, 1.5, (0.0, 0.5, 0.0))
+
+    def found(target):
+        return near_of(stage_of(target, Scene(sun=Sun(azimuth_deg=30, elevation_deg=40)), pebbles, bounces="fine"), view)
+
+    bounces._look.cache_clear()
+    bounces._bake.cache_clear()
+    fresh = found(two)
+    assert (fresh[..., 1] > 0.02).mean() > 0.02
+    found(AWAY)
+    np.testing.assert_array_equal(found(two), fresh)
+
+
+def test_beyond_the_probes_fine_light_is_that_of_the_sky(monkeypatch):
+    """250 m away nothing is known of what bounces, however near it is."""
+    far = painted_mesh(*((np.array(box((249, y, 1), (251, y + 0.3, 3))), matt(0.9)) for y in (-0.4, 0.1)))
+    near = painted_mesh((np.concatenate([box((-1, y, 0), (1, y + 2, 1)) for y in (-1, 250)]), matt(0.5)))
+    monkeypatch.setattr(volumes, "MOST", 4_000)
+    stages = [stage_of(AWAY, Scene(sun=None, sky=EVEN), both(near, far), bounces=how) for how in ("on", "fine")]
+    view = camera(40, 30, 60, 90, 10, 5.0, (250.0, 0.0, 2.0))
+    plain, fine = (light(stage, view) for stage in stages)
+    assert stages[0].baked(0).bounces.frame[1, 6] > 0
+    assert (near_of(stages[1], view)[..., 1] > 0.01).any()
+    assert (fine <= plain + 1e-4).all()
 
 
 def seen_share(side: float, height: float) -> float:
@@ -216,10 +247,10 @@ def test_lobes_are_shared_by_pixels_of_one_surface_alone():
     made_of, gloss = np.array([1, 1, 2, 1, 1, 1], np.int32), np.full((6, 13), 0.3, np.float32)
     shown = np.arange(18, dtype=np.float32).reshape(6, 3)
     is_known = np.array([True, True, True, True, True, False])
-    found = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, 6, 6)
+    found = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, 6)
     np.testing.assert_allclose(found[:5, 0] / 3, [(0 + 1) / 2, (0 + 1 + 3) / 3, 2, (1 + 3) / 2, 4])
     gloss[:, 6] = 0.05
-    np.testing.assert_array_equal(kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, 6, 6)[:5], shown[:5])
+    np.testing.assert_array_equal(kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, 6)[:5], shown[:5])
     gloss[:, 6] = 0.3  # rows of three pixels: what is next in memory is not what is beside
-    found = kernels_mirror.shared(at[:4], normals[:4], made_of[:4] * 0, gloss, shown[:4], is_known[:4], 3, 4)
+    found = kernels_mirror.shared(at[:4], normals[:4], made_of[:4] * 0, gloss, shown[:4], is_known[:4], 3)
     np.testing.assert_allclose(found[:, 0] / 3, [1.5, 1.5, 1.5, 1.5])

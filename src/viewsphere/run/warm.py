@@ -198,7 +198,9 @@ def _card() -> Mesh:
         normals=np.tile(np.array([0, -1, 0], np.float32), (4, 1)),
         triangle_material=np.zeros(2, np.int32),
         triangle_part=np.zeros(2, np.int32),
-        materials=(Material(base_color_texture=Texture(0), alpha_mode="MASK"),),
+        materials=(
+            Material(base_color_texture=Texture(0), alpha_mode="MASK", roughness=0.05),
+        ),  # where light bounces, a mirror
         uv0=uv,
         colors=np.ones((4, 4), np.float32),
         images=(Image("card", pixels),),

@@ -204,7 +204,8 @@ def _bake(lighting: _Lighting) -> Bounces:
     if seen.below is not None:
         bounces.floor[:] = _on_ground(seen, seen.below, sent, lanterns, lit.emitted, off).reshape(bounces.floor.shape)
     light = np.where((lanterns.froms == 0)[:, None], sent, np.float32(-1))
-    return bounces._replace(sent=PatchLight(patches.table.keys, patches.table.patch, light, bounces.sent.frame))
+    known = patches.table.keys, patches.table.patch, light
+    return bounces._replace(sent=PatchLight(*known, bounces.sent.frame, bounces.sent.materials))
 
 
 def _settle(seen: _Seen, light: Float32, views: Float32) -> None:
@@ -270,10 +271,10 @@ def _look(hall: Hall) -> _Seen:
     looked = look(tree, *made, normals, hall.unit, volumes[0].is_inside_out) if has_charts else None
     if looked is not None:
         bundles.extend(looked.rays)
-    inner = grids[0]
+    inner, materials = grids[0], hall.surfaces.material[hall.which]
     made_of = (
         normals,
-        hall.surfaces.material[hall.which],
+        materials,
         np.array([*inner.corner, *inner.last], np.float32),
         inner.cells * PATCHES,
         _ground(hall),
@@ -284,7 +285,8 @@ def _look(hall: Hall) -> _Seen:
         patches = patches_of([*bundles, around.rays], *made_of, patches)
     screens = np.concatenate([volume.screens for volume in volumes])
     light = np.zeros((len(screens), COLUMNS), np.float32)
-    sent = NO_PATCH_LIGHT._replace(frame=np.array([*inner.corner, *inner.last, inner.cells * PATCHES], np.float32))
+    box = np.array([*inner.corner, *inner.last, inner.cells * PATCHES], np.float32)
+    sent = NO_PATCH_LIGHT._replace(frame=box, materials=materials)
     volume = light, NO_BOUNCES.views, screens, inner.shape, _frame(grids)
     bounces = Bounces(*volume, floor, floor_frame, NO_LIGHTMAP, sent, NO_NEAR)
     return _Seen(bounces, tree, volumes, patches.trimmed(), below, looked, around)

@@ -46,7 +46,6 @@ def with_near(
     near = np.zeros((len(triangle), 4), np.float32)
     near[:, 0] = 1
     turned = domes(RAYS, TILE * TILE).astype(np.float32)
-    surfaces = hall.surfaces.normals, hall.surfaces.material
     for start in range(0, len(slots), SOME):
         own = slots[start : start + SOME]
         places, rays = seen_at(view, own, depth)
@@ -56,7 +55,7 @@ def with_near(
         origins = (places + normals * np.float32(OFF / hall.unit)).astype(np.float32)
         each = np.arange(len(own), dtype=np.int32)
         met, far = cast(tree, origins, ways, each, REACH / float(bounces.frame[0, 3]))
-        kernels.gather(met, far, origins, ways, hall.which, *surfaces, bounces.sent, own, near)
+        kernels.gather(met, far, origins, ways, hall.which, hall.surfaces.normals, bounces.sent, own, near)
     return bounces._replace(near=near)
 
 

@@ -233,9 +233,10 @@ def dim_by_near(start, count, slots, near, b):
     """What is nearer to the samples `slots` than probes know, in place of the part of their light that it takes away."""
     for i in range(U(count)):
         own = near[U(slots[U(start) + i])]
+        known = max(b[U(INSIDE) + i], b[U(MAPPED) + i]) * b[U(OPEN) + i]  # as much as there is of the probes' light
         for k in range(U(3)):
             for row in (U(GLOW_R) + k * U(BLOCK) + i, U(LEAN_R) + k * U(BLOCK) + i):
-                b[row] = b[row] * own[U(0)] + own[U(1) + k]
+                b[row] = b[row] * own[U(0)] + own[U(1) + k] * known
 
 
 @inner

@@ -20,20 +20,21 @@ SHARED, REACH = 0.1, 2  # roughness from which on pixels share it, and how many 
 
 
 @njit(fastmath=FAST, _nrt=True)
-def shared(at, normals, made_of, gloss, shown, is_known, width, pixels):
+def shared(at, normals, made_of, gloss, shown, is_known, width):
     """The mean (n, 3) of what the lobes of pixels `at` (n,) around each of them see, shown (n, 3): of those of one material,
-    made_of (n,), that face alike. gloss (n, 13): see `kernels_split.gloss`; `width`: pixels in a row, of `pixels` in all.
+    made_of (n,), that face alike. gloss (n, 13): see `kernels_split.gloss`; `width`: pixels in a row; at: ever greater.
     """
-    rows, means = np.full(pixels, -1, np.int32), np.empty_like(shown)
+    first, last = at[0], at[-1]
+    rows, means = np.full(last - first + 1, -1, np.int32), np.empty_like(shown)
     for i in range(at.shape[0]):
-        rows[at[i]] = i
+        rows[at[i] - first] = i
     for i in range(at.shape[0]):
         column, reach = at[i] % width, REACH if gloss[i, 6] > f4(SHARED) else 0
         red = green = blue = count = f4(0)
         for down in range(-reach, reach + 1):
             for across in range(max(-reach, -column), min(reach, width - 1 - column) + 1):
                 p = at[i] + down * width + across
-                j = rows[p] if 0 <= p < pixels else np.int32(-1)
+                j = rows[p - first] if first <= p <= last else np.int32(-1)
                 if j < 0 or made_of[j] != made_of[i] or not is_known[j]:
                     continue
                 like = normals[i, 0] * normals[j, 0] + normals[i, 1] * normals[j, 1] + normals[i, 2] * normals[j, 2]

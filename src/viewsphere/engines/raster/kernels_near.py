@@ -14,11 +14,11 @@ U = nb.uintp
 
 
 @njit(fastmath=FAST)
-def gather(met, far, origins, ways, which, normals, materials, sent, slots, near):
+def gather(met, far, origins, ways, which, normals, sent, slots, near):
     """Set rows `slots` (N,) of near (S, 4): the share of rays that meet nothing, and the mean light of what the others meet.
 
     met, far (K, N), origins (N, 3): see `kernels_trace.cast`; ways (N, K, 3); which (T,): which of the triangles with these
-    normals and materials are met; sent: see `PatchLight`. A ray that meets no known patch,
+    normals are met; sent: see `PatchLight`. A ray that meets no known patch,
     or a lantern, counts as one that meets nothing.
     """
     per, cells = f4(1) / f4(met.shape[0]), sent.frame[6]
@@ -33,7 +33,7 @@ def gather(met, far, origins, ways, which, normals, materials, sent, slots, near
             p = origins[i, U(0)] + far_away * d[0], origins[i, U(1)] + far_away * d[1], origins[i, U(2)] + far_away * d[2]
             x, y, z = normals[t, U(0)], normals[t, U(1)], normals[t, U(2)]
             side = f4(-1) if x * d[0] + y * d[1] + z * d[2] > f4(0) else f4(1)
-            key = patch_key(p, (x * side, y * side, z * side), cells, sent.frame, nb.int64(materials[t]))
+            key = patch_key(p, (x * side, y * side, z * side), cells, sent.frame, nb.int64(sent.materials[U(met[k, i])]))
             own = sent.patch[found(key, sent.keys, sent.patch)]
             if own < 0 or sent.light[U(own), U(0)] < f4(0):
                 free += per

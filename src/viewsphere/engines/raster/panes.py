@@ -67,7 +67,7 @@ def mirror_in_panes(
         if baked.is_fine:
             shown, is_known = _seen_in_lobes(baked, baked.hall, baked.tree, view, gloss, at, width)
             normals, made_of = _normals(view, gloss)[1], baked.surfaces.material[triangle[at]]
-            shown = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, camera.width, triangle.size)
+            shown = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, camera.width)
         else:
             sights = gloss[:, 7:10].copy(), gloss[:, 10:13].copy(), width
             shown, is_known = _seen(baked, baked.hall, baked.tree, sights, float(view.pixel))
@@ -81,27 +81,29 @@ def _normals(view: PictureRays, gloss: Float32) -> tuple[Float32, Float32]:
     toward = view.eye - gloss[:, 7:10]
     toward /= np.sqrt((toward * toward).sum(axis=1, keepdims=True))
     normals = toward + gloss[:, 10:13]
-    return toward, normals / np.sqrt((normals * normals).sum(axis=1, keepdims=True))
+    return toward, normals / np.maximum(np.sqrt((normals * normals).sum(axis=1, keepdims=True)), np.float32(1e-6))
 
 
 def _seen_in_lobes(
     baked: Baked, hall: Hall, tree: Tree, view: PictureRays, gloss: Float32, at: Int32, width: Float32
 ) -> tuple[Float32, NDArray[np.bool_]]:
-    """The mean radiance (n, 3) of what `LOBE_RAYS` of each of the pixels `at` (n,) see, and where all of it is known (n,).
+    """The mean radiance (n, 3) of what `LOBE_RAYS` of each of the pixels `at` (n,) see, and where there is any, (n,). Rays that
+    see what is not known have the light that the pixel was taken to mirror.
 
     gloss (n, 13): see `kernels_split.gloss`; width (n,): of a pixel there.
     """
     shown, known = np.zeros((len(at), 3), np.float32), np.zeros(len(at), np.bool_)
     toward, normals = _normals(view, gloss)
+    taken = gloss[:, 3:6] / np.maximum(gloss[:, :3], np.float32(1e-6))
     for start in range(0, len(at), SOME // LOBE_RAYS):
         own = slice(start, start + SOME // LOBE_RAYS)
         ways, weights = lobe_rays(toward[own], normals[own], gloss[own, 6], at[own], int(view.columns), LOBE_RAYS)
         sights = np.tile(gloss[own, 7:10], (LOBE_RAYS, 1)), ways.reshape(-1, 3), np.tile(width[own], LOBE_RAYS)
         seen, is_known = _seen(baked, hall, tree, sights, float(view.pixel))
         total = weights.sum(axis=0)
-        light = (weights[..., None] * seen.reshape(*weights.shape, 3)).sum(axis=0)
-        shown[own] = light / np.maximum(total, np.float32(1e-6))[:, None]
-        known[own] = (is_known.reshape(weights.shape) | (weights == 0)).all(axis=0) & (total > 0)
+        each = np.where(is_known.reshape(*weights.shape, 1), seen.reshape(*weights.shape, 3), taken[own])
+        shown[own] = (weights[..., None] * each).sum(axis=0) / np.maximum(total, np.float32(1e-6))[:, None]
+        known[own] = total > 0
     return shown, known
 
 

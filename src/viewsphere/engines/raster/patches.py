@@ -110,7 +110,7 @@ class Patches:
         table = self.table
         rows, columns = np.nonzero(np.arange(kernels.HITS) < table.known[: self.count, None])
         triangle = table.triangle[rows, columns]
-        whole = np.where(triangle >= 0, which[triangle], triangle)
+        whole = np.where(triangle >= 0, which[np.maximum(triangle, 0)], triangle)
         width = np.float32(np.sqrt(4 * np.pi / len(self.ids[0])) / 2)
         answers, arrived = np.zeros((len(rows), 6), np.float32), np.zeros((len(rows), 3), np.float32)
         for is_ground in (False, True):

@@ -84,13 +84,14 @@ class Lightmap(NamedTuple):
 class PatchLight(NamedTuple):
     """What patches send. keys (S,) uint64, patch (S,) int32: their table, see `kernels_probes.patch`; light (M, 3): of each,
     radiance, -1 for lanterns, whose light arrives as probes know it; frame (7,): the box of the probes, and how many patches
-    there are in a length.
+    there are in a length; materials (T,): of the triangles that rays meet, as they were numbered when the table was made.
     """
 
     keys: NDArray[np.uint64]
     patch: Int32
     light: Float32
     frame: Float32
+    materials: Int32
 
 
 class Bounces(NamedTuple):
@@ -130,7 +131,11 @@ NO_LIGHTMAP = Lightmap(
     np.zeros((1, 12), np.float32),
 )
 NO_PATCH_LIGHT = PatchLight(
-    np.zeros(1, np.uint64), np.full(1, -1, np.int32), np.zeros((0, 3), np.float32), np.zeros(7, np.float32)
+    np.zeros(1, np.uint64),
+    np.full(1, -1, np.int32),
+    np.zeros((0, 3), np.float32),
+    np.zeros(7, np.float32),
+    np.zeros(0, np.int32),
 )
 NO_NEAR = np.zeros((0, 4), np.float32)
 NO_BOUNCES = Bounces(
