@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from light_stage import ball
 from test_bounces import AWAY, EVEN, both, matt, painted_mesh, stage_of
-from test_panes import PLATE, behind, plate
+from test_panes import PLATE, behind, metal, plate
 from test_raster import DARK, box, camera, rectangle
 
 from viewsphere.assets.mesh import Material
@@ -21,7 +21,7 @@ from viewsphere.engines.raster.panes import mirror_in_panes
 from viewsphere.engines.raster.polish import NOWHERE
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
-from viewsphere.model.scene import Scene, Sun
+from viewsphere.model.scene import Ground, Scene, Sun
 from viewsphere.truth.visibility import rasterize
 
 
@@ -254,3 +254,16 @@ def test_lobes_are_shared_by_pixels_of_one_surface_alone():
     gloss[:, 6] = 0.3  # rows of three pixels: what is next in memory is not what is beside
     found = kernels_mirror.shared(at[:4], normals[:4], made_of[:4] * 0, gloss, shown[:4], is_known[:4], 3)
     np.testing.assert_allclose(found[:, 0] / 3, [1.5, 1.5, 1.5, 1.5])
+
+
+def test_a_rough_mirror_on_the_ground_has_no_speckles():
+    """Some rays of nearly every lobe meet the ground, of which they know nothing; all pixels are changed by the others."""
+    view = camera(48, 36, 50, 20, 10, 3.0, (0.0, 0.0, 0.5))
+    block = painted_mesh((np.array(box((-0.6, -0.1, 0), (0.6, 0.1, 1))), metal(0.4)))
+    stage = stage_of(block, Scene(sun=None, sky=EVEN, ground=Ground()), bounces="fine")
+    changed = light(stage, view, lambda seen, values: mirror_in_panes(stage.baked(0), view, seen, NOWHERE, values))
+    plain, seen = light(stage, view), rasterize(stage.at(0), view)
+    normals = stage.at(0).triangle_normals[seen.triangle]
+    upright = (seen.triangle >= 0) & (seen.triangle < 12) & (np.abs(normals[..., 2]) < 0.1)
+    assert upright.sum() > 100
+    assert (np.abs(changed - plain).max(axis=2)[upright] > 1e-5).mean() > 0.95

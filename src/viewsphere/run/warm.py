@@ -192,15 +192,15 @@ def _card() -> Mesh:
     uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
     pixels = np.full((4, 4, 4), 255, np.uint8)
     pixels[1:3, 1:3, 3] = 0
+    # The floor of a place is one, whose mirror image is drawn where light bounces.
+    mirror = Material(base_color_texture=Texture(0), alpha_mode="MASK", roughness=0.05)
     return Mesh(
         vertices=corners,
         triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
         normals=np.tile(np.array([0, -1, 0], np.float32), (4, 1)),
         triangle_material=np.zeros(2, np.int32),
         triangle_part=np.zeros(2, np.int32),
-        materials=(
-            Material(base_color_texture=Texture(0), alpha_mode="MASK", roughness=0.05),
-        ),  # where light bounces, a mirror
+        materials=(mirror,),
         uv0=uv,
         colors=np.ones((4, 4), np.float32),
         images=(Image("card", pixels),),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -89,6 +89,13 @@ class Hall:
     unit: float
     ground_z: float | None
     has_map: bool
+
+    @cached_property
+    def owns(self) -> NDArray[np.bool_]:
+        """Which of the surfaces' triangles are its own, (T,)."""
+        own = np.zeros(len(self.surfaces.material), np.bool_)
+        own[self.which] = True
+        return own
 
 
 class _Seen(NamedTuple):

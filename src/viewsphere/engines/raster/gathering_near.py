@@ -36,11 +36,9 @@ def with_near(
 
     triangle, depth (S,): what samples show, see `kernels_paint.shade`.
     """
-    is_own = np.zeros(len(hall.surfaces.material), np.bool_)
-    is_own[hall.which] = True
+    slots = slots[hall.owns[triangle[slots]]]
     if len(bounces.lightmap.chart):
-        is_own &= bounces.lightmap.chart == -1
-    slots = slots[is_own[triangle[slots]]]
+        slots = slots[bounces.lightmap.chart[triangle[slots]] == -1]
     if not len(slots):
         return bounces._replace(near=NO_NEAR)
     near = np.zeros((len(triangle), 4), np.float32)
@@ -48,7 +46,7 @@ def with_near(
     turned = domes(RAYS, TILE * TILE).astype(np.float32)
     for start in range(0, len(slots), SOME):
         own = slots[start : start + SOME]
-        places, rays = seen_at(view, own, depth)
+        places, rays = _seen_at(view, own, depth)
         normals = hall.surfaces.normals[triangle[own]]
         normals = np.where((normals * rays).sum(axis=1, keepdims=True) < 0, normals, -normals)
         ways = np.matmul(turned[_turn(view, own)], axes_along(normals))
@@ -67,7 +65,7 @@ def _turn(view: PictureRays, slots: Int32) -> Int32:
     return row % TILE * TILE + column % TILE
 
 
-def seen_at(view: PictureRays, slots: Int32, depth: Float32) -> tuple[Float32, Float32]:
+def _seen_at(view: PictureRays, slots: Int32, depth: Float32) -> tuple[Float32, Float32]:
     """Where samples (N,) see something, (N, 3), and their rays, (N, 3), in the stage's axes; depth (S,): see `with_near`."""
     if len(view.rays):
         rays = view.rays[slots]

@@ -65,8 +65,9 @@ def mirror_in_panes(
         kernels_split.gloss(view, baked.surfaces, baked.textures, baked.floor, *light, at, triangle, depth, gloss)
         width = (view.pixel * view.scale / depth[at]).astype(np.float32)
         if baked.is_fine:
-            shown, is_known = _seen_in_lobes(baked, baked.hall, baked.tree, view, gloss, at, width)
-            normals, made_of = _normals(view, gloss)[1], baked.surfaces.material[triangle[at]]
+            toward, normals = _facing(view, gloss)
+            shown, is_known = _seen_in_lobes(baked, baked.hall, baked.tree, view, (toward, normals), gloss, at, width)
+            made_of = baked.surfaces.material[triangle[at]]
             shown = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, camera.width)
         else:
             sights = gloss[:, 7:10].copy(), gloss[:, 10:13].copy(), width
@@ -76,7 +77,7 @@ def mirror_in_panes(
         kernels_mirror.polish(at, gloss, shown, shown, nearness, depth, *map(np.float32, borders), radiance)
 
 
-def _normals(view: PictureRays, gloss: Float32) -> tuple[Float32, Float32]:
+def _facing(view: PictureRays, gloss: Float32) -> tuple[Float32, Float32]:
     """Directions towards the viewer, and normals, (n, 3) each; gloss (n, 13): see `kernels_split.gloss`."""
     toward = view.eye - gloss[:, 7:10]
     toward /= np.sqrt((toward * toward).sum(axis=1, keepdims=True))
@@ -85,15 +86,22 @@ def _normals(view: PictureRays, gloss: Float32) -> tuple[Float32, Float32]:
 
 
 def _seen_in_lobes(
-    baked: Baked, hall: Hall, tree: Tree, view: PictureRays, gloss: Float32, at: Int32, width: Float32
+    baked: Baked,
+    hall: Hall,
+    tree: Tree,
+    view: PictureRays,
+    facing: tuple[Float32, Float32],
+    gloss: Float32,
+    at: Int32,
+    width: Float32,
 ) -> tuple[Float32, NDArray[np.bool_]]:
     """The mean radiance (n, 3) of what `LOBE_RAYS` of each of the pixels `at` (n,) see, and where there is any, (n,). Rays that
     see what is not known have the light that the pixel was taken to mirror.
 
-    gloss (n, 13): see `kernels_split.gloss`; width (n,): of a pixel there.
+    facing: see `_facing`; gloss (n, 13): see `kernels_split.gloss`; width (n,): of a pixel there.
     """
     shown, known = np.zeros((len(at), 3), np.float32), np.zeros(len(at), np.bool_)
-    toward, normals = _normals(view, gloss)
+    toward, normals = facing
     taken = gloss[:, 3:6] / np.maximum(gloss[:, :3], np.float32(1e-6))
     for start in range(0, len(at), SOME // LOBE_RAYS):
         own = slice(start, start + SOME // LOBE_RAYS)
@@ -116,9 +124,7 @@ def _panes(baked: Baked, hall: Hall, visibility: Visibility, left_out: NDArray[n
     at = np.flatnonzero(is_pane)
     if not len(at):
         return at.astype(np.int32)
-    is_own = np.zeros(len(baked.surfaces.material), np.bool_)
-    is_own[hall.which] = True
-    return at[is_own[shown[at]]].astype(np.int32)
+    return at[hall.owns[shown[at]]].astype(np.int32)
 
 
 def _seen(
