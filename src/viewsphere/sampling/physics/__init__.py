@@ -10,7 +10,7 @@ from __future__ import annotations
 from viewsphere.sampling.physics._body import Board, Body, Touch, body_of, needed
 from viewsphere.sampling.physics._world import CALM_LOOKS, DAMPED_S, LONGEST_S, STEP_S, TYPICAL, World
 
-EDITION = "physics 4"
+EDITION = "physics 5"
 """Raised when the same bodies come to rest elsewhere than before: what was simulated and kept is told apart by it."""
 
 __all__ = [

@@ -40,6 +40,11 @@ REST_S, REST_WAY, REST_ANGLE = 1.0, 0.0009, math.radians(0.45)
 world's and not those that are simulated: what stands on an edge falls a moment later.
 """
 
+ASLEEP = 0.006
+"""Bodies that settle and are slower than this for ten steps, metres a second, stay as they are until something moves against
+them, and cost nothing (MuJoCo 3.4 and newer). Whether all are at rest is looked at with all of them awake.
+"""
+
 DAMPED_S, DAMPING = 2.0, 4.0
 """Seconds after which bodies that settle lose a share of their speed, and how much of it a second: boats rock on otherwise. No
 look that finds them at rest is helped so.
@@ -84,9 +89,17 @@ class World:
 
     def begin(self, poses: Sequence[Matrix4]) -> None:
         """Let the bodies go from these poses, as in a new world; fences that were taken away stay away."""
+        self._fall_asleep(False)  # MuJoCo does not place what stands still in data that are made while bodies may sleep
         self._data, self._steps = self._mujoco.MjData(self._model), 0
         for number, pose in enumerate(poses):
             self.put(number, pose)
+        self._mujoco.mj_forward(self._model, self._data)
+
+    def _fall_asleep(self, may: bool) -> None:
+        """Let bodies that hardly move sleep, or wake all."""
+        if sleep := int(getattr(self._mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)):
+            flags = self._model.opt.enableflags
+            self._model.opt.enableflags, self._model.opt.sleep_tolerance = flags | sleep if may else flags & ~sleep, ASLEEP
 
     def _compiled(
         self, bodies: Sequence[Body], boards: Sequence[Board], floor: float, fixed: Sequence[tuple[Body, Matrix4]]
@@ -158,12 +171,16 @@ class World:
         each: int = LOOK,
         look: Callable[[], None] | None = None,
         ends: Callable[[], bool] | None = None,
+        is_calm: bool = False,
     ) -> bool:
         """Let time go by until all bodies stay where they are for `rest_s` of the world's seconds, and go back to when that
         began; whether it begins before so many simulated ones are over, and before `ends` says that all is of no use. `look`
-        is called every so many steps, and `ends` after it.
+        is called every so many steps, and `ends` after it. is_calm: whether they seem to be at rest when this begins.
         """
-        calm, tried, begun, step = list[Float](), None, 0, 0
+        calm, tried, begun, step = list[Float](), None, self._steps, 0
+        self._fall_asleep(not is_calm)
+        if is_calm:
+            tried = self._data.qpos.reshape(-1, 7).copy()
         while tried is not None or (step + each) * STEP_S <= longest_s:
             step += each
             if calm or tried is not None or self._steps * STEP_S < DAMPED_S:
@@ -182,6 +199,8 @@ class World:
                     self._begin_at(tried, begun)
                     return True
                 continue
+            if tried is not None:
+                self._fall_asleep(True)
             tried, calm = None, [*calm, now] if self._is_slow else []
             if len(calm) >= CALM_LOOKS and _are_near(calm[-CALM_LOOKS], now, CALM_WAY, CALM_ANGLE):
                 tried, begun, calm = now, self._steps, []
@@ -191,7 +210,8 @@ class World:
         return False
 
     def _begin_at(self, state: Float, steps: int) -> None:
-        """Put all bodies at rest in a state (N, 7), which was after so many steps."""
+        """Put all bodies at rest and awake in a state (N, 7), which was after so many steps."""
+        self._fall_asleep(False)
         self._data.qpos[:], self._data.qvel[:], self._steps = state.ravel(), 0.0, steps
         self._mujoco.mj_forward(self._model, self._data)
 

@@ -132,7 +132,7 @@ class Drop:
         calm = settle(rest_s=0.0) if fences else settle()
         if fences and calm:
             world.take_fences_away()
-            calm = settle() if film else self._kept(world, number, places, longest_s)
+            calm = settle(is_calm=True) if film else self._kept(world, number, places, longest_s)
         made: dict[str, Any] = {"poses": world.poses}
         return made | ({"ways": film.ways} if film else {}), self._problem(world, calm, bool(film))
 
@@ -158,7 +158,7 @@ class Drop:
         def watch() -> None:
             let_go(self._beside(world, math.inf) if again < most else ())
 
-        calm = world.settle(longest_s, look=watch)
+        calm = world.settle(longest_s, look=watch, is_calm=True)
         while calm and again < most and (high := self._beside(world, self.ground.height)):
             let_go(high)
             calm = world.settle(longest_s, look=watch)
