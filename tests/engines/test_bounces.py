@@ -111,6 +111,17 @@ def test_a_closed_box_that_glows_evenly(reflectance):
     np.testing.assert_allclose(light, 1 / (1 - reflectance), rtol=0.018 if reflectance else 0.03)
 
 
+def test_a_closed_box_that_glows_faintly_beside_a_sunlit_wall():
+    """All bounces in the box are followed, however little of all light they are."""
+    low, high, apart = (-1.0, -0.8, -0.6), (1.0, 0.8, 0.6), np.array([2.5, 0, 0])
+    dim, white = matt(0.8, 0.01), matt(0.8)
+    mesh = painted_mesh((inside_out(box(low, high)), dim), (box(low + apart, high + apart), white))
+    stage = stage_of(mesh, Scene(sun=Sun(azimuth_deg=0, elevation_deg=40), sky=DARK))
+    places, normals = walls(low, high)
+    light = probed(stage, places.reshape(-1, 3), normals.reshape(-1, 3))
+    np.testing.assert_allclose(light, 0.05, rtol=0.02)
+
+
 @pytest.mark.slow
 def test_a_closed_box_of_which_one_wall_glows(monkeypatch):
     """What is sent out is all absorbed: the mean irradiance is the power over area times absorption. A wall opposite has what

@@ -62,8 +62,16 @@ MAP, MAP_RAYS, BEYOND = 96, 128, 0.9
 SHADOWS = 2e-3
 """Cells off a surface at which shadows begin."""
 
-UNCHANGED, ROUNDS = 0.004, 48
-"""The share of all light below which another bounce is not seen, and how many there are at most."""
+UNCHANGED, ROUNDS = 0.02, 48
+"""The share of a patch's light, in the mean of all, below which what further bounces add is not followed but foretold, and how
+many there are at most.
+"""
+
+TINY = 1e-12
+"""Light of patches that is none."""
+
+MOST_SENT_ON = 0.9
+"""Of light, the share that the next bounce sends on at most, as far as it is foretold."""
 
 TERMS = np.array([1 / 4, *[1 / 2] * 3, *[15 / 16] * 2, 5 / 64, 15 / 16, 15 / 64], np.float32) / np.float32(math.pi)
 """Factors of the terms of irradiance / pi: the constants of spherical harmonics, squared, times the share of each degree that
@@ -76,7 +84,8 @@ class Hall:
     """Things that throw light at one another, between the corners low and high (3,) in the stage's units, `unit` metres.
 
     key: equal where all of it is, but for light; which (T,): their triangles; ground_z: the ground's height, None for none;
-    floor: see `painting.Baked`; has_map: whether they stand on the ground, and nothing else does.
+    floor: see `painting.Baked`; has_map: whether they stand on the ground, and nothing else does; is_fine: whether more rays
+    gather light on them.
     """
 
     key: Hashable
@@ -89,6 +98,7 @@ class Hall:
     unit: float
     ground_z: float | None
     has_map: bool
+    is_fine: bool
 
     @cached_property
     def owns(self) -> NDArray[np.bool_]:
@@ -171,7 +181,7 @@ def _bake(lighting: _Lighting) -> Bounces:
     lanterns = lanterns_of(hall.which, hall.surfaces, patches, lit.emitted, TURNS)
     shining, near = _shining(seen, lanterns, lit.emitted, weights, off)
     own = lit.emitted * (lanterns.froms == 0)[:, None] + lit.reflectance * lit.arrived / np.float32(math.pi)
-    places, normals, sent = patches.places, patches.normals, own
+    places, normals, before, sent = patches.places, patches.normals, np.zeros_like(own), own
     glow, inside = np.empty_like(own), np.empty(len(own), np.float32)
     gathering = _gathering(seen, surrounding, lanterns, lit.emitted, off)
     if gathering is not None:
@@ -193,9 +203,11 @@ def _bake(lighting: _Lighting) -> Bounces:
         kernels.look_up(bounces, places, normals, patches.triangles, glow, inside)
         if gathering is not None:
             gathering.look_around(sent, glow, inside)
-        before = sent
+        earlier, before = before, sent
         sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * elsewhere)
-        if np.abs(sent - before).sum(dtype=np.float64) <= UNCHANGED * sent.sum(dtype=np.float64):
+        further = _further(sent - before, before - earlier)
+        if (further / np.maximum(sent, TINY)).mean(dtype=np.float64) <= UNCHANGED:
+            sent = sent + further
             break
     receive()
     if gathering is not None:
@@ -213,6 +225,14 @@ def _bake(lighting: _Lighting) -> Bounces:
     light = np.where((lanterns.froms == 0)[:, None], sent, np.float32(-1))
     known = patches.table.keys, patches.table.patch, light
     return bounces._replace(sent=PatchLight(*known, bounces.sent.frame, bounces.sent.materials))
+
+
+def _further(change: Float32, last: Float32) -> Float32:
+    """What all further bounces add to patches, (M, 3), of which the last one added `change` and the one before it `last`: each
+    adds the same share of what the one before it did.
+    """
+    share = np.divide(change, last, out=np.ones_like(change), where=last > 0).clip(0, MOST_SENT_ON)
+    return change * share / (1 - share)
 
 
 def _settle(seen: _Seen, light: Float32, views: Float32) -> None:
@@ -275,7 +295,7 @@ def _look(hall: Hall) -> _Seen:
         below = Rays(places, up, same, met, far)
         bundles.append(below)
     made = hall.surfaces.vertices, hall.surfaces.triangles[hall.which]
-    looked = look(tree, *made, normals, hall.unit, volumes[0].is_inside_out) if has_charts else None
+    looked = look(tree, *made, normals, hall.unit, volumes[0].is_inside_out, hall.is_fine) if has_charts else None
     if looked is not None:
         bundles.extend(looked.rays)
     inner, materials = grids[0], hall.surfaces.material[hall.which]

@@ -79,7 +79,7 @@ class Halls:
         has_map = ground_z is not None and not arranged.has_scenery
         limits = own.which, own.low, own.high
         surfaces = casters.surfaces._replace(normals=arranged.geometry.triangle_normals_of(_still(arranged)))
-        return Hall(key, surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map)
+        return Hall(key, surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map, bounces == "fine")
 
     def _throwing(self, arranged: Arranged, rows: Rows, only_indoors: bool) -> _Throwing:
         still, surfaces, lengths = _still(arranged), rows.surfaces, rows.lengths

@@ -24,6 +24,9 @@ CELL, MOST = 0.1, 64_000
 LEAST, NARROW = 0.05, 0.05
 """Square metres that a chart has at least, and metres that it is wide: twice its area by the length of its border."""
 
+ROOM = 1 << 25
+"""Rays of all nodes at most: each takes twelve bytes."""
+
 TURNS = 4
 """The rays of a node are turned in the square of so many ways: any four by four nodes have all."""
 
@@ -67,7 +70,7 @@ class Charts:
 
 
 def charts_of(corners: Float32, unit: float, rays: int) -> Charts | None:
-    """The charts of triangles (T, 3, 3) in a stage of `unit` metres, None if there are none."""
+    """The charts of triangles (T, 3, 3) in a stage of `unit` metres, None if there are none. rays: of each node at most."""
     places = corners.astype(np.float64)
     found = [piece for chart in _planes(places, unit) for piece in _pieces(chart, places, unit)]
     if not found:
@@ -171,6 +174,7 @@ def _settled(
         at = slice(done, done + len(piece.triangles))
         flat[at], which[at], done = corners[piece.triangles] @ piece.axes[:2].T * cells - low, k, at.stop
     total = int(counts.sum())
+    rays = max(1, min(rays, ROOM // total))
     places, distances = np.zeros((total, 2)), np.full(total, np.inf)
     kernels.settle(flat, which, charts, INSET, places, distances)
     ways, orientation = np.unique(np.rint(charts[:, kernels.NORMAL : kernels.NORMAL + 3] * PLANES), axis=0, return_inverse=True)
