@@ -232,7 +232,7 @@ def _further(change: Float32, last: Float32) -> Float32:
     adds the same share of what the one before it did.
     """
     share = np.divide(change, last, out=np.ones_like(change), where=last > 0).clip(0, MOST_SENT_ON)
-    return change * share / (1 - share)
+    return (change * share / (1 - share)).astype(np.float32)
 
 
 def _settle(seen: _Seen, light: Float32, views: Float32) -> None:
