@@ -268,7 +268,7 @@ def coloured(tmp_path_factory):
 @pytest.mark.parametrize(
     "toward",
     [
-        (-1, 0.001, 0.2),
+        pytest.param((-1, 0.001, 0.2), marks=pytest.mark.slow),
         pytest.param((1, 0, 0), marks=pytest.mark.slow),
         (0.3, -0.7, 0.6),
         pytest.param((0.1, 0.1, -0.9), marks=pytest.mark.slow),

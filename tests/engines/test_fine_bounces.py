@@ -49,6 +49,7 @@ def near_of(stage, view: Camera) -> np.ndarray:
     return found.near.reshape(view.height, view.width, 4)
 
 
+@pytest.mark.slow
 def test_in_a_furnace_what_is_near_sends_what_it_takes_away():
     """A white ball within another one that shines and throws back half: all has twice the light that the outer one sends by
     itself; so has the gap.
@@ -63,6 +64,7 @@ def test_in_a_furnace_what_is_near_sends_what_it_takes_away():
     np.testing.assert_allclose(light(stage, view), 0.5, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_near_light_does_not_depend_on_what_was_painted_before():
     """Rays of a place are kept from shot to shot, whose targets have other numbers of materials."""
     pebbles = both(ball(0.5, (0, 0, 0), 16), ball(0.5, (0, 1.02, 0), 16))
@@ -81,6 +83,7 @@ def test_near_light_does_not_depend_on_what_was_painted_before():
     np.testing.assert_array_equal(found(two), fresh)
 
 
+@pytest.mark.slow
 def test_beyond_the_probes_fine_light_is_that_of_the_sky(monkeypatch):
     """250 m away nothing is known of what bounces, however near it is."""
     far = painted_mesh(*((np.array(box((249, y, 1), (251, y + 0.3, 3))), matt(0.9)) for y in (-0.4, 0.1)))

@@ -64,6 +64,7 @@ def test_more_motion_takes_more_pictures(known):
     assert found[:3] == [1, 1, 2] and found == sorted(found) and found[-1] == MOST
 
 
+@pytest.mark.slow
 def test_less_than_a_pixel_is_nothing(known):
     shot = SCENES["pan"](0.5)
     np.testing.assert_array_equal(picture(shot, known), picture(sharp(shot), known))

@@ -46,7 +46,8 @@ def some(s: Samples, which) -> Samples:
     return Samples(s.place[which], s.smooth[which], s.normal[which], s.pixel[which], s.is_ground[which])
 
 
-@pytest.mark.parametrize("quality", quick(["fast", "fine"], "fast"))
+@pytest.mark.slow
+@pytest.mark.parametrize("quality", ["fast", "fine"])
 @pytest.mark.parametrize("ground", [True, False])
 def test_a_car_against_rays(quality, ground):
     pytest.importorskip("embreex")
@@ -60,6 +61,7 @@ def test_a_car_against_rays(quality, ground):
     assert np.corrcoef(found[sure, 0], truth[sure])[0, 1] > 0.65
 
 
+@pytest.mark.slow
 def test_the_ground_beside_a_car_against_rays():
     pytest.importorskip("embreex")
     stage = LightStage(zoo.build("car", np.random.default_rng(3)))
@@ -72,7 +74,7 @@ def test_the_ground_beside_a_car_against_rays():
     assert found.max() > 0.9
 
 
-@pytest.mark.parametrize("ground", [True, False])
+@pytest.mark.parametrize("ground", quick([True, False], True))
 def test_a_corner_and_under_a_table_against_rays(ground):
     pytest.importorskip("embreex")
     walls = [cuboid((-1, -1, 0), (1, 1, 0.1)), cuboid((-1.1, -1, 0), (-1, 1, 2)), cuboid((-1, -1.1, 0), (1, -1, 2))]
@@ -134,6 +136,7 @@ def test_nothing_is_hidden_far_away_or_when_it_is_off():
     np.testing.assert_array_equal(stage.occlusion(NO_OCCLUSION, beside)[:, :2], 1)
 
 
+@pytest.mark.slow
 def test_a_box_keeps_light_from_the_ground_and_from_what_it_lights():
     """Under an overhead sun nothing but the sky is lost beside a box; under a low one its shadow sends up less light."""
     stage = LightStage(flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1))))

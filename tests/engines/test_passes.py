@@ -178,6 +178,7 @@ def linear_picture(stage, view):
     return light.reshape(view.height, view.width, 4)[..., :3]
 
 
+@pytest.mark.slow
 def test_albedo_times_shading_is_the_diffuse_picture():
     """Within 1 %, of a car without metals: what its colours add to the same car in black."""
     car = zoo.build("car", np.random.default_rng(4))

@@ -129,6 +129,7 @@ def test_a_sequence_looks_like_stills(scene, occlusion, most, share):
         assert apart.mean() < most and (apart > 8).mean() < share, (apart.mean(), (apart > 8).mean())
 
 
+@pytest.mark.slow
 def test_a_stage_tells_stills_from_a_sequence():
     stage = stage_of(sequence_of("sun"))
     moving = picture(stage, 1)
@@ -137,6 +138,7 @@ def test_a_stage_tells_stills_from_a_sequence():
     assert np.array_equal(picture(stage, 1), moving)
 
 
+@pytest.mark.slow
 def test_what_stands_still_is_drawn_once():
     """As long as the map stays where it is, and nothing comes or goes."""
     slow = Motion(poses=tuple(pose(0.01 * i, 0.2, 0.0) for i in range(COUNT)))

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from quick import quick
 from truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, random_soup, sphere
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines.raster.kernels_paint import BRIGHT, GLINT, average_samples, brighten_lines, shared_samples
@@ -86,7 +87,7 @@ def test_nothing_to_smooth():
     assert check_edges(geometry, camera)[0] is None
 
 
-@pytest.mark.parametrize("name", ["car", "bicycle"])
+@pytest.mark.parametrize("name", quick(["car", "bicycle"], "car"))
 def test_dense_models(name):
     """Silhouettes of many small triangles and of thin spokes: nearly all samples are truth's, and they are not biased."""
     mesh = build(name, np.random.default_rng(1))
@@ -196,7 +197,7 @@ def sample_rays(camera):
     return np.stack([pixels[:, int(4 * y), :, int(4 * x)] for x, y in OFFSETS], axis=2).reshape(-1, 3)
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", quick(LENSES, "pinhole"))
 def test_layers_equal_brute_force(name):
     deep = 0
     for seed in range(4):

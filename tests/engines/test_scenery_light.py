@@ -123,6 +123,7 @@ def test_a_target_darkens_the_scenery_it_stands_on_as_it_does_the_ground():
     assert np.ptp(above[inner]) <= 3
 
 
+@pytest.mark.slow
 def test_the_next_target_is_lit_by_the_same_place_and_another_sun_by_another():
     """Kept shadows are those of the place and the sun at hand."""
     house = mesh_of(box((-4, -5, 0), (4, 5, 6)))

@@ -62,6 +62,7 @@ def test_each_model_takes_a_picture_of_the_folder_which_its_name_decides(folder)
     assert len({tuple(painted(recipe_of(folder, seed=seed))) for seed in range(3)}) > 1
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn_for_each_frame_where_materials_are(folder):
     views = {"azimuth": list(range(0, 360, 30)), "elevation": 20, "distance": {"fill": 0.8}}
     scene = {"ground": "off", "draw": "per_frame", "materials": [{"images": str(folder)}]}

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from isal import isal_zlib
 
+from quick import quick
 from viewsphere.codecs.deflate import RAW, ZLIB, compressed
 
 PLACES = ((1 << 20, 0), (3 << 20, 7), (5 << 20, 255), (9 << 20, 90))
@@ -48,7 +49,7 @@ def elsewhere(make, stack: int, pattern: int) -> list:
     return found
 
 
-@pytest.mark.parametrize("window", [ZLIB, RAW])
+@pytest.mark.parametrize("window", quick([ZLIB, RAW], RAW))
 def test_equal_bytes_are_deflated_equally_in_every_thread_and_memory(window):
     inputs = returning_heads(8000, 300)
     first, *others = (elsewhere(lambda: [compressed(data, window) for data in inputs], *place) for place in PLACES)

@@ -96,6 +96,7 @@ def test_polygons_of_nasty_masks(name):
     assert_exact(NASTY[name])
 
 
+@pytest.mark.slow
 def test_polygons_of_all_masks_of_3_by_4():
     for bits in itertools.product((False, True), repeat=12):
         mask = np.array(bits).reshape(3, 4)

@@ -76,6 +76,7 @@ def test_speeds_and_sizes():
     assert sizes(SNOW).slope == pytest.approx(2.55 * 2**-0.48)
 
 
+@pytest.mark.slow
 def test_pictures_follow_from_seed_and_moment_alone():
     assert (picture(RAIN) == picture(RAIN)).all()
     assert (picture(RAIN) != picture(RAIN, seconds=0.04)).any()

@@ -256,6 +256,7 @@ def test_blenders_engines_show_the_materials_where_raster_does(request, engine):
     assert np.corrcoef(by_raster[floor].reshape(-1), by_blender[floor].reshape(-1))[0, 1] > 0.8
 
 
+@pytest.mark.slow
 def test_labels_of_a_deforming_model_do_not_change(monkeypatch, tmp_path):
     """The box leans, and loses its lid half-way: what it is made of follows, flow and all else stay."""
     let_walk(monkeypatch, tmp_path)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from proven import equal, told
+from quick import quick
 from truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
@@ -143,7 +144,7 @@ def procedural(rng):
     ]
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", quick(LENSES, "rational"))
 def test_ids_and_depth_on_procedural_scenes(name):
     rng = np.random.default_rng(7)
     meshes = procedural(rng)

@@ -70,6 +70,7 @@ def test_nothing_moves_nothing_changes():
     np.testing.assert_allclose(swept.incidence, still.incidence, atol=1e-3)  # the world's normals are float32
 
 
+@pytest.mark.slow
 def test_each_column_is_nearly_as_if_drawn_at_its_own_moment():
     """At a street's speeds: another triangle is met at outlines, and a neighbouring facet of a ball; all else is the same."""
     own, rng = scan(rings=32, elevation=[-15, 5]), np.random.default_rng(4)

@@ -217,6 +217,7 @@ def zoo_scene():
     return things, meshes
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_points_against_embree():
     """Embree's rays are float32: each difference is settled by float64 brute force, and none goes against us."""
     pytest.importorskip("embreex")

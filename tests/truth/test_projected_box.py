@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quick import quick
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 from viewsphere.geometry.box import projected_bounds
 from viewsphere.model.camera import Distortion
@@ -37,7 +38,7 @@ MODELS = {
 }
 
 
-@pytest.mark.parametrize("name", STRONG)
+@pytest.mark.parametrize("name", quick(STRONG, *(STRONG.keys() - {"folding", "barrel", "shifted"})))
 @given(seed=st.integers(0, 10**6), model=st.sampled_from(sorted(MODELS)))
 def test_no_pixel_of_a_model_lies_outside_its_box(name, seed, model):
     """Nor is the box larger than its pixels by more than gaps between pixel centres allow, for a ball that fills some."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from test_embree import compare, embree, trace, turned
 
+from quick import quick
 from shots import still_shot
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.box import box_vertices
@@ -73,7 +74,7 @@ def cameras(lens_name, count, width=320, height=240):
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", quick(LENSES, "pinhole", "fisheye"))
 def test_ids_and_depth_of_a_whole_scene(name):
     *_, geometry = scene()
     views = cameras(name, 6 if name == "pinhole" else 2)
@@ -102,6 +103,7 @@ def alone(geometry, camera, object_id):
     return hit, hit[i.height : 2 * i.height, i.width : 2 * i.width]
 
 
+@pytest.mark.slow
 def test_masks_boxes_and_visible_shares_of_a_whole_scene():
     things, meshes, geometry = scene()
     whole = embree(geometry)
