@@ -129,6 +129,7 @@ def test_a_table_has_what_was_asked_for() -> None:
     assert {"column", "foot"} <= set(round_.parts)
 
 
+@pytest.mark.slow
 def test_a_sofa_has_what_was_asked_for() -> None:
     plain = sofa(Sofa(scattered=0))
     assert not {"pillow", "throw", "chaise", "button"} & set(plain.parts)

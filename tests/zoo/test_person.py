@@ -120,7 +120,8 @@ def test_joints_are_smpls_in_surreals_order():
     assert {one["name"]: one["extras"]["speed"] for one in root["animations"]} == {**SPEEDS, "stand": 0.0, "sit": 0.0}
 
 
-@pytest.mark.parametrize("seed", [1, 5, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 5, 3])
 def test_weights_sum_to_one_and_every_joint_moves_something(seed):
     one = made(seed)
     np.testing.assert_allclose(one.vertex_weights.sum(axis=1), 1, atol=1e-12)
@@ -266,6 +267,7 @@ def test_surreals_format_takes_its_joints_and_parts(walked, tmp_path):
     assert part_numbers(info.steps[0].body_parts, SMPL).tolist() == list(range(25))
 
 
+@pytest.mark.slow
 def test_a_store_holds_the_mesh_that_was_drawn(walked):
     info = walked.models[0]
     step = info.steps[0]
@@ -274,6 +276,7 @@ def test_a_store_holds_the_mesh_that_was_drawn(walked):
     assert len(seen.triangles) > 20_000 and step.body_parts == SMPL
 
 
+@pytest.mark.slow
 def test_an_export_tells_the_same_joints(walked):
     (file,) = (walked.root / "coco" / "annotations").glob("*.json")
     told = {one["image_id"]: one for one in json.loads(file.read_text())["annotations"]}

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
+from quick import quick
 from viewsphere import plugins, zoo
 from viewsphere.zoo.indoors.furnishing import Furnishing, Stand, extent, overlap
 from viewsphere.zoo.indoors.habits import furnished
@@ -40,7 +41,7 @@ def at(piece) -> np.ndarray:
     return np.array(piece.world_from_piece)
 
 
-@pytest.mark.parametrize("name", ["room", pytest.param("flat", marks=pytest.mark.slow), "table_top"])
+@pytest.mark.parametrize("name", quick(["room", "flat", "table_top"], "table_top"))
 def test_a_seed_gives_one_layout_and_others_give_others(name: str) -> None:
     layouts = [place(name, seed) for seed in range(5)]
     assert place(name, 3) == layouts[3]

@@ -75,6 +75,7 @@ def test_a_mugs_handle_stands_out_and_ends_within_its_wall(shape: str) -> None:
         assert (ends[:, 0] > within - 2e-4).all() and (ends[:, 0] < within + p.wall).any()
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_is_there() -> None:
     assert {"content", "tag", "spoon"} <= set(mug(Mug(content="tea", tag=True, spoon=True)).parts)
     assert not {"content", "tag", "spoon"} & set(mug(Mug()).parts)
@@ -140,6 +141,7 @@ def test_bottles_are_of_all_kinds_and_colours() -> None:
     assert len({(p.label.title, p.label.colors) for p in draws if p.label}) > 30
 
 
+@pytest.mark.slow
 def test_all_prints_can_be_drawn_and_differ() -> None:
     looks = set()
     for paint in PATTERNS.values():
