@@ -117,6 +117,7 @@ def test_bop_exports_alike_again(of_bop):
                     close("bop", "again: BOP of BOP", a[field], b[field], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_symmetries_of_models_info_are_the_models(tmp_path, tree):
     folder = tree(shift=0.0)
     made = make_again("bop", folder, tmp_path / "again")
@@ -345,6 +346,7 @@ def test_broken_trees_are_told_in_a_line_and_leave_nothing(tree, tmp_path, what)
     assert "\n" not in str(error.value) and sorted(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_symmetries_that_are_not_all_listed_are_left_out_and_said(tree, tmp_path):
     folder = tree(0.0)
     turns = [np.diag([1.0, -1, -1, 1]).ravel().tolist(), np.diag([-1.0, 1, -1, 1]).ravel().tolist(), np.eye(4).ravel().tolist()]

@@ -66,6 +66,7 @@ def test_frames_of_other_scenes_have_other_files(asked, tmp_path):
     assert len(suns) == len(samples) == sum(len(told.samples) for told in asked.values())
 
 
+@pytest.mark.slow
 def test_sky_and_colours_behind_have_files_of_their_own(asked, tmp_path):
     """The shots have several frames; what is behind them is drawn for each."""
     scene = {"background": {"choice": ["sky", "#ff0000"]}}
@@ -272,7 +273,7 @@ def test_blend_is_a_format_that_cannot_be_imported():
     assert blend._spec("a", "a.glb").centring == "as_is" and isinstance(blend._spec("a", "a.glb"), ModelSpec)
 
 
-@pytest.mark.parametrize("world", ["videos", "drives"])
+@pytest.mark.parametrize("world", quick(["videos", "drives"], "videos"))
 def test_each_sensor_of_a_rig_has_files_of_its_own(asked, world, request, tmp_path):
     dataset = request.getfixturevalue(world)
     export(dataset.root, ["blend"], output=tmp_path)

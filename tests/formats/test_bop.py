@@ -20,6 +20,7 @@ import webdataset
 from pycocotools.coco import COCO
 
 from proven import close, equal
+from quick import quick
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.formats import bop
@@ -103,7 +104,7 @@ def project(k, points):
     return found[:, :2] / found[:, 2:]
 
 
-@pytest.mark.parametrize("world", ["stills", "poses", pytest.param("videos", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("world", quick(["stills", "poses", "videos"], "stills"))
 def test_poses_take_points_of_models_to_their_pixels(written, world, request):
     """The coordinates map says which point of the model a pixel shows; pose and K take it to the centre of that pixel."""
     dataset = request.getfixturevalue(world)

@@ -237,6 +237,7 @@ def test_the_papers_tree_has_the_same_files_a_folder_higher(exported, tmp_path):
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_captions_are_coco_s(tmp_path):
     """pycocotools reads them by the ids of the images; without them there is no such file, and a changed one is found."""
     dataset, folder = make(tmp_path / "out", True, annotations=("captions",)), tmp_path / "coco"

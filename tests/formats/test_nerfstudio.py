@@ -14,7 +14,6 @@ from PIL import Image
 
 from cube_dataset import FEW, LENS, make
 from proven import close, equal
-from quick import quick
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
@@ -95,7 +94,8 @@ def test_world_points_come_to_their_pixels(world, kind, request, tmp_path):
         assert picture.samefile(dataset.path(sample.files["rgb"]))
 
 
-@pytest.mark.parametrize("kind", quick(["nerfstudio", "instant-ngp"], "instant-ngp"))
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["nerfstudio", "instant-ngp"])
 def test_depth_lifts_to_the_points(videos, kind, tmp_path):
     found = everything(written(videos, tmp_path, kind=kind), kind)
     for sample in videos:

@@ -54,6 +54,7 @@ def test_models_are_projected_exactly(poses, written):
             close("objectnet3d", "scipy: RT", said.RT[:, :3], o.camera_from_object[:3, :3], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_boxes_classes_and_the_true_camera(stills, written):
     folder = written(stills)
     for sample, record, objects, seen in shown(stills, folder):

@@ -95,6 +95,7 @@ def test_models_beside_the_axis_are_near_and_exact_by_the_true_camera(stills, wr
     assert 0.01 < farthest < 0.2  # pictures are 50 degrees wide
 
 
+@pytest.mark.slow
 def test_boxes_flags_and_anchors(stills, written):
     points = 0
     for _, _, record, objects, seen in shown(stills, written(stills)):

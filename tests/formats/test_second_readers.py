@@ -176,6 +176,7 @@ def scenes(dataset):
     return found
 
 
+@pytest.mark.slow
 def test_vkitti_2_pictures(videos, vkitti2):
     moved = 0
     for sequence, samples in scenes(videos).items():

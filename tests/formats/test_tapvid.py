@@ -216,6 +216,7 @@ def test_equal_arrays_make_equal_files_that_any_numpy_reads(tmp_path):
             equal("tapvid", "NumPy: arrays", found[key], array)
 
 
+@pytest.mark.slow
 def test_another_process_makes_the_same_pickle():
     """Hashes of texts differ between processes."""
     program = (

@@ -107,6 +107,7 @@ def corners(size, place, turns):
     return (signs * [w / 2, h / 2, length / 2] - [0, h / 2, 0]) @ turned(*turns).T + place
 
 
+@pytest.mark.slow
 def test_maps_of_version_2(videos, two):
     for sample in Views(videos).of(FormatEntry(name="vkitti"), None):
         camera, root = int(sample.sensor == "right"), two / f"Scene{sample.sequence}/fog/frames"

@@ -290,6 +290,7 @@ def test_the_visible_surface_is_the_same(made, known):
     assert np.median(others) > 0.3
 
 
+@pytest.mark.slow
 def test_diameters_are_the_largest_distances_of_any_two_vertices(made, known):
     for info in made.models:
         vertices = known[info.category][2].vertices.astype(np.float32).astype(float)  # which the OBJ file writes shortly

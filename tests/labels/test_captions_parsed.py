@@ -583,6 +583,7 @@ def few(folder, tmp_path_factory):
     return made(tmp_path_factory.mktemp("few"), entries(folder), {"count": 8}, scenes={"count": 9, **SCENES})
 
 
+@pytest.mark.slow
 def test_sentences_hold_of_their_pictures(few):
     sentences, forms = read(few, 8)
     told("captions", "a second program that reads them", 0)
@@ -591,6 +592,7 @@ def test_sentences_hold_of_their_pictures(few):
     assert {"count", "place", "size", "cut", "view", "relation", "weather", "color", "extreme"} <= set(forms)
 
 
+@pytest.mark.slow
 def test_words_are_those_of_the_paint(few):
     """Of each model, as it was painted; but of the one whose entry says others."""
     said = {o.key: (o.color or "", o.material or "") for sample in few for o in sample.objects}
@@ -617,6 +619,7 @@ SWAPS = [
 ]
 
 
+@pytest.mark.slow
 def test_the_reader_notices_what_does_not_hold(few):
     """Sentences in which a word was changed for another are refused, each of them."""
     reader, noticed = Reader(few), Counter()
@@ -689,6 +692,7 @@ def test_a_street_is_told_of(folder, tmp_path):
     assert forms["surroundings"] and forms["hidden"] and forms["count"] == 4
 
 
+@pytest.mark.slow
 def test_many_few_and_none(folder, tmp_path):
     """More than twelve of a kind, plurals of the recipe's own, and pictures in which too little of anything is seen."""
     models = [one for one in entries(folder, scale={"length": 0.2}) if one["category"] in {"knife", "orange"}]
@@ -711,6 +715,7 @@ TEMPLATES = ["{count} things: {list}|{categories}", "{object} is a {color} {mate
 TEMPLATES += ["{description} {relation}", "under a {weather} sky {{so}}"]
 
 
+@pytest.mark.slow
 def test_own_sentences_hold(folder, tmp_path):
     dataset = made(tmp_path, entries(folder), {"count": 6, "templates": TEMPLATES}, scenes={"count": 6, **SCENES})
     reader, seen = Reader(dataset), Counter()

@@ -178,6 +178,7 @@ def moving(sweep, **changes):
     return recipe({"sweep": sweep, "azimuth_step": 1}, **{**said, **changes})
 
 
+@pytest.mark.slow
 def test_a_sweep_does_not_depend_on_how_sequences_are_cut():
     cut, whole = ([s.channels["lidar"] for s in vs.render(moving(0.1, shot_frames=n)) if s.sensor == "top"] for n in (1, 3))
     still = [s.channels["lidar"] for s in vs.render(moving(0)) if s.sensor == "top"]

@@ -9,6 +9,7 @@ import trimesh
 
 from label_scenes import changed, pictured, proof, random_camera, random_things, rows_of
 from proven import equal, told
+from quick import quick
 from small import small_recipe, tree_hash
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere import generate, plan
@@ -100,7 +101,7 @@ def test_free_cells_are_before_what_is_seen_and_occluded_ones_behind(name):
     assert {OUTSIDE, FREE, OCCLUDED, SURFACE} == set(np.unique(grid.state).tolist())
 
 
-@pytest.mark.parametrize("slab", [1, 700, 4000])
+@pytest.mark.parametrize("slab", quick([1, 700, 4000], 700, 4000))
 def test_cells_are_seen_alike_however_many_are_looked_at_together(slab, monkeypatch):
     """Less than a step ahead has, more, and a number that no steps have; long and flat grids are as cheap as others."""
     options = {**SMALL, "size": [9, 30, 50]}
