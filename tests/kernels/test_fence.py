@@ -40,11 +40,13 @@ def imported(file):
             yield from (f"numba.core.{name.name}" if of_core else node.module for name in node.names)
 
 
+@pytest.mark.slow
 def test_only_the_compiler_knows_numba_from_within():
     files = {file.relative_to(PACKAGE).as_posix(): set(imported(file)) - PUBLIC for file in PACKAGE.rglob("*.py")}
     assert {file for file, names in files.items() if names} == INSIDERS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("numba", "asked", "loaded"),
     [

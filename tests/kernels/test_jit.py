@@ -76,6 +76,7 @@ def sum_of_two(numbers):
 """
 
 
+@pytest.mark.slow
 def test_a_cached_kernel_can_become_part_of_one_that_is_compiled(tmp_path):
     (tmp_path / "callee.py").write_text(CALLEE)
     (tmp_path / "caller.py").write_text(CALLER)

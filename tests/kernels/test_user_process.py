@@ -29,14 +29,10 @@ print(numba.config.CACHE_DIR, tripled.stats.cache_path, sep="|")
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("said", "stock"),
-    [
-        ("", "0"),
-        ("elsewhere", "1"),
-        pytest.param("", "1", marks=pytest.mark.slow),
-        pytest.param("elsewhere", "0", marks=pytest.mark.slow),
-    ],
+    [("", "0"), ("elsewhere", "1"), ("", "1"), ("elsewhere", "0")],
 )
 def test_own_functions_are_cached_where_they_were(tmp_path, stock, said):
     (tmp_path / "theirs.py").write_text(THEIRS)
