@@ -8,6 +8,7 @@ import pytest
 
 import viewsphere.check
 from cube_dataset import FEW, LENS, make
+from quick import quick
 from sealing import seal_again
 from small import small_recipe
 from viewsphere import generate
@@ -107,7 +108,7 @@ LENSES = {
 }
 
 
-@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("lens", quick(LENSES, "fisheye"))
 def test_bent_pictures_pass(tmp_path, lens):
     report = check(make(tmp_path, intrinsics=LENS.model_copy(update={"distortion": LENSES[lens]})))
     assert report.ok, report.findings
@@ -133,6 +134,7 @@ def test_every_export_that_is_there_is_proved_by_its_format(dataset):
     assert part.ok and "coco: not checked, that needs all frames" in part.notes
 
 
+@pytest.mark.slow
 def test_a_format_without_a_proof_is_a_note(dataset):
     (dataset.root / "blend").mkdir()
     (dataset.root / "blend" / "a.blend").write_text("scene")
@@ -166,6 +168,7 @@ def test_pictures_alone_pass_with_notes(tmp_path):
     assert any("depth and instances" in note for note in report.notes)
 
 
+@pytest.mark.slow
 def test_rays_are_cast_on_the_frames_asked_for(whole, monkeypatch):
     assert check(whole, sample=3).checked["surface"] == 3
     assert "surface" not in check(whole, rays=False).checked
@@ -202,6 +205,7 @@ def test_a_missing_shot_and_model(dataset):
     assert "block-1.glb" in messages[1]
 
 
+@pytest.mark.slow
 def test_what_was_left_out_on_purpose_is_a_note(tmp_path):
     dataset = make(tmp_path, leave_out=(2,))
     assert failures(dataset) == {("counts", None)}
@@ -221,6 +225,7 @@ def test_an_unknown_id_in_the_map(dataset):
     assert ("instances", 2) in failures(dataset, sample=0)
 
 
+@pytest.mark.slow
 def test_a_wrong_category(dataset):
     edit_channel(dataset, 2, "categories", lambda a: a.__setitem__(dataset[2].instances > 0, 3))
     assert failures(dataset) == failures(dataset, sample=0) == {("categories", 2)}
@@ -263,6 +268,7 @@ def test_a_hole_that_is_cut_consistently(dataset):
     assert {(name, 1) for name in (*shown, "mask", "box2d")} == found
 
 
+@pytest.mark.slow
 def test_run_lengths_that_are_none(dataset, spelled):
     for frame, counts in enumerate(("?!", "", "o"), 1):
         edit_record(dataset, frame, lambda r, counts=counts: r["objects"][0].update(mask=counts))
@@ -426,7 +432,7 @@ def test_all_that_is_kept_of_objects_is_computed_again(dataset):
     assert {(name, frame) for frame, name in enumerate(KEPT)} <= failures(dataset, rays=False)
 
 
-@pytest.mark.parametrize("moved", ["motion", "instant"])
+@pytest.mark.parametrize("moved", quick(["motion", "instant"], "instant"))
 def test_shots_that_were_changed(dataset, moved):
     """Beside one whose lens was changed, and one that is whole."""
 
@@ -445,6 +451,7 @@ def test_shots_that_were_changed(dataset, moved):
     assert found == {*([6] if moved == "instant" else [4, 5, 6, 7]), 8, 9, 10, 11}
 
 
+@pytest.mark.slow
 def test_rounded_depth_is_compared_to_its_step(tmp_path):
     dataset = make(tmp_path, files=Files(depth="png16", depth_unit=0.01), ground=True)
     assert check(dataset).ok
@@ -657,6 +664,7 @@ def test_every_leaf_of_every_record_is_proved(short, merged, tmp_path, kind, mon
     assert missed_leaves(dataset, places, monkeypatch) == []
 
 
+@pytest.mark.slow
 def test_frames_of_another_split_than_the_plan_dealt(tmp_path):
     generate(small_recipe(formats=[]), tmp_path)
     file = next(tmp_path.glob("store/shots/*/*/shot.json"))

@@ -101,6 +101,7 @@ def test_completing_loads_nothing_heavy():
     assert run.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("bash") is None, reason="bash")
 def test_bash_itself(tmp_path):
     program = tmp_path / "viewsphere"

@@ -16,6 +16,7 @@ from small import ROOT
 README = (ROOT / "README.md").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_generated_pages_are_what_the_code_says():
     run = subprocess.run([sys.executable, ROOT / "scripts" / "docs.py", "--check"], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr

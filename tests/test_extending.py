@@ -175,6 +175,7 @@ def test_a_format_may_prepare_its_samples(small_dataset, tmp_path, monkeypatch):
     assert tree_hash(tmp_path / "The same table") == tree_hash(tmp_path / "One row an object")
 
 
+@pytest.mark.slow
 def test_a_format_may_be_a_tree(small_dataset, monkeypatch):
     install(monkeypatch, "lines", "viewsphere.formats", EXAMPLES["One JSON line a picture"])
     export(small_dataset.root, ["lines"])

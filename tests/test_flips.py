@@ -77,7 +77,8 @@ def is_noticed(dataset, file):
         return True
 
 
-@pytest.mark.parametrize(("count", "names"), [(8, None), pytest.param(100, SEALED, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "names"), [(8, None), (100, SEALED)])
 def test_every_flipped_bit_is_found(finished, count, names):
     missed, tried = [], set()
     for dataset in finished:
@@ -93,7 +94,8 @@ def test_every_flipped_bit_is_found(finished, count, names):
     assert len(tried) >= (70 if names is None else len(SEALED) + 2)
 
 
-@pytest.mark.parametrize(("count", "suffixes"), [(8, None), pytest.param(100, CHECKED, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "suffixes"), [(8, None), (100, CHECKED)])
 def test_readers_see_every_flip(finished, count, suffixes):
     """No array comes out of a damaged file; where files carry checksums, codecs see that without the manifest's digest."""
     tried = set()

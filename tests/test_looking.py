@@ -61,6 +61,7 @@ def test_films_of_chosen_frames_leave_out_what_lacks_a_sensor(moving):
     assert [chosen[place].instant for places in film.places for place in places] == [0, 0, 2, 2, 3, 3]
 
 
+@pytest.mark.slow
 def test_spread_takes_both_ends():
     (film, _) = films_of(list(preview_samples(moving_recipe(), 12, 32, row=6)))
     assert film.spread(3) == (0, 2, 5)
@@ -68,6 +69,7 @@ def test_spread_takes_both_ends():
     assert film.spread(99) == (0, 1, 2, 3, 4, 5)
 
 
+@pytest.mark.slow
 def test_a_preview_of_a_recipe_shows_evenly_spaced_instants_of_its_sequences():
     shown = [(s.sequence, s.instant, s.sensor) for s in preview_samples(moving_recipe(), 6, 48, row=3)]
     assert shown == [
@@ -234,6 +236,7 @@ def _durations(file: Path) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 def test_an_mp4_shows_every_instant_in_order(moving, tmp_path):
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     made = write_video(moving, tmp_path / "one.mp4", ["flow", "tracks"], "post_box_001")

@@ -122,12 +122,14 @@ def test_a_crash_costs_one_message(spec, reader, body, said):
     assert said in refusal(spec)
 
 
+@pytest.mark.slow
 def test_an_endless_loop_is_stopped(spec, reader, monkeypatch):
     reader("while True: pass")
     monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", str(1.0))
     assert "within 1 s (limit MAX_READ_SECONDS)" in refusal(spec)
 
 
+@pytest.mark.slow
 def test_a_loop_that_keeps_the_interpreter_to_itself_is_stopped(spec, reader, monkeypatch):
     reader("import re; re.match(r'(a+)+b', 'a' * 60)")
     monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", "1")
@@ -177,6 +179,7 @@ def test_without_processes_the_error_says_so(spec, monkeypatch):
     assert len(load_normalised(spec).triangles) == 6
 
 
+@pytest.mark.slow
 def test_zoo_models_stay_here(spec, monkeypatch):
     mesh = load_normalised(spec)
     monkeypatch.setattr(subprocess, "Popen", None)
@@ -184,6 +187,7 @@ def test_zoo_models_stay_here(spec, monkeypatch):
     np.testing.assert_array_equal(found.vertices, mesh.vertices)
 
 
+@pytest.mark.slow
 def test_what_was_left_behind_is_swept(spec):
     folder = cache_folder()
     killed = folder / f"{PREFIX}{of_this_process()}x"
@@ -223,6 +227,7 @@ def test_no_child_outlives_its_parent(spec, reader, tmp_path, how):
         parent.wait()
 
 
+@pytest.mark.slow
 def test_a_child_ends_when_its_standard_input_does(spec, reader, tmp_path):
     reader("while True: pass")
     job = Job(spec.model_dump(mode="json"), str(tmp_path), 2.0 * DEADLINE, 1 << 32, os.getpid())
@@ -253,6 +258,7 @@ def _work(pipe, text):
     pipe.send(len(load_normalised(ModelSpec.model_validate_json(text)).triangles))
 
 
+@pytest.mark.slow
 def test_the_reader_writes_nothing_elsewhere(spec, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     before = {p for p in tmp_path.rglob("*") if "cache" not in p.parts}

@@ -53,6 +53,7 @@ def digest():
     return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
 
 
+@pytest.mark.slow
 def test_the_same_bits_without_vector_instructions():
     from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 
+import pytest
 from fake_blender import LACKING, blind_blender, fake_blender, with_modules, without_blender
 from typer.testing import CliRunner
 
@@ -81,6 +82,7 @@ def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
     assert "set VIEWSPHERE_CACHE" in doctor().stdout
 
 
+@pytest.mark.slow
 def test_setting_up_says_each_step_and_only_once(tmp_path, monkeypatch):
     monkeypatch.delenv(VARIABLE, raising=False)
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)

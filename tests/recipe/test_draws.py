@@ -97,6 +97,7 @@ def test_whole_numbers_stay_whole_and_both_ends_are_drawn():
     assert {type(n) for n in found} == {int}
 
 
+@pytest.mark.slow
 def test_vectors_are_drawn_element_by_element_or_as_a_whole():
     found = np.array(draws("point", [{"uniform": [0, 1]}, 0, [2, 3]], 300))
     assert (found[:, 1] == 0).all()

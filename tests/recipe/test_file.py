@@ -111,6 +111,7 @@ def test_what_is_no_yaml_is_reported_at_its_line(write, text, message):
     assert "\n" not in found
 
 
+@pytest.mark.slow
 def test_aliases_cannot_explode(write):
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 10)]

@@ -154,6 +154,7 @@ def test_the_shown_recipe_holds_no_absolute_path(small_dataset):
     assert {name: shown[name] for name in others} == json.loads(json.dumps({name: part.recipe[name] for name in others}))
 
 
+@pytest.mark.slow
 def test_the_page_holds_no_absolute_path(small_dataset, tmp_path):
     proof = Proof(False, {"boxes": 1}, (f"files: {small_dataset.root}/store/plan.json: expected more",), (f"{tmp_path}/a: b",))
     write_report(small_dataset, tmp_path / "page.html", proof=proof)
@@ -296,6 +297,7 @@ def test_mistakes_are_named(small_dataset, tmp_path):
         write_report(Dataset(empty), tmp_path / "page.html", proof=Proof(True, {}, (), ()))
 
 
+@pytest.mark.slow
 def test_check_reads_no_more_frames_than_asked_for(small_dataset):
     from viewsphere import export
     from viewsphere.check import check

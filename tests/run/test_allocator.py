@@ -9,6 +9,8 @@ import sys
 
 import pytest
 
+from quick import quick
+
 pytestmark = [
     pytest.mark.timeout(60),
     pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="glibc's allocator is told"),
@@ -59,13 +61,14 @@ def answered(script, *arguments, **environment):
     return told == "True", list(map(int, numbers))
 
 
-@pytest.mark.parametrize("arrays", [FRAME, LARGE])
+@pytest.mark.parametrize("arrays", quick([FRAME, LARGE], FRAME))
 def test_freed_memory_is_kept(arrays):
     told, pages = answered(NEW_PAGES, arrays)
     assert told
     assert sum(pages) < 100
 
 
+@pytest.mark.slow
 def test_what_is_beyond_the_kept_bytes_is_given_back():
     told, (most, left) = answered(GIVEN_BACK)
     assert told

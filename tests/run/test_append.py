@@ -283,7 +283,8 @@ def bigger_file(tmp_path):
     return file
 
 
-@pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [0, 2])
 def test_any_number_of_workers_gives_the_same_bytes(workers, bigger_file, bigger, out):
     if workers:
         run = command(bigger_file, out, "--append", "--workers", str(workers))
@@ -464,6 +465,7 @@ def test_a_changed_model_file_is_refused(of_files, tmp_path):
     assert generate(of("new.obj"), out, append=True, formats=[]).rendered == 2  # the old one need not be there
 
 
+@pytest.mark.slow
 def test_a_new_model_that_cannot_be_read_is_refused_or_left_out(of_files, tmp_path):
     out, of = of_files
     (tmp_path / "bad.obj").write_text("not a model\n")
@@ -665,6 +667,7 @@ def test_another_motion_of_a_model_needs_another_name(tmp_path):
 PLAYED = {"clip": "Run", "fps": 12}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", PLAYED)
 @pytest.mark.parametrize("time", [None, {"frames": 2, "fps": 10}])
 def test_what_an_animated_model_plays_is_what_it_played(field, time, tmp_path, monkeypatch):

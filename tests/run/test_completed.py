@@ -80,6 +80,7 @@ def test_exports_of_few_channels_are_those_of_many(few, tmp_path, tmp_path_facto
     assert all(one.read_bytes() == other.read_bytes() for one, other in pairs)
 
 
+@pytest.mark.slow
 def test_a_choice_of_frames_is_computed_as_all_are(few, tmp_path):
     for choice, place in ((Choice(), "all"), (Choice(frames=((0, 2),)), "some"), (Choice(models=("car*",)), "cars")):
         export(few, [{"yolo": {"task": "obb"}}], output=tmp_path / place, choice=choice)
@@ -114,6 +115,7 @@ def test_what_an_unfinished_neighbour_would_tell_is_asked_for(few_moving, tmp_pa
     export(tmp_path / "few", "pointcloud", output=tmp_path / "out")  # depth needs no other instant
 
 
+@pytest.mark.slow
 def test_formats_that_lack_the_same_see_each_frame_once(few, tmp_path, monkeypatch):
     seen = []
     monkeypatch.setattr(sights, "rasterize", lambda *arguments, **more: seen.append(1) or rasterize(*arguments, **more))

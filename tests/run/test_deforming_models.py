@@ -198,6 +198,7 @@ def test_exports_name_the_files_and_come_back(folder):
     assert sorted(s.objects[0].track for s in back) == [""] * 2 + ["walker"] * 6
 
 
+@pytest.mark.slow
 def test_time_steps_are_chosen_by_their_keys(folder):
     generate(recipe(folder), folder / "out")
 

@@ -32,6 +32,7 @@ def test_scenes_drawn_for_each_frame_are_built_for_each():
     assert extrapolate(planned, RATES, 1).seconds == 2 * 2 + 12 * 3 + 12 * 0.5 + 12 * 0.25
 
 
+@pytest.mark.slow
 def test_each_piece_of_work_is_timed_once():
     """By a clock that counts how often it is looked at, a model, a scene, two frames and all exports take one second each."""
     recipe = small_recipe(viewpoints={"azimuth": {"start": 0, "stop": 345, "step": 15}, "distance": 1.0})

@@ -60,6 +60,7 @@ def is_proved(folder):
     return check(Dataset(folder), rays=False, sample=0).ok
 
 
+@pytest.mark.slow
 def test_a_recipe_gives_options_and_is_read_back_from_its_text(tmp_path):
     recipe = small_recipe(formats=["native", COCOS_OWN], channels=["rgb"])
     generate(recipe, tmp_path / "out")

@@ -110,7 +110,7 @@ def test_without_redrawing_epochs_are_equal():
     assert [s.pose for s in epochs[:12]] == [s.pose for s in epochs[12:]]
 
 
-@pytest.mark.parametrize("shard", [(0, 2), (1, 2)])
+@pytest.mark.parametrize("shard", [(0, 2), pytest.param((1, 2), marks=pytest.mark.slow)])
 def test_sequences_stay_together_and_in_order(shard):
     recipe = eventful_recipe(6, camera={"size": [32, 24], "fov_deg": 60}, channels=["depth"], shot_frames=4)
     share = list(vs.render(recipe, shard=shard, shuffle=True))

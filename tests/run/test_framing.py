@@ -9,6 +9,7 @@ import pytest
 
 import viewsphere as vs
 from built_once import built_once
+from quick import quick
 from small import tree_hash
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
@@ -54,6 +55,7 @@ def test_random_viewpoints_are_drawn_again_until_enough_of_the_frames_model_is_s
         assert np.array_equal(one.objects[1].world_from_object, two.objects[1].world_from_object)
 
 
+@pytest.mark.slow
 def test_company_that_is_drawn_for_each_frame_is_placed_again():
     views = {"azimuth": [0, 90, 180], "elevation": 2, "distance": 2.5}
     before, after = (list(vs.render(recipe_of(scene=CROWD, viewpoints=views, min_visibility=v))) for v in (None, 0.7))
@@ -130,7 +132,7 @@ def test_tries_share_what_is_computed_of_a_plan(monkeypatch):
     assert planned.trying({0: 1}).schedules is planned.schedules
 
 
-@pytest.mark.parametrize("name", ["min_visibility", "empty"])
+@pytest.mark.parametrize("name", quick(["min_visibility", "empty"], "empty"))
 def test_appended_frames_show_as_much_of_their_models(name, tmp_path):
     few = {"formats": [], "viewpoints": {**LOW, "count": 2}}
     vs.generate(recipe_of(**few, **{name: 0.3}), tmp_path / "out")

@@ -102,6 +102,7 @@ def test_imported_objects_say_what_is_known_and_nan_for_the_rest(tmp_path):
     assert report.ok, report.findings
 
 
+@pytest.mark.slow
 def test_rendered_frames_join_a_real_data_set(tmp_path, small_run):
     import_dataset("coco", coco(tmp_path / "real"), tmp_path / "opened")
     with pytest.raises(UserError, match="expected the channels of"):

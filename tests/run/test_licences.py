@@ -187,6 +187,7 @@ def test_plan_notes_it_and_succeeds(folder, tmp_path):
     assert "note" not in viewsphere("plan", file).stdout
 
 
+@pytest.mark.slow
 def test_a_model_that_deforms_is_credited_once_and_so_are_its_time_steps(tmp_path, monkeypatch):
     let_walk(monkeypatch, tmp_path)
     walker = {"source": str(tmp_path / "walker.fbx"), "category": "person", "frames": [1, 13], **MAKER.model_dump()}

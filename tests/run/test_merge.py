@@ -83,6 +83,7 @@ def test_models_of_one_key_and_other_content_are_two(sources, merged):
     assert len(set(digests)) == 4
 
 
+@pytest.mark.slow
 def test_a_merged_data_set_passes_every_proof(merged):
     report = check(Dataset(merged))
     assert report.ok, report.findings

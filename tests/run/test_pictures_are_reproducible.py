@@ -116,6 +116,7 @@ def test_frames_come_out_alike_in_any_order(pictures):
     assert len({sample.rgb.tobytes() for sample in first.values()}) == len(shots)
 
 
+@pytest.mark.slow
 def test_labels_know_nothing_of_what_is_done_to_pictures(pictures):
     """Light, materials, background, view, smoother and effects change the pictures; no label changes by a bit."""
     from viewsphere.run.stages import Stages

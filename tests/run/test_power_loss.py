@@ -164,6 +164,7 @@ def sources(tmp_path):
     return [tmp_path / "a", Path(shutil.copytree(tmp_path / "a", tmp_path / "b"))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", WORK)
 def test_what_is_there_is_whole_and_what_was_finished_is_there(what, sources, disk, tmp_path, monkeypatch):
     monkeypatch.setenv(moving.DURABILITY, "fsync")

@@ -46,6 +46,7 @@ def recipe_file(tmp_path):
     return file
 
 
+@pytest.mark.slow
 def test_shards_in_any_order_make_what_one_run_makes(small_run, tmp_path):
     out = tmp_path / "out"
     left = [generate(small_recipe(), out, shard=(k, 3)) for k in (2, 0, 1)]

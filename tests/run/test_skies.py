@@ -50,6 +50,7 @@ def test_a_bad_one_in_a_folder_stops_the_run_before_it_begins(name, problem, wor
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_what_is_mended_is_said(tmp_path):
     (tmp_path / "skies").mkdir()
     pixels = PIXELS.copy()

@@ -1,6 +1,7 @@
 """What a worker keeps warm."""
 
 import numpy as np
+import pytest
 
 from viewsphere import zoo
 from viewsphere.model.model_spec import ModelSpec
@@ -31,6 +32,7 @@ def test_a_model_at_its_own_scale_is_built_once(monkeypatch):
     assert len(built) == 1
 
 
+@pytest.mark.slow
 def test_models_used_last_are_kept_as_far_as_there_is_room(monkeypatch):
     built = []
     build = zoo.build

@@ -32,6 +32,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_what_starts_workers_imports_no_numba():
     words = [sys.executable, "-c", "import sys, viewsphere.run.generate; print('numba' in sys.modules)"]
     assert subprocess.run(words, capture_output=True, text=True, check=True).stdout == "False\n"
@@ -141,6 +142,7 @@ def test_a_mark_is_void_when_a_kernel_is_gone(tmp_path, monkeypatch):
     assert len(rendered) == 2
 
 
+@pytest.mark.slow
 def test_a_mark_lists_kernels_of_this_process_and_none_of_other_versions(tmp_path, monkeypatch):
     decode_rle(2, 2, encode_rle(np.ones((2, 2), bool)))
     (of_mask,) = (folder for folder in map(Path, warm._caches()) if list(folder.glob("kernels_mask.*.nbi")))

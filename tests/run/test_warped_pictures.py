@@ -166,6 +166,7 @@ def test_scene_flow_and_change_of_disparity_are_those_of_the_flow(made):
         np.testing.assert_allclose((a.disparity + a.disparity_change)[seen], k.fx * BASELINE / z, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_all_proofs_of_the_data_set_hold(made):
     report = check(made[1], sample=None)
     assert report.ok, report.findings

@@ -70,6 +70,7 @@ def test_records_of_older_versions_say_nothing(recipe, tmp_path):
     assert generate(recipe(), out).rendered == 0
 
 
+@pytest.mark.slow
 def test_check_looks_at_it(recipe, tmp_path):
     out = tmp_path / "out"
     generate(recipe(), out)
@@ -127,6 +128,7 @@ def test_what_is_said_of_looks(recipe, tmp_path):
             generate(recipe(), tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_mistakes_are_told_before_anything_is_rendered(recipe, tmp_path):
     sidecar = tmp_path / "box.stl.viewsphere.yaml"
     sidecar.write_text("symmetries: {continuous: [{axis: [0, 0, 1], offset: [20, 0, 0]}]}")
@@ -157,6 +159,7 @@ def test_what_a_recipe_asks_for(recipe, tmp_path):
     np.testing.assert_allclose(traits(sidecar=str(tmp_path / "other.yaml")).keypoints.points["middle"], 0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_command_line_ends_with_2(recipe, tmp_path):
     (tmp_path / "box.stl.viewsphere.yaml").write_text("keypoint: {}")
     (tmp_path / "recipe.yaml").write_text(

@@ -249,6 +249,7 @@ def damage(root, few):
     return spoilt
 
 
+@pytest.mark.slow
 def test_damage_is_found_and_mended(few, uploaded):
     root = uploaded
     assert check(Dataset(root), sample=2, rays=False).ok
