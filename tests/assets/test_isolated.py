@@ -107,13 +107,17 @@ def test_a_reader_says_what_is_wrong(spec, write):
     [
         pytest.param("import os; os.abort()", "reading it crashed (SIGABRT)", marks=pytest.mark.slow),
         ("import ctypes; ctypes.string_at(0)", "reading it crashed (SIGSEGV)"),
-        ("import os; os.kill(os.getpid(), 9)", "reads it ended unexpectedly: it was killed (SIGKILL), perhaps"),
+        pytest.param(
+            "import os; os.kill(os.getpid(), 9)",
+            "reads it ended unexpectedly: it was killed (SIGKILL), perhaps",
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             "import os; os.kill(os.getpid(), 15)", "try again with more memory free, or fewer --workers", marks=pytest.mark.slow
         ),
         pytest.param("import os; os._exit(3)", "reading it crashed (exit code 3)", marks=pytest.mark.slow),
         pytest.param("raise SystemExit('no\\nmore')", "the process that reads it failed (more)", marks=pytest.mark.slow),
-        ("raise TypeError('a\\nb')", "its reader failed (TypeError: a b)"),
+        pytest.param("raise TypeError('a\\nb')", "its reader failed (TypeError: a b)", marks=pytest.mark.slow),
         pytest.param("f = lambda x: f(x) + 1; f(0)", "within one another (recursion)", marks=pytest.mark.slow),
     ],
 )

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from called import called
 
+from quick import quick
 from viewsphere.engines.raster import kernels_block as rows
 from viewsphere.engines.raster import kernels_light
 from viewsphere.engines.raster.environment import Surrounding, bake_surrounding, lobe_albedo
@@ -128,11 +129,14 @@ def test_one_bounce_is_reciprocal():
 
 @pytest.mark.parametrize(
     ("rough", "metal", "coat"),
-    [
-        *((0.35, metal, coat) for metal, coat in ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0))),
-        *((0.6, metal, coat) for metal, coat in ((0.0, 1.0), (0.5, 0.0), (1.0, 1.0))),
-        *((1.0, metal, coat) for metal, coat in ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0))),
-    ],
+    quick(
+        [
+            *((0.35, metal, coat) for metal, coat in ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0))),
+            *((0.6, metal, coat) for metal, coat in ((0.0, 1.0), (0.5, 0.0), (1.0, 1.0))),
+            *((1.0, metal, coat) for metal, coat in ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0))),
+        ],
+        *((0.35, 0.5, 1.0), (0.6, 0.0, 1.0), (1.0, 1.0, 0.0)),
+    ),
 )
 def test_distant_lights_all_around_are_a_furnace(rough, metal, coat):
     """Integrated over directions as the kernel's own light, not through the maps."""

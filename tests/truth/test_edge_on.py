@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quick import quick
 from small import small_recipe
 from truth_scenes import LENSES, cube, lens, orbit_camera, placed
 from viewsphere import Dataset, generate
@@ -21,7 +22,7 @@ STANDING = placed(cube(), ground=True)
 
 @pytest.mark.parametrize("name", LENSES)
 @pytest.mark.parametrize("tilt", [0.0, 0.3, math.pi / 2])
-@pytest.mark.parametrize("azimuth", [0.0, 0.4, 2.1, 4.4])
+@pytest.mark.parametrize("azimuth", quick([0.0, 0.4, 2.1, 4.4], 0.4))
 @pytest.mark.parametrize("roundings", [-3, 0, 3])
 def test_no_pixel_sees_the_ground_from_its_own_plane(name, tilt, azimuth, roundings):
     z = STANDING.ground_z + roundings * np.spacing(1.0)
