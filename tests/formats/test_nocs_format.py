@@ -113,6 +113,7 @@ def test_poses_take_coordinates_to_what_depth_shows(world):
             close("nocs", "own alignment: points", points, (rays * depth[y, x]).T, "m", atol=step)
 
 
+@pytest.mark.slow
 def test_meshes_fill_their_extents(world):
     dataset, folder = world
     for info in dataset.models:
