@@ -122,6 +122,18 @@ def test_a_closed_box_that_glows_faintly_beside_a_sunlit_wall():
     np.testing.assert_allclose(light, 0.05, rtol=0.02)
 
 
+def test_further_bounces_are_foretold_where_two_walls_take_turns(monkeypatch):
+    """A sunlit wall and a shaded one: of each patch, light is what it is when all bounces are followed."""
+    walls = (box((-1, -1, 0), (1, 1, 1)), matt(0.6)), (box((1.5, -1, 0), (2.5, 1, 2)), matt(0.9))
+    stages = [stage_of(painted_mesh(*walls), Scene(sun=Sun(azimuth_deg=20, elevation_deg=40), sky=EVEN)) for _ in range(2)]
+    foretold = stages[0].baked(0).bounces.sent.light
+    baking._bake.cache_clear()
+    monkeypatch.setattr(baking, "UNCHANGED", -1.0)
+    followed = stages[1].baked(0).bounces.sent.light
+    assert len(followed) > 100
+    np.testing.assert_allclose(foretold, followed, rtol=0.02)
+
+
 @pytest.mark.slow
 def test_a_closed_box_of_which_one_wall_glows(monkeypatch):
     """What is sent out is all absorbed: the mean irradiance is the power over area times absorption. A wall opposite has what

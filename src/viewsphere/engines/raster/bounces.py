@@ -62,7 +62,7 @@ MAP, MAP_RAYS, BEYOND = 96, 128, 0.9
 SHADOWS = 2e-3
 """Cells off a surface at which shadows begin."""
 
-UNCHANGED, ROUNDS = 0.02, 48
+UNCHANGED, ROUNDS = 0.002, 48
 """The share of a patch's light, in the mean of all, below which what further bounces add is not followed but foretold, and how
 many there are at most.
 """
@@ -70,8 +70,8 @@ many there are at most.
 TINY = 1e-12
 """Light of patches that is none."""
 
-MOST_SENT_ON = 0.9
-"""Of light, the share that the next bounce sends on at most, as far as it is foretold."""
+MOST_SENT_ON = 0.81
+"""Of light, the share that two bounces send on at most, as far as it is foretold."""
 
 TERMS = np.array([1 / 4, *[1 / 2] * 3, *[15 / 16] * 2, 5 / 64, 15 / 16, 15 / 64], np.float32) / np.float32(math.pi)
 """Factors of the terms of irradiance / pi: the constants of spherical harmonics, squared, times the share of each degree that
@@ -181,7 +181,7 @@ def _bake(lighting: _Lighting) -> Bounces:
     lanterns = lanterns_of(hall.which, hall.surfaces, patches, lit.emitted, TURNS)
     shining, near = _shining(seen, lanterns, lit.emitted, weights, off)
     own = lit.emitted * (lanterns.froms == 0)[:, None] + lit.reflectance * lit.arrived / np.float32(math.pi)
-    places, normals, before, sent = patches.places, patches.normals, np.zeros_like(own), own
+    places, normals, sent, added = patches.places, patches.normals, own, (np.zeros_like(own), np.zeros_like(own), own)
     glow, inside = np.empty_like(own), np.empty(len(own), np.float32)
     gathering = _gathering(seen, surrounding, lanterns, lit.emitted, off)
     if gathering is not None:
@@ -203,12 +203,11 @@ def _bake(lighting: _Lighting) -> Bounces:
         kernels.look_up(bounces, places, normals, patches.triangles, glow, inside)
         if gathering is not None:
             gathering.look_around(sent, glow, inside)
-        earlier, before = before, sent
-        sent = own + lit.reflectance * (glow + (1 - inside[:, None]) * elsewhere)
-        further = _further(sent - before, before - earlier)
-        if (further / np.maximum(sent, TINY)).mean(dtype=np.float64) <= UNCHANGED:
-            sent = sent + further
+        before, sent = sent, own + lit.reflectance * (glow + (1 - inside[:, None]) * elsewhere)
+        added = (*added[1:], sent - before)
+        if (_further(*added) / np.maximum(sent, TINY)).mean(dtype=np.float64) <= UNCHANGED:
             break
+    sent = sent + _further(*added)
     receive()
     if gathering is not None:
         gathering.finish(sent)
@@ -227,12 +226,12 @@ def _bake(lighting: _Lighting) -> Bounces:
     return bounces._replace(sent=PatchLight(*known, bounces.sent.frame, bounces.sent.materials))
 
 
-def _further(change: Float32, last: Float32) -> Float32:
-    """What all further bounces add to patches, (M, 3), of which the last one added `change` and the one before it `last`: each
-    adds the same share of what the one before it did.
+def _further(first: Float32, second: Float32, third: Float32) -> Float32:
+    """What all further bounces add to patches, (M, 3), to which the last three added so much: any two of them add the same
+    share of what the two before did. Of single ones that is not so: a sunlit wall and a shaded one that faces it take turns.
     """
-    share = np.divide(change, last, out=np.ones_like(change), where=last > 0).clip(0, MOST_SENT_ON)
-    return (change * share / (1 - share)).astype(np.float32)
+    share = np.divide(third, first, out=np.ones_like(third), where=first > 0).clip(0, MOST_SENT_ON)
+    return ((second + third) * share / (1 - share)).astype(np.float32)
 
 
 def _settle(seen: _Seen, light: Float32, views: Float32) -> None:

@@ -25,7 +25,9 @@ LEAST, NARROW = 0.05, 0.05
 """Square metres that a chart has at least, and metres that it is wide: twice its area by the length of its border."""
 
 ROOM = 1 << 25
-"""Rays of all nodes at most: each takes twelve bytes."""
+"""Rays of all nodes at most, each of which takes twelve bytes. A direction counts as four: there are many where charts face
+many ways.
+"""
 
 TURNS = 4
 """The rays of a node are turned in the square of so many ways: any four by four nodes have all."""
@@ -174,10 +176,10 @@ def _settled(
         at = slice(done, done + len(piece.triangles))
         flat[at], which[at], done = corners[piece.triangles] @ piece.axes[:2].T * cells - low, k, at.stop
     total = int(counts.sum())
-    rays = max(1, min(rays, ROOM // total))
     places, distances = np.zeros((total, 2)), np.full(total, np.inf)
     kernels.settle(flat, which, charts, INSET, places, distances)
     ways, orientation = np.unique(np.rint(charts[:, kernels.NORMAL : kernels.NORMAL + 3] * PLANES), axis=0, return_inverse=True)
+    rays = max(1, min(rays, ROOM // max(total, 4 * TURNS * TURNS * len(ways))))
     axes = np.empty((len(ways), 3, 3))
     own_axes = np.array([piece.axes for piece in found])
     axes[orientation] = own_axes

@@ -1,4 +1,4 @@
-"""Rigid bodies that fall and come to rest, by MuJoCo (Todorov, Erez, Tassa 2012; version 3.2 or newer).
+"""Rigid bodies that fall and come to rest, by MuJoCo (Todorov, Erez, Tassa 2012; version 3.3 or newer).
 
 The settings are measured ones: with MuJoCo's own a pile of models creeps on for ever. They are lengths and seconds, so that
 every world is simulated as if its typical body were `TYPICAL` metres long, and scaled back: free fall only changes its clock.

@@ -239,13 +239,13 @@ class World:
 
     @property
     def deepest(self) -> float:
-        """Metres that bodies overlap one another, boards or the floor, at most."""
+        """Metres that bodies that are awake overlap one another, boards or the floor, at most."""
         distances = self._data.contact.dist[: self._data.ncon]
         return max(0.0, -float(distances.min())) / self._scale if len(distances) else 0.0
 
     @property
     def touching(self) -> frozenset[tuple[int, int]]:
-        """Pairs of numbers of bodies that touch, the lower one first; -1 is what stands still."""
+        """Pairs of numbers of bodies that touch, the lower one first, one of them awake; -1 is what stands still."""
         owner = self._model.geom_bodyid - 1
         pairs = self._data.contact.geom[: self._data.ncon]
         owner[owner >= self._bodies] = -1  # what is fixed
