@@ -119,7 +119,7 @@ def look(
     normals: Float32,
     unit: float,
     is_inside_out: bool,
-    is_fine: bool = False,
+    is_fine: bool,
 ) -> Look | None:
     """What nodes and sites of triangles (T, 3) see, None if none of them is wide and flat. vertices: see `Surfaces`."""
     more = FINER if is_fine else 1
