@@ -89,11 +89,11 @@ class World:
 
     def begin(self, poses: Sequence[Matrix4]) -> None:
         """Let the bodies go from these poses, as in a new world; fences that were taken away stay away."""
-        self._fall_asleep(False)  # MuJoCo does not place what stands still in data that are made while bodies may sleep
+        self._fall_asleep(False)
         self._data, self._steps = self._mujoco.MjData(self._model), 0
         for number, pose in enumerate(poses):
             self.put(number, pose)
-        self._mujoco.mj_forward(self._model, self._data)
+        self._mujoco.mj_forward(self._model, self._data)  # places what stands still, which a step does not once bodies may sleep
 
     def _fall_asleep(self, may: bool) -> None:
         """Let bodies that hardly move sleep, or wake all."""
