@@ -12,7 +12,7 @@ from viewsphere.engines.raster import bounces as baking
 from viewsphere.engines.raster import gathering, lightmaps, volumes
 from viewsphere.engines.raster import kernels_lightmap as kernels
 from viewsphere.engines.raster.kernels_probes import look_up
-from viewsphere.engines.raster.lightmaps import CELL, MOST, charts_of
+from viewsphere.engines.raster.lightmaps import CELL, MOST, TURNS, charts_of
 from viewsphere.engines.raster.tracing import cast, tree_of
 from viewsphere.model.scene import Scene, Sun
 
@@ -92,6 +92,10 @@ def test_nodes_together_have_no_more_rays_than_are_allowed(monkeypatch):
     monkeypatch.setattr(lightmaps, "ROOM", 5 * len(many.origins))
     assert charts_of(sheet, 1.0, 16).directions.shape[1] == 5
     assert many.directions.shape[1] == 16
+    # Of few nodes, the directions in which they look are most.
+    monkeypatch.setattr(lightmaps, "ROOM", 3 * 4 * TURNS * TURNS)
+    assert len((few := charts_of(0.3 * sheet, 1.0, 16)).origins) < 4 * TURNS * TURNS
+    assert few.directions.shape[1] == 3
 
 
 @pytest.mark.slow

@@ -93,7 +93,7 @@ class World:
         self._data, self._steps = self._mujoco.MjData(self._model), 0
         for number, pose in enumerate(poses):
             self.put(number, pose)
-        self._mujoco.mj_forward(self._model, self._data)  # places what stands still, which a step does not once bodies may sleep
+        self._mujoco.mj_forward(self._model, self._data)  # places what stands still: no step does, once bodies sleep
 
     def _fall_asleep(self, may: bool) -> None:
         """Let bodies that hardly move sleep, or wake all."""
