@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
+from functools import cached_property
 
 from viewsphere.errors import StoreError, UserError, ViewsphereError
 from viewsphere.model.thing import TimeStep
-from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.executors import Job, Listed, hired
 from viewsphere.run.opening import check_whether_same
 from viewsphere.run.progress import Listener, Progress
+from viewsphere.run.replanning import AnotherPlan, Replanned
 from viewsphere.run.stages import StoredBoxes
 from viewsphere.run.tasks import Damaged, ModelTask
 from viewsphere.run.warm import compile_kernels
-from viewsphere.sampling.extension import Portion, resumed
-from viewsphere.sampling.plan import plan
+from viewsphere.sampling.extension import Portion
 from viewsphere.store import PlanRecord, Row, Store
 
 Errors = dict[str, ViewsphereError]
 """What could not be made again, by its key, and why; it stays as it was."""
-
-MOST_FOLDERS = 8
-"""Folders above a model's file in which its recipe is looked for."""
-
-MOST_SHOTS = 100
-"""Shots of a part that are asked where its models' files lay."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +32,6 @@ class Mender:
     record: PlanRecord
     workers: int
     tell: Listener
-    _portions: dict[int, Portion] = field(default_factory=dict[int, Portion])
 
     def models(self, keys: Iterable[str]) -> Errors:
         """Make the models of these keys again; gives what could not be done."""
@@ -110,45 +102,22 @@ class Mender:
 
     def _portion(self, number: int) -> Portion:
         """A part, with its recipe's plan; raises UserError where that is not what it was."""
-        if number not in self._portions:
-            self._portions[number] = self._planned(number)
-        return self._portions[number]
-
-    def _planned(self, number: int) -> Portion:
-        part = self.record.parts[number]
-        if part.merged or not part.is_sampled:
+        check_whether_same(self.store, self.record.parts[number])
+        try:
+            return self._replanned.portion(number)
+        except UserError as error:
+            part = self.record.parts[number]
+            if part.merged or not part.is_sampled:
+                raise
+            problem = "another recipe" if isinstance(error, AnotherPlan) else error
             raise StoreError(
-                f"{self.store.root}: part {number + 1}: expected one that was rendered here, found another data set's: repair "
-                "that one, then merge or import it anew"
-            )
-        check_whether_same(self.store, part)
-        problem: object = None
-        for folder in dict.fromkeys(self._folders(number)):
-            try:
-                planned = plan(Recipe.model_validate(part.recipe, context={"folder": folder}), part.shot_frames)
-            except UserError as error:
-                problem = problem or error
-                continue
-            if planned.digest == part.digest:
-                return resumed(planned, self.record, number)
-        raise StoreError(
-            f"{self.store.root}: recipe {part.name!r}: expected its files where they were, "
-            f"found {problem or 'another recipe'}: put them back, or "
-            "delete the damaged folders and render the recipe again"
-        )
+                f"{self.store.root}: recipe {part.name!r}: expected its files where they were, found {problem}: put them back, "
+                "or delete the damaged folders and render the recipe again"
+            ) from None
 
-    def _folders(self, number: int) -> Iterator[Path]:
-        """Where the recipe's file may have been: here, or above a model's."""
-        yield Path.cwd()
-        for row, _ in zip(self.record.rows_of(number), range(MOST_SHOTS), strict=False):
-            try:
-                shot = self.store.labelled(row.key)
-            except StoreError:
-                continue
-            if shot is not None:
-                for thing in shot.things:
-                    yield from Path(thing.model.source).parents[:MOST_FOLDERS]
-                return
+    @cached_property
+    def _replanned(self) -> Replanned:
+        return Replanned(self.store, self.record)
 
 
 def _sorted(keys: Iterable[str], part_of: Callable[[str], int]) -> tuple[Errors, dict[int, list[str]]]:

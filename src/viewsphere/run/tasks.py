@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Literal
 
 from viewsphere.model.credit import Credit
-from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing, TimeStep
-from viewsphere.run.framing import Framing
-from viewsphere.run.models import Models, mesh_digest
+from viewsphere.model.thing import TimeStep
+from viewsphere.run.composing import Composer
+from viewsphere.run.models import Models
 from viewsphere.run.stages import Stages, StoredBoxes
 from viewsphere.run.warm import compile_kernels
 from viewsphere.sampling.extension import Portion
@@ -49,13 +48,6 @@ class KernelTask:
     shot: Shot
 
 
-class SceneryRecord(Frozen):
-    """What is background in a shot: things of id 0, and the digest of each model's mesh by its key at the time step shown."""
-
-    things: tuple[Thing, ...]
-    digests: dict[str, str]
-
-
 class Worker:
     """Does tasks for a part of a data set."""
 
@@ -64,9 +56,8 @@ class Worker:
         self.stages = Stages()
         self.models = Models(self.store, self.stages, portion.record)
         self._portion = portion.remembering(self.store)
-        self._framing = Framing(portion.plan.recipe, self.stages)
         self._boxes = StoredBoxes(self.store)
-        self._digests: dict[str, str] = {}
+        self._composer = Composer(self._portion, self._boxes, self.stages)
 
     def do(self, task: ModelTask | KernelTask | Row | Damaged, tell: Callable[[int], None]) -> int:
         """Make models, kernels, or the shot of a row; gives the number of frames that were made. `tell` is given their number
@@ -94,22 +85,9 @@ class Worker:
         """Make the shot of a row and render it into the store; gives the number of its frames, and `tell` so far after each.
         Errors of one that takes the place of a damaged one (`again`) as for `Store.aside`.
         """
-        with self._portion.plan.recipe.located():
-            shot = self._framing.shot(lambda tries: self._portion.shot(row, self._boxes, tries))
+        shot = self._composer.shot(row)
         samples = _counted(self.stages.render(shot), tell)
-        return self.store.write_shot(shot.key, samples, self._scenery(shot), shot.files, shot, again)
-
-    def _scenery(self, shot: Shot) -> str:
-        """What is background in a shot, and digests of its meshes, as `SceneryRecord` reads it; empty if nothing is."""
-        things = tuple(p for p in shot.things if p.id == 0)
-        shown = {
-            thing.model.key_at(step and step.frame): (thing.model, step) for thing in things for step in thing.motion.steps
-        }
-        for key, (spec, step) in shown.items():
-            if key not in self._digests:
-                self._digests[key] = mesh_digest(self.stages.model(spec, step))
-        digests = {key: self._digests[key] for key in shown}
-        return SceneryRecord(things=things, digests=digests).model_dump_json() if things else ""
+        return self.store.write_shot(shot.key, samples, self._composer.scenery(shot), shot.files, shot, again)
 
 
 def _counted(samples: Iterable[Sample], tell: Callable[[int], None]) -> Iterator[Sample]:

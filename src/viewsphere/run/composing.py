@@ -1,0 +1,49 @@
+"""Shots of a part, composed of its recipe: for a run that renders them, and for a proof that compares them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.run.framing import Framing
+from viewsphere.run.models import mesh_digest
+from viewsphere.run.stages import Stages, StoredBoxes
+from viewsphere.sampling.extension import Portion
+from viewsphere.store import Row
+
+
+class SceneryRecord(Frozen):
+    """What is background in a shot: things of id 0, and the digest of each model's mesh by its key at the time step shown."""
+
+    things: tuple[Thing, ...]
+    digests: dict[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Composer:
+    """Composes shots of a part; `boxes` gives the sizes of the data set's models."""
+
+    portion: Portion
+    boxes: StoredBoxes
+    stages: Stages
+    _digests: dict[str, str] = field(default_factory=dict[str, str])
+
+    def shot(self, row: Row) -> Shot:
+        """The shot of a row, with everything that is drawn again until it fits. Raises UserError as `Portion.shot`."""
+        framing = Framing(self.portion.plan.recipe, self.stages)
+        with self.portion.plan.recipe.located():
+            return framing.shot(lambda tries: self.portion.shot(row, self.boxes, tries))
+
+    def scenery(self, shot: Shot) -> str:
+        """The background of a shot, and digests of its meshes, as `SceneryRecord` reads it; empty without any."""
+        things = tuple(thing for thing in shot.things if thing.id == 0)
+        shown = {
+            thing.model.key_at(step and step.frame): (thing.model, step) for thing in things for step in thing.motion.steps
+        }
+        for key, (spec, step) in shown.items():
+            if key not in self._digests:
+                self._digests[key] = mesh_digest(self.stages.model(spec, step))
+        digests = {key: self._digests[key] for key in shown}
+        return SceneryRecord(things=things, digests=digests).model_dump_json() if things else ""
