@@ -107,8 +107,8 @@ def test_dae_axes_unit_transform_and_texture(write, up, axes):
 
 
 def test_a_texture_outside_the_folder_needs_consent(write):
-    write("textures/blue.png", png("blue"))
-    path = write("meshes/a.dae", DAE.format(up="Z_UP", image="../textures/blue.png"))
+    write("elsewhere/blue.png", png("blue"))
+    path = write("meshes/a.dae", DAE.format(up="Z_UP", image="../elsewhere/blue.png"))
     mesh, _ = load_model(path)
     assert mesh.materials[0].base_color_texture is None
     assert "outside the model's folder, not read; set confined: false to allow" in mesh.warnings[0]

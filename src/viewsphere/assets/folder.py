@@ -6,17 +6,18 @@ import base64
 import binascii
 import io
 import os
-import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePosixPath
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.finder import Finder, NotFoundError
 from viewsphere.assets.mesh import Image
 from viewsphere.errors import ModelError
 from viewsphere.limits import limits
@@ -46,15 +47,21 @@ class ModelFolder:
     shown: tuple[str, ...] = ()
     clip: str | None = None
     fps: float | None = None
-    files: list[Path] = field(default_factory=list[Path])
+    files: dict[Path, None] = field(default_factory=dict[Path, None])
     warnings: list[str] = field(default_factory=list[str])
     images: list[Image] = field(default_factory=list[Image])
     _said: set[str] = field(default_factory=set[str])
+    _named: set[str] = field(default_factory=set[str])
     _indices: dict[str, int | None] = field(default_factory=dict[str, "int | None"])
 
     def copy(self) -> ModelFolder:
         """A copy with the files and warnings so far, but without images; both can go on independently."""
-        return replace(self, files=[*self.files], warnings=[*self.warnings], images=[], _said={*self._said}, _indices={})
+        return replace(self, files={**self.files}, warnings=[*self.warnings], images=[], _said={*self._said}, _indices={})
+
+    @cached_property
+    def finder(self) -> Finder:
+        """The search for files that the model names."""
+        return Finder(self.model, self.confined, self.files)
 
     def warn(self, message: str) -> None:
         """Add a warning that begins with the model's file name, unless the same one was added before."""
@@ -78,7 +85,7 @@ class ModelFolder:
 
     def read_model(self) -> bytes:
         """The model file's own bytes; ModelError when it is missing, empty, unreadable or too large."""
-        self.files.append(self.model)
+        self.files[self.model] = None
         try:
             size = self.model.stat().st_size
             if not self.model.is_file():
@@ -93,15 +100,15 @@ class ModelFolder:
             raise self.error("the file is empty; export the model again")
         return data
 
-    def read(self, reference: str, what: str = "file") -> bytes:
-        """Bytes of a file that the model names, or of a data: URI.
+    def read(self, reference: str, what: str = "file", base: Path | None = None) -> bytes:
+        """Bytes of a file that the model names, or of a data: URI; `base` is the folder of the file that holds the reference.
 
-        Raises UnreadableError when the file is missing, or lies outside the model's folder while the folder is confined. If a
-        path leads nowhere (or outside) but a file of the same name lies beside the model, that file is read, with a warning.
+        Raises UnreadableError when there is no such file (`finder.Finder` says where it is looked for), or only one outside
+        the asset's root while the folder is confined. A file elsewhere than the reference's own path is read with a warning.
         """
         if reference.startswith("data:"):
             return _data_uri(reference)
-        path = self._find(reference, what)
+        path = self.path_of(reference, what, base)
         if (size := path.stat().st_size) > (most := limits.MAX_FILE_BYTES):
             raise UnreadableError(
                 f"{what} {_short(reference)}: expected at most {most:,} bytes (limit MAX_FILE_BYTES), found {size:,}"
@@ -111,53 +118,29 @@ class ModelFolder:
         except OSError as error:
             raise UnreadableError(f"{what} {reference!r} cannot be read: {error.strerror or error}") from None
 
-    def _find(self, reference: str, what: str) -> Path:
-        if re.match(r"(?i)[a-z][a-z0-9+.-]+://", reference) or "\0" in reference:
-            raise UnreadableError(f"{what} {_short(reference)} is not a path below the model's folder; it is not fetched")
-        root = _resolved(self.model.parent)
-        name = reference.replace("\\", "/").strip()
-        target = _resolved(root / name)
-        inside = target.is_relative_to(root)
-        drive = re.match(r"[A-Za-z]:", name) is not None
-        if not drive and (inside or not self.confined):
-            found = self._existing(target)
-            if found is not None:
-                return found
-        beside = self._existing(root / PurePosixPath(name).name) if PurePosixPath(name).name else None
-        if beside is not None and _resolved(beside).is_relative_to(root):
-            self.warn(f"{what} {reference!r} was read from beside the model instead")
-            return beside
-        if inside or drive or not self.confined:
-            raise UnreadableError(f"{what} {_short(reference)} does not exist")
-        raise UnreadableError(
-            f"{what} {_short(reference)} is outside the model's folder, not read; set confined: false to allow"
-        )
-
-    def _existing(self, path: Path) -> Path | None:
-        """The file, or else one beside it whose name differs only in case; None if neither exists. Both are recorded."""
+    def path_of(self, reference: str, what: str = "file", base: Path | None = None) -> Path:
+        """The path of a file that the model names; raises UnreadableError as `read` does."""
+        self._count(reference)
         try:
-            self.remember(path)
-            if path.is_file():
-                return path
-            if not path.parent.is_dir():
-                return None
-            wanted = path.name.casefold()
-            for other in sorted(path.parent.iterdir()):
-                if other.name.casefold() == wanted and other.is_file():
-                    self.remember(other)
-                    return other
-        except (OSError, ValueError):
-            return None
-        return None
+            found = self.finder.find(reference, base)
+        except NotFoundError as error:
+            raise UnreadableError(f"{what} {_short(reference)} {error}") from None
+        if found.elsewhere:
+            place = os.path.relpath(found.path, os.path.realpath(self.model.parent)).replace(os.sep, "/")
+            self.warn(f"{what} {_short(reference)} does not exist there; {place!r} was read instead")
+        return found.path
 
     def remember(self, path: Path) -> None:
         """Count a file among those that the model depends on."""
-        if path not in self.files:
-            self.check("MAX_FILES", len(self.files), "files that it names")
-            self.files.append(path)
+        self._count(str(path))
+        self.files[path] = None
 
-    def image(self, key: str, name: str, data: bytes | None = None) -> int | None:
-        """Index in `images` of the texture `key` (a path or data: URI, or any name when `data` holds its
+    def _count(self, name: str) -> None:
+        self._named.add(name)
+        self.check("MAX_FILES", len(self._named), "files that it names")
+
+    def image(self, key: str, name: str, data: bytes | None = None, base: Path | None = None) -> int | None:
+        """Index in `images` of the texture `key` (a path or data: URI, found as by `read`, or any name when `data` holds its
         bytes).
 
         None, with a warning, when the picture cannot be used: the material then has its factors without the texture.
@@ -165,7 +148,7 @@ class ModelFolder:
         if key not in self._indices:
             index = None
             try:
-                data = self.read(key, "texture") if data is None else data
+                data = self.read(key, "texture", base) if data is None else data
                 pixels = decode_image(data, f"texture {_short(name)}")
                 index = self.add_image(Image(name, self._bounded(pixels, name)))
             except UnreadableError as error:
@@ -251,11 +234,6 @@ def reduced(pixels: NDArray[np.uint8], sharpest: int) -> NDArray[np.uint8]:
 
     factor = -(-max(pixels.shape[:2]) // sharpest)
     return pixels if factor == 1 else np.array(Pillow.fromarray(pixels).reduce(factor))
-
-
-def _resolved(path: Path) -> Path:
-    """The path without links; unlike `Path.resolve` it has an answer for links that lead in circles."""
-    return Path(os.path.realpath(path))
 
 
 def _data_uri(uri: str) -> bytes:

@@ -98,7 +98,7 @@ class Blenders:
         """The timeline of a glTF file, by Blender where only Blender can read it, and which files say it."""
         folder = ModelFolder(file, confined)
         try:
-            return timeline(Document.read(folder), clip, fps), folder.files
+            return timeline(Document.read(folder), clip, fps), tuple(folder.files)
         except ForBlenderError:
             return self.told(file, confined, "timeline", {"clip": clip, "fps": fps}), [file]
 

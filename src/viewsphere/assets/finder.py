@@ -1,0 +1,188 @@
+"""The file that a model means by a name: the one search for textures, buffers and material libraries of every reader."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path, PurePosixPath
+from urllib.parse import unquote
+
+LAYOUTS = ("materials/textures", "materials", "images", "texture", "textures")
+"""Folders beside the model's own in which public data sets keep pictures: Google Scanned Objects and Gazebo models
+(`meshes/`), ShapeNetCore v2 (`models/`), PartNet-Mobility (`textured_objs/`), and exporters of COLLADA.
+"""
+
+BELOW = ("textures", "texture", "images", "maps", "tex", "materials/textures")
+"""Folders below the model's own that are searched for a file whose own path leads nowhere."""
+
+PICTURES = {".bmp", ".dds", ".gif", ".jpeg", ".jpg", ".png", ".ppm", ".tga", ".tif", ".tiff", ".webp"}
+
+NEAREST_AMONG = 2_000
+"""Most files that are compared with the name of a missing one: enough for any asset, and quick in a folder of a million."""
+
+URL = re.compile(r"(?i)([a-z][a-z0-9+.-]+)://")
+DRIVE = re.compile(r"/?[A-Za-z][:|](?=/|$)")
+
+
+class NotFoundError(Exception):
+    """No file for a reference; the message says why, and names the nearest file that exists."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A file, and whether the reference's own path led elsewhere."""
+
+    path: Path
+    elsewhere: bool = False
+
+
+@dataclass(eq=False)
+class Finder:
+    """The search for files that a model names.
+
+    The asset's root is the model's folder; the `LAYOUTS` beside that folder belong to it too. While `confined`, no file
+    outside the root is given or listed, whatever links and `..` a path holds. `looked_for` are all paths that were tried: a
+    model's meaning changes when one of them appears.
+    """
+
+    model: Path
+    confined: bool = True
+    looked_for: dict[Path, None] = field(default_factory=dict[Path, None])
+    _listings: dict[Path, dict[str, str]] = field(default_factory=dict[Path, dict[str, str]])
+
+    def find(self, reference: str, base: Path | None = None) -> Found:
+        """The file of a reference, which may be percent-encoded, in another case, or written with backslashes.
+
+        Its path is followed from the model's folder, then from `base`, the folder of the file that holds the reference. A
+        path that leads nowhere counts by its last name: beside the model, beside `base`, then in the known folders. Raises
+        NotFoundError.
+        """
+        names = self._names(reference)
+        folders = [self.model.parent] if base in (None, self.model.parent) else [self.model.parent, base]
+        for name, folder in ((name, folder) for name in names for folder in folders):
+            if not DRIVE.match(name) and (path := self._followed(folder, name)) is not None:
+                return Found(path)
+        known = [parent / name for parent, names in self._known(folders) for name in names]
+        for last, folder in ((PurePosixPath(name).name, folder) for name in names for folder in [*folders, *known]):
+            if last and (path := self._followed(folder, last)) is not None:
+                return Found(path, elsewhere=last not in names)
+        raise NotFoundError(self._why(names, [*folders, *known]))
+
+    def holds(self, reference: str, base: Path | None = None) -> bool:
+        """Whether there is a file for a reference."""
+        try:
+            self.find(reference, base)
+        except NotFoundError:
+            return False
+        return True
+
+    def _names(self, reference: str) -> list[str]:
+        """The reference as it is and percent-decoded, with slashes; a file: URL is a path."""
+        url = URL.match(reference)
+        if "\0" in reference or (url and url[1].lower() != "file"):
+            raise NotFoundError("is not a path below the model's folder; it is not fetched")
+        name = reference.strip().strip('"').replace("\\", "/")
+        name = name[len("file://") :] if url else name
+        return [name for name in dict.fromkeys((name, unquote(name))) if "\0" not in name]
+
+    def _known(self, folders: Iterable[Path]) -> Iterator[tuple[Path, tuple[str, ...]]]:
+        for folder in folders:
+            yield folder, BELOW
+        yield _real(self.model.parent).parent, LAYOUTS
+
+    def is_inside(self, path: Path) -> bool:
+        """Whether a path, its links followed, lies in the asset's root."""
+        real, folder = _real(path), _real(self.model.parent)
+        if real.is_relative_to(folder):
+            return True
+        beside = real.relative_to(folder.parent) if real.is_relative_to(folder.parent) else Path()
+        return any(PurePosixPath(*map(_key, beside.parts)).is_relative_to(layout) for layout in LAYOUTS)
+
+    def _followed(self, folder: Path, name: str) -> Path | None:
+        """The file at a relative path, each of whose names may differ in case; None if it is not there, or outside."""
+        target = Path(os.path.normpath(_real(folder) / name))
+        try:
+            if not self._may_give(target):
+                return None
+            self.looked_for[target] = None
+            path = target if target.is_file() else self._in_any_case(target)
+            if path is None or not self._may_give(path) or not path.is_file():
+                return None
+        except (OSError, ValueError):
+            return None
+        self.looked_for[path] = None
+        return path
+
+    def _may_give(self, path: Path) -> bool:
+        return not self.confined or self.is_inside(path)
+
+    def _in_any_case(self, target: Path) -> Path | None:
+        """The path with each name as its folder spells it."""
+        path = Path(target.anchor)
+        for name in target.parts[1:]:
+            exact = path / name
+            if not os.path.lexists(exact):
+                spelled = self._listing(path).get(_key(name))
+                if spelled is None:
+                    return None
+                exact = path / spelled
+            path = exact
+        return path
+
+    def _listing(self, folder: Path) -> dict[str, str]:
+        """A folder's names by their keys, the first in order of each."""
+        if folder not in self._listings:
+            names = sorted((file.name for file in folder.iterdir()), reverse=True) if folder.is_dir() else []
+            self._listings[folder] = {_key(name): name for name in names}
+        return self._listings[folder]
+
+    def _why(self, names: list[str], folders: Iterable[Path]) -> str:
+        """Why there is no file: none exists, or the path leads outside."""
+        outside = self.confined and not (DRIVE.match(names[-1]) or self.is_inside(self.model.parent / names[-1]))
+        reason = "is outside the model's folder, not read; set confined: false to allow" if outside else "does not exist"
+        nearest = self._nearest(PurePosixPath(names[-1]).name, folders)
+        return reason if nearest is None else f"{reason} (nearest file: {nearest!r})"
+
+    def _nearest(self, last: str, folders: Iterable[Path]) -> str | None:
+        """The file below these folders whose name resembles this one most, from the model's folder."""
+        wanted = PurePosixPath(last.lower())
+        kinds = PICTURES if wanted.suffix in PICTURES else {wanted.suffix}
+        files = {file: file.name.lower() for file in islice(self._files(folders), NEAREST_AMONG)}
+        files = {file: name for file, name in files.items() if PurePosixPath(name).suffix in kinds}
+        same = [file for file, name in files.items() if PurePosixPath(name).stem == wanted.stem]
+        # 0.6, difflib's own threshold, is where names of one series (wood_1, wood_2) still count and others do not.
+        close = difflib.get_close_matches(wanted.name, list(files.values()), 1, 0.6)
+        best = [*same, *(file for file, name in files.items() if [name] == close)]
+        return os.path.relpath(best[0], _real(self.model.parent)).replace(os.sep, "/") if best else None
+
+    def _files(self, folders: Iterable[Path]) -> Iterator[Path]:
+        """Files that may be given, in these folders and the folders in them, each once."""
+        seen: set[Path] = set()
+        for folder in map(_real, folders):
+            places = [folder, *(folder / name for name in sorted(self._names_in(folder)))]
+            for place in places:
+                if place in seen or not place.is_dir() or not self._may_give(place):
+                    continue
+                seen.add(place)
+                yield from (place / name for name in sorted(self._names_in(place)) if (place / name).is_file())
+
+    def _names_in(self, folder: Path) -> list[str]:
+        try:
+            return list(self._listing(folder).values()) if self._may_give(folder) else []
+        except OSError:
+            return []
+
+
+def _key(name: str) -> str:
+    """A name for comparison: archives of macOS decompose letters with accents, other systems compose them."""
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+def _real(path: Path) -> Path:
+    """The path without links; unlike `Path.resolve` it has an answer for links that lead in circles."""
+    return Path(os.path.realpath(path))
