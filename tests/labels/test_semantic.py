@@ -15,7 +15,7 @@ from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera
 from viewsphere.codecs.palette import palette
 from viewsphere.geometry.rotation import rigid
 from viewsphere.labels import channels, observe
-from viewsphere.labels.semantic import LABEL, renumbered
+from viewsphere.labels.semantic import LABEL
 from viewsphere.model.classes import (
     FIRST_THING,
     GROUND,
@@ -144,7 +144,7 @@ def test_its_proof_notices_other_classes(name):
 
 def test_other_ids_of_categories_change_things_alone():
     array = np.array([[1, 13, 32, 33, 40]], np.int32)
-    assert renumbered(array, {1: 2, 2: 1, 9: 9}).tolist() == [[1, 13, 33, 32, 40]]
+    assert LABEL.ids["category"](array, {1: 2, 2: 1, 9: 9}).tolist() == [[1, 13, 33, 32, 40]]
 
 
 def test_things_have_the_colours_of_their_categories():

@@ -19,7 +19,7 @@ from viewsphere.errors import RecipeError, StoreError
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels import Sight, channels
-from viewsphere.labels.voxels import LABEL, renumbered
+from viewsphere.labels.voxels import LABEL
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
@@ -241,7 +241,7 @@ def test_runs_are_kept_and_have_other_ids_elsewhere():
     sample, _ = voxelled(0)
     back = decode(channels()["voxels"], "x.npz", lambda: encode(channels()["voxels"], sample.voxels))
     assert back.dtype == RUN and back.tobytes() == sample.voxels.tobytes()
-    other = renumbered(sample.voxels, {3: 8, 4: 3})
+    other = LABEL.ids["category"](sample.voxels, {3: 8, 4: 3})
     assert set(np.unique(other["class"])) & {39, 34} and (other["length"] == sample.voxels["length"]).all()
     assert (other["class"] == 39).sum() == (sample.voxels["class"] == 34).sum()
     with pytest.raises(StoreError, match=r"^frame 0: voxels: expected runs of 8,294,400 cells, found 60,000"):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from viewsphere import plugins
 from viewsphere.labels._field import Field
+from viewsphere.labels._ids import IdKind, by_number, by_table, in_attributes, in_column, renumbered
 from viewsphere.labels._label import (
     TAIL,
     ChannelLabel,
@@ -54,6 +55,7 @@ __all__ = [
     "Drawing",
     "Extent",
     "Field",
+    "IdKind",
     "Label",
     "Makers",
     "ModelFacts",
@@ -64,6 +66,8 @@ __all__ = [
     "Sight",
     "alone",
     "annotated",
+    "by_number",
+    "by_table",
     "channel_labels",
     "channels",
     "drawable",
@@ -71,6 +75,8 @@ __all__ = [
     "finite",
     "from_short_record",
     "from_whole_record",
+    "in_attributes",
+    "in_column",
     "is_in",
     "is_shown",
     "labels",
@@ -79,6 +85,7 @@ __all__ = [
     "object_labels",
     "observe",
     "on_request",
+    "renumbered",
     "sample_labels",
     "sample_values",
     "short_record",

@@ -8,12 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.labels._ids import Ids, check_ids, is_of_numbers
+
 
 @dataclass(frozen=True)
 class Field:
     """One field of an object or of a picture: a number, a text or a plain dataclass of these and of tuples of numbers (`shape`
     is empty), a tuple of numbers, or an array, whose `shape` has -1 where any length will do. `many` is a tuple of any number
     of such values. `optional`: None says that there is no such value.
+
+    `ids` are the kinds of ids in a value, each with a function that gives the value with other ones. Whole numbers have to
+    declare them; raises ValueError for those that do not.
     """
 
     name: str
@@ -25,6 +30,10 @@ class Field:
     is_array: bool = False
     optional: bool = False
     many: bool = False
+    ids: Ids | None = None
+
+    def __post_init__(self) -> None:
+        check_ids(f"field {self.name!r}", self.ids, is_of_numbers(self.type))
 
     @property
     def is_regular(self) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from viewsphere.errors import ViewsphereError
 from viewsphere.labels._field import Field
+from viewsphere.labels._ids import Ids, check_ids, has_whole_numbers
 from viewsphere.labels._placement import ModelFacts, Placement
 from viewsphere.labels._sight import Sight
 from viewsphere.model.channel import Channel
@@ -126,8 +127,8 @@ class ChannelLabel(Label):
     seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact; `colors` are those of the
     first ids in files with a palette.
 
-    `renumbered(array, ids)` gives the array of a data set whose categories have other ids, by their old ones; None: it has no
-    ids of categories.
+    `ids` are the kinds of ids in the array, each with a function that gives the array with other ones. Arrays of whole numbers
+    have to declare them; raises ValueError for those that do not.
     """
 
     compute: Callable[[Sight], Array]
@@ -137,7 +138,10 @@ class ChannelLabel(Label):
     empty: float = 0
     encoding: Any = "tiff"
     colors: tuple[Color, ...] = ()
-    renumbered: Callable[[Array, Mapping[int, int]], Array] | None = None
+    ids: Ids | None = None
+
+    def __post_init__(self) -> None:
+        check_ids(f"label {self.name!r}", self.ids, has_whole_numbers(self.dtype), "by_table")
 
     def is_in(self, sample: Sample) -> bool:
         """Whether the sample keeps the channel."""
@@ -147,13 +151,6 @@ class ChannelLabel(Label):
     def channel(self) -> Channel:
         """The channel that describes the label's file."""
         return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning, self.colors)
-
-
-def by_table(array: Array, ids: Mapping[int, int]) -> Array:
-    """The array with other ids for those that have one."""
-    table = np.arange(max([int(array.max(initial=0)), *ids]) + 1, dtype=array.dtype)
-    table[list(ids)] = list(ids.values())
-    return table[array]
 
 
 def later(sight: Sight, i: int) -> Mapping[str, Any]:

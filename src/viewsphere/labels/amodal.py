@@ -86,7 +86,7 @@ LABEL = ObjectLabel(
     axes="image",
     on_request=True,
     fields=(
-        Field("amodal", "COCO's compressed run-length code of the pixels that it alone would cover", Rle),
+        Field("amodal", "COCO's compressed run-length code of the pixels that it alone would cover", Rle, ids={}),
         Field("box2d_amodal", "their half-open corners (x0, y0, x1, y1), None without any", float, (4,), "px", optional=True),
     ),
     compute=compute,

@@ -26,6 +26,7 @@ from viewsphere.labels._described import (
     words_of,
 )
 from viewsphere.labels._field import Field
+from viewsphere.labels._ids import in_attributes
 from viewsphere.labels._label import Drawing, Models, Needs, Picture, SampleLabel
 from viewsphere.labels._lines import written
 from viewsphere.labels._sentences import (
@@ -334,6 +335,7 @@ LABEL = SampleLabel(
             "text, form and ids of the objects that each is of: docs/captions.md has the grammar",
             Caption,
             many=True,
+            ids={"object": in_attributes("objects")},
         ),
     ),
     compute=compute,

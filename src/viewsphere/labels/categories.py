@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, by_table, channel_of
+from viewsphere.labels._ids import by_table
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.labels._paint import by_number
 from viewsphere.model.sample import Sample
 
@@ -32,6 +33,6 @@ LABEL = ChannelLabel(
     encoding="png16",
     compute=lambda sight: sight.per_triangle(sight.geometry.triangle_category, 0),
     prove=prove,
-    renumbered=by_table,
+    ids={"category": by_table},
     drawing=Drawing("categories", pixels=lambda picture, sample: by_number(picture, sample.channels["categories"])),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from viewsphere.labels._ids import by_number
 from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.labels._lines import notes
 from viewsphere.labels._placement import Placement
@@ -35,7 +36,7 @@ LABEL = ObjectLabel.derived(
     fields=(
         Field("category", "name of the category", str),
         Field("supercategory", "name of what the category belongs to; may be empty", str),
-        Field("category_id", "number of the category, from 1", int),
+        Field("category_id", "number of the category, from 1", int, ids={"category": by_number}),
     ),
     prove=prove,
     drawing=Drawing("category", lines=notes(lambda o: o.category)),

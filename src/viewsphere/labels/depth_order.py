@@ -10,6 +10,7 @@ import numpy as np
 
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.labels._field import Field
+from viewsphere.labels._ids import in_attributes
 from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
 from viewsphere.labels._lines import arrow, middle
 from viewsphere.labels._paint import color_of
@@ -117,6 +118,7 @@ LABEL = ObjectLabel(
             "id, number of common pixels in the image (hidden ones count), and the share of them at which it is nearer",
             Overlap,
             many=True,
+            ids={"object": in_attributes("id")},
         ),
     ),
     compute=compute,

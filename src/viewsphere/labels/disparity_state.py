@@ -20,6 +20,7 @@ LABEL = ChannelLabel(
     meaning=f"the seen point in the rectified sensor's picture: {_state.MEANING}",
     needs=Needs(rectified=True),
     dtype=np.uint8,
+    ids={},
     empty=4,
     encoding="png",
     compute=compute,

@@ -20,6 +20,7 @@ LABEL = ChannelLabel(
     meaning=f"the seen point one instant later: {_state.MEANING}",
     needs=Needs(instants=(1,)),
     dtype=np.uint8,
+    ids={},
     empty=4,
     encoding="png",
     compute=compute,

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from viewsphere.labels._ids import by_table
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.labels._paint import by_number
 from viewsphere.model.sample import Sample
@@ -28,6 +29,7 @@ LABEL = ChannelLabel(
     dtype=np.int32,
     unit="object id",
     encoding="png16",
+    ids={"object": by_table},
     compute=lambda sight: sight.instances.ids,
     prove=prove,
     drawing=Drawing("instances", pixels=lambda picture, sample: by_number(picture, sample.channels["instances"])),

@@ -163,7 +163,7 @@ LABEL = ObjectLabel(
         Field("keypoints", f"{_EACH}; NaN without a pixel", float, (-1, 2), "px", "image", is_array=True),
         Field("keypoints3d", _EACH, float, (-1, 3), "m", "world", is_array=True),
         Field("keypoints3d_camera", _EACH, float, (-1, 3), "m", "camera", is_array=True),
-        Field("keypoint_states", f"{_EACH}: 0 visible, 1 occluded, 2 outside, 3 behind", int, (-1,), is_array=True),
+        Field("keypoint_states", f"{_EACH}: 0 visible, 1 occluded, 2 outside, 3 behind", int, (-1,), is_array=True, ids={}),
     ),
     compute=compute,
     keep=lambda o: o.keypoint_states.tolist() or None,

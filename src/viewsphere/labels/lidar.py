@@ -12,6 +12,7 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels._albedo import albedo
 from viewsphere.labels._chance import generator
 from viewsphere.labels._from_above import from_above
+from viewsphere.labels._ids import in_column
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
 from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.lidar import POINT, Lidar
@@ -138,6 +139,7 @@ LABEL = ChannelLabel(
     empty=np.nan,
     encoding="npz",
     compute=compute,
+    ids={"category": in_column("category"), "object": in_column("instance")},
     prove=prove,
     drawing=Drawing("lidar", alone=from_above, key=(("LiDAR from above: objects in their colours, else high is light", None),)),
 )

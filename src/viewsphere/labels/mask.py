@@ -90,8 +90,8 @@ LABEL = ObjectLabel(
     name="mask",
     meaning="its visible pixels; polygons are made of them",
     fields=(
-        Field("rle", "COCO's compressed run-length code", Rle),
-        Field("area", "number of visible pixels", int, unit="px"),
+        Field("rle", "COCO's compressed run-length code", Rle, ids={}),
+        Field("area", "number of visible pixels", int, unit="px", ids={}),
     ),
     compute=compute,
     keep=lambda o: o.rle.counts,

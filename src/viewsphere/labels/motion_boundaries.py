@@ -79,6 +79,7 @@ LABEL = ChannelLabel(
     meaning="1 where a pixel beside shows something else that moves otherwise",
     needs=Needs(instants=(1,)),
     dtype=np.uint8,
+    ids={},
     encoding="png",
     compute=compute,
     prove=prove,

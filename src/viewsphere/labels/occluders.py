@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewsphere.labels._field import Field
+from viewsphere.labels._ids import in_attributes
 from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
 from viewsphere.labels._lines import arrow, middle, note
 from viewsphere.labels._paint import color_of
@@ -82,7 +83,11 @@ LABEL = ObjectLabel(
     on_request=True,
     fields=(
         Field(
-            "occluders", "id (0: scenery or ground) and share of its pixels in the image, largest first", Occluder, many=True
+            "occluders",
+            "id (0: scenery or ground) and share of its pixels in the image, largest first",
+            Occluder,
+            many=True,
+            ids={"object": in_attributes("id")},
         ),
     ),
     compute=compute,

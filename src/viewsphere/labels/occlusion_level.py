@@ -55,6 +55,7 @@ LABEL = ObjectLabel(
             f"of its pixels in the image are hidden: 0 at most {PARTLY:.0%}, 1 at most {LARGELY:.0%}, 2 more, or it has none; "
             "3 all are outside",
             int,
+            ids={},
         ),
     ),
     restore=restore,

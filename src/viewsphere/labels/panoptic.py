@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.labels._classes import KEY, colored, with_classes, wrong_classes
+from viewsphere.labels._ids import by_table
 from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Picture, channel_of
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._sight import Sight
@@ -64,6 +65,11 @@ def renumbered(codes: Array, ids: Mapping[int, int]) -> Array:
     return with_classes(class_of(codes), ids) << BITS | object_of(codes)
 
 
+def with_objects(codes: Array, ids: Mapping[int, int]) -> Array:
+    """The map where objects have other ids."""
+    return class_of(codes) << BITS | by_table(object_of(codes), ids)
+
+
 def picture(codes: NDArray[np.int32]) -> Picture:
     """A map as a picture (H, W, 3) uint8: stuff in the colour of its class, each thing in its own."""
     colors, objects = colored(class_of(codes)), object_of(codes)
@@ -80,6 +86,6 @@ LABEL = ChannelLabel(
     empty=SKY << BITS,
     compute=compute,
     prove=prove,
-    renumbered=renumbered,
+    ids={"category": renumbered, "object": with_objects},
     drawing=Drawing("panoptic", beside=lambda sample: picture(sample.channels["panoptic"]), key=KEY),
 )

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from viewsphere.labels._ids import by_table
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.labels._paint import by_number
 from viewsphere.model.sample import Sample
@@ -24,6 +25,7 @@ LABEL = ChannelLabel(
     dtype=np.int32,
     unit="part id",
     encoding="png16",
+    ids={"part": by_table},
     compute=lambda sight: sight.per_triangle(sight.geometry.triangle_part, 0),
     prove=prove,
     drawing=Drawing("parts", pixels=lambda picture, sample: by_number(picture, sample.channels["parts"])),

@@ -24,6 +24,7 @@ from viewsphere.labels._described import (
     words_of,
 )
 from viewsphere.labels._field import Field
+from viewsphere.labels._ids import in_attributes
 from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
 from viewsphere.labels._lines import note
 from viewsphere.labels._paint import color_of
@@ -253,6 +254,7 @@ LABEL = SampleLabel(
             "object (id), text, and its parts color, material, extreme, place, relation and landmark (id): docs/captions.md",
             Expression,
             many=True,
+            ids={"object": in_attributes("object", "landmark")},
         ),
     ),
     compute=compute,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from viewsphere.labels._classes import KEY, class_names, colored, with_classes, wrong_classes
-from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, channel_of
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.model.classes import SKY, class_colors
 from viewsphere.model.sample import Sample
 
@@ -17,11 +17,6 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
     classes, instances = channel_of(sample, "semantic"), channel_of(sample, "instances")
     if classes is not None and instances is not None:
         yield from wrong_classes(sample, classes, instances)
-
-
-def renumbered(classes: Array, ids: Mapping[int, int]) -> Array:
-    """The classes where categories have other ids."""
-    return with_classes(classes, ids)
 
 
 LABEL = ChannelLabel(
@@ -34,6 +29,6 @@ LABEL = ChannelLabel(
     colors=tuple(map(tuple, class_colors().tolist())),
     compute=lambda sight: sight.per_triangle(sight.geometry.triangle_class, SKY),
     prove=prove,
-    renumbered=renumbered,
+    ids={"category": with_classes},
     drawing=Drawing("semantic", beside=lambda sample: colored(sample.channels["semantic"]), key=KEY),
 )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
+from viewsphere.labels._ids import in_column
 from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Needs, channel_of, rendered
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._sight import Sight
@@ -136,6 +137,7 @@ LABEL = ChannelLabel(
     unit="m, px",
     empty=np.nan,
     encoding="npz",
+    ids={"object": in_column("object"), "part": in_column("triangle")},
     compute=compute,
     prove=prove,
     drawing=Drawing("surface_samples", lines=draw),

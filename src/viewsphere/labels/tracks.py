@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
+from viewsphere.labels._ids import in_column
 from viewsphere.labels._label import ChannelLabel, Color, Drawing, Models, Needs, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
@@ -116,6 +117,7 @@ LABEL = ChannelLabel(
     unit="m, px",
     empty=np.nan,
     encoding="npz",
+    ids={"object": in_column("object")},
     compute=compute,
     prove=prove,
     drawing=Drawing("tracks", trails=draw, key=(("tracks: filled is visible, hollow is occluded", None),)),

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.labels._ids import by_table
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.labels._paint import by_number
 from viewsphere.labels._sight import Sight
@@ -37,6 +38,7 @@ LABEL = ChannelLabel(
     dtype=np.int32,
     unit="triangle",
     empty=-1,
+    ids={"part": by_table},
     compute=compute,
     prove=prove,
     drawing=Drawing("triangles", pixels=lambda picture, sample: by_number(picture, sample.channels["triangles"] + 1)),

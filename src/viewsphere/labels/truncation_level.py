@@ -45,7 +45,9 @@ LABEL = ObjectLabel(
     name="truncation_level",
     meaning="how much of it lies outside of the image, in KITTI's grades",
     on_request=True,
-    fields=(Field("truncation_level", f"outside are: 0 at most {TRUNCATED:.0%}, 1 at most {LARGELY:.0%}, 2 more", int),),
+    fields=(
+        Field("truncation_level", f"outside are: 0 at most {TRUNCATED:.0%}, 1 at most {LARGELY:.0%}, 2 more", int, ids={}),
+    ),
     restore=restore,
     prove=prove,
     drawing=Drawing("truncation_level", lines=draw, key=(("truncation_level: 0 inside, 1 truncated, 2 largely so", None),)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -14,8 +14,9 @@ from viewsphere.geometry import voxels
 from viewsphere.geometry.camera import has_unit_rays, pixel_rays, project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels._cells import drawn
-from viewsphere.labels._classes import KEY
-from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, by_table, channel_of, rendered
+from viewsphere.labels._classes import KEY, with_classes
+from viewsphere.labels._ids import in_column
+from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, channel_of, rendered
 from viewsphere.labels._lifting import ROUNDING, exact_depth, largest
 from viewsphere.labels._sight import Sight
 from viewsphere.model.camera import Camera
@@ -255,13 +256,6 @@ def _inside(grid: Grid, points: Float) -> tuple[Rows, ...]:
     return i, j, k
 
 
-def renumbered(runs: Array, ids: Mapping[int, int]) -> Array:
-    """The runs where categories have other ids."""
-    out = runs.copy()
-    out["class"] = by_table(runs["class"], {thing_class(old): thing_class(new) for old, new in ids.items()})
-    return out
-
-
 LABEL = ChannelLabel(
     name="voxels",
     meaning="cells of a grid before the camera, in runs, a row each: how many, class as in `semantic` (0: empty), object, "
@@ -275,6 +269,6 @@ LABEL = ChannelLabel(
     encoding="npz",
     compute=compute,
     prove=prove,
-    renumbered=renumbered,
+    ids={"category": in_column("class", with_classes), "object": in_column("instance")},
     drawing=Drawing("voxels", beside=drawn, key=(("voxels from behind the camera; pale: not in its view", None), *KEY)),
 )

@@ -97,12 +97,12 @@ class Shot(Frozen):
         return found
 
     @property
-    def world(self) -> str:
-        """The name of what it shows, without its variation: its sequence's, else its own."""
-        if not self.variation or self.sequence:
-            return (self.sequence or self.key).removesuffix(f"-{self.variation}" if self.variation else "")
-        subject, _, position = self.key.rpartition("-")
-        return f"{subject.removesuffix(f'-{self.variation}')}-{position}"
+    def subject(self) -> str:
+        """The stable name of the model or scene that it shows, without its variation. The rest of its key says where its frames
+        are stored: that differs where a data set is rendered in parts, or in shots of other lengths.
+        """
+        subject = self.key.rpartition("-")[0]
+        return subject.removesuffix(f"-{self.variation}") if self.variation else subject
 
     @property
     def objects(self) -> tuple[Thing, ...]:

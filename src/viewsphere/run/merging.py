@@ -4,15 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib.metadata import version
 from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
 from viewsphere.errors import StoreError, UserError
-from viewsphere.labels import channel_labels, channels
+from viewsphere.labels import (
+    IdKind,
+    ObjectLabel,
+    SampleLabel,
+    channel_labels,
+    channels,
+    object_labels,
+    renumbered,
+    sample_labels,
+)
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.credit import Credit
 from viewsphere.model.sample import MERGED, ObjectAnnotation, Sample
@@ -49,6 +59,13 @@ class _Source:
     def keeps_categories(self) -> bool:
         """Whether every category id stays what it is."""
         return all(old == new.id for old, new in self.categories.items())
+
+    @cached_property
+    def tables(self) -> Mapping[IdKind, Mapping[int, int]]:
+        """New ids by old ones, of each kind that merging renumbers: ids of objects and of parts are those of a shot and of a
+        model, which stay whole.
+        """
+        return {"category": {old: new.id for old, new in self.categories.items()}}
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -317,6 +334,7 @@ def _renumbered(source: _Source, sample: Sample, index: int) -> ForeignFrame:
     moved = replace(
         sample,
         index=index,
+        more=_with_ids(source, sample.more, sample_labels().values()),
         sequence=source.sequences.get(sample.sequence, sample.sequence),
         known_pose=pose and pose.model_copy(update={"index": pose.index + source.first_pose}),
         objects=tuple(_moved_object(source, o) for o in sample.objects),
@@ -333,7 +351,14 @@ def _moved_object(source: _Source, o: ObjectAnnotation) -> ObjectAnnotation:
     folder, _, name = o.model.rpartition("/")
     model = f"{folder.rpartition('/')[0]}/{key}/{name}" if o.model else ""
     named = {"key": key + o.key.removeprefix(old), "track": key if o.track else ""}
-    return replace(o, **named, model=model, **_of(source.categories[o.category_id]))
+    more = _with_ids(source, o.more, object_labels())
+    return replace(o, **named, model=model, more=more, **_of(source.categories[o.category_id]))
+
+
+def _with_ids(source: _Source, values: Mapping[str, Any], labels: Iterable[ObjectLabel | SampleLabel]) -> dict[str, Any]:
+    """Values of labels' fields, with the ids of the merged data set."""
+    ids = {field.name: field.ids for label in labels for field in label.fields}
+    return {name: renumbered(value, ids.get(name), source.tables) for name, value in values.items()}
 
 
 def _of(category: Category) -> dict[str, Any]:
@@ -343,8 +368,8 @@ def _of(category: Category) -> dict[str, Any]:
 
 def _with_category_ids(source: _Source, sample: Sample) -> Iterator[tuple[str, Loaded]]:
     """The channels that hold ids of categories, with those of the merged data set, encoded."""
-    ids = {old: new.id for old, new in source.categories.items()}
+    kinds = source.dataset.kinds[source.dataset.plan.part_of(sample.index)]
     for name, label in channel_labels().items():
-        if name in sample.files and label.renumbered:
-            data = encode(label.channel, label.renumbered(sample.channels[name], ids))
-            yield name, Loaded(label.channel.suffix, data)
+        if name in sample.files and label.ids and source.tables.keys() & label.ids.keys():
+            array = renumbered(sample.channels[name], label.ids, source.tables)
+            yield name, Loaded(kinds.suffix(label.channel), encode(label.channel, array, kinds))

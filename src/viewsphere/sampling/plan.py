@@ -275,7 +275,7 @@ class Plan(Shown, Stock):
         """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
         each frame. `first` is the number of its first sample, `tries` as for `shot`.
         """
-        key, variation, stock = key or subject, "", self
+        key, variation, stock = key or f"{subject}-{poses[0]:06d}", "", self
         if self.recipe.variations is not None:
             subject, variation = without(subject)
             stock = self._under[variation]

@@ -327,11 +327,12 @@ class SampleViews:
 
     @property
     def drawn_as(self) -> tuple[str, ...]:
-        """What randomness in the sample's labels follows from besides a seed: its shot, whatever its variation, its sensor, and
-        its instant, which is named by its time and by where the rig is then.
+        """What randomness in the sample's labels follows from besides a seed: its subject, whatever its variation, its sensor,
+        and its instant, which is named by its time and by where the rig is then. Nothing of it depends on how a data set is
+        stored, so the same frame has the same draws however it came there.
         """
         shot, now = self.views.shot, self.views.shot.instants[self.instant]
-        return shot.world, self.sensor.name, repr(now.seconds), repr(now.world_from_rig)
+        return shot.subject, self.sensor.name, repr(now.seconds), repr(now.world_from_rig)
 
     @property
     def followed(self) -> Followed:
