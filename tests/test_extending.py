@@ -70,8 +70,8 @@ import numpy as np
 from viewsphere.labels import ChannelLabel, Needs
 
 LABEL = ChannelLabel(
-    name="unseen", meaning="whether the point is hidden an instant later", needs=Needs(instants=(1,)), dtype=np.uint8, empty=4, ids={},
-    encoding="png", compute=lambda sight: np.zeros(sight.visibility.triangle.shape, np.uint8)
+    name="unseen", meaning="whether the point is hidden an instant later", needs=Needs(instants=(1,)), dtype=np.uint8, empty=4,
+    ids={}, encoding="png", compute=lambda sight: np.zeros(sight.visibility.triangle.shape, np.uint8)
     if sight.match(1) is None else sight.match(1).state,
 )
 """
