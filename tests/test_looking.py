@@ -264,7 +264,7 @@ def test_a_video_of_still_pictures_is_refused(tmp_path):
 def test_mistakes_in_videos_are_named(moving, tmp_path, monkeypatch):
     with pytest.raises(UserError, match=r"ends in .mp4 or .webp; found .*v.avi"):
         write_video(moving, tmp_path / "v.avi")
-    with pytest.raises(StoreError, match=r"^--sequence: expected one of post_box_000, post_box_001; found 'car'"):
+    with pytest.raises(StoreError, match=r"^--sequence: 'car' is unknown\. Valid: post_box_000, post_box_001"):
         write_video(moving, tmp_path / "v.webp", sequence="car")
     with pytest.raises(StoreError, match="--draw: expected the channel scene_flow"):
         write_video(moving, tmp_path / "v.webp", ["scene_flow"])

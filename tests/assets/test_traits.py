@@ -113,8 +113,8 @@ def test_all_fields_and_sixteen_numbers_in_a_row(model):
 
 MISTAKES = {
     "symmetries:\n  discrete: [turn]": ":2: symmetries.discrete[0]: expected a list; found 'turn'",
-    "symmetry: {}": "found 'symmetry'; did you mean 'symmetries'?",
-    "axes: world": ":1: axes: expected one of file, object; found 'world'",
+    "symmetry: {}": "'symmetry' is unknown; did you mean 'symmetries'?",
+    "axes: world": ":1: axes: 'world' is unknown. Valid: file, object",
     "symmetries: {continuous: [{axis: [0, 0, 2]}]}": "axis: expected a vector of length 1",
     "symmetries: {continuous: [{axis: [0, 0, .nan]}]}": "axis[2]: expected",
     "symmetries: {discrete: [[1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]]}": "expected a motion; found the identity",

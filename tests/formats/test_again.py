@@ -361,7 +361,7 @@ def test_a_folder_that_holds_something_and_other_formats_are_refused(tree, tmp_p
     for kind, out, message in (
         ("bop", folder, "expected a new folder"),
         ("bop", tmp_path / "a.yaml", "expected a folder beside --from"),
-        ("coco", tmp_path / "a", "expected one of bop, colmap, nerfstudio, pascal3d; found 'coco'"),
+        ("coco", tmp_path / "a", "'coco' is unknown. Valid: bop, colmap, nerfstudio, pascal3d"),
         ("bob", tmp_path / "a", "did you mean 'bop'"),
     ):
         with pytest.raises(UserError, match=message):

@@ -60,9 +60,9 @@ def test_what_is_not_kept_is_not_there():
         replace(sample, channels={}).point_cloud()
     with pytest.raises(StoreError, match="expected the channel surface_samples, found none"):
         sample.point_cloud(surface="complete")
-    with pytest.raises(UserError, match="point_cloud: axes: expected one of camera, world; found 'word'; did you mean 'world'"):
+    with pytest.raises(UserError, match=r"point_cloud: axes: 'word' is unknown; did you mean 'world'\? Valid: camera, world"):
         sample.point_cloud("word")
-    with pytest.raises(UserError, match="point_cloud: surface: expected one of visible, complete; found 'all'"):
+    with pytest.raises(UserError, match=r"point_cloud: surface: 'all' is unknown\. Valid: visible, complete"):
         sample.point_cloud(surface="all")
 
 

@@ -246,7 +246,7 @@ def recipe(*annotations):
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        ("amodl", r"annotations\[0\]: expected one of .*; found 'amodl'; did you mean 'amodal'"),
+        ("amodl", r"annotations\[0\]: 'amodl' is unknown; did you mean 'amodal'\? Valid: .*"),
         ("depth", r"annotations\[0\]: expected a label of objects.*found depth, which is one of channels"),
         ("pose", r"annotations\[0\]: expected a label on request; found pose, which every data set has"),
         ("hull", r"annotations\[0\]: expected a label; found hull, a field of contour: name that"),
@@ -271,7 +271,7 @@ def test_a_label_of_objects_is_no_channel():
             {"keypoints": {}},
             r"labels: expected .* recipe names; found 'keypoints': name it in channels or annotations",
         ),
-        ({"keypoint": {}}, r"labels: expected one of .*; found 'keypoint'; did you mean 'keypoints'\?"),
+        ({"keypoint": {}}, r"labels: 'keypoint' is unknown; did you mean 'keypoints'\? Valid: .*"),
         ({"amodal": 3}, r"labels\.amodal: expected a mapping"),
     ],
 )

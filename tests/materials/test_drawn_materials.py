@@ -95,7 +95,7 @@ def test_a_larger_map_shows_the_same_with_more_detail():
 
 
 def test_an_unknown_material_is_told_with_the_nearest_one():
-    with pytest.raises(UserError, match=r"^material: expected one of asphalt, .*; found 'wod'; did you mean 'wood'\?$"):
+    with pytest.raises(UserError, match=r"^material: 'wod' is unknown; did you mean 'wood'\? Valid: asphalt, .*$"):
         materials.surface("wod", 0, 64)
 
 

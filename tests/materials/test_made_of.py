@@ -191,12 +191,15 @@ def test_a_grain_alone_is_new_in_each_frame():
     [
         (
             {"ground": {"material": "wod"}},
-            r"scene\.ground\.material: expected one of asphalt.*found 'wod'; did you mean 'wood'\?",
+            r"scene\.ground\.material: 'wod' is unknown; did you mean 'wood'\? Valid: asphalt",
         ),
-        ({"ground": {"material": ["wood", "carpets"]}}, r"scene\.ground\.material.*found 'carpets'; did you mean 'carpet'\?"),
+        (
+            {"ground": {"material": ["wood", "carpets"]}},
+            r"scene\.ground\.material.*'carpets' is unknown; did you mean 'carpet'\?",
+        ),
         ({"ground": {"material": "wood", "image": "a.png"}}, r"scene\.ground: expected material or image; found both"),
         ({"ground": {"material": "wood", "tile": 1}}, r"scene\.ground: expected no tile beside material.*leave it out"),
-        ({"materials": [{"texture": "iron"}]}, r"scene\.materials\[0\]\.texture: expected one of asphalt.*found 'iron'"),
+        ({"materials": [{"texture": "iron"}]}, r"scene\.materials\[0\]\.texture: 'iron' is unknown.*asphalt"),
         (
             {"materials": [{"texture": {"choice": ["any", "wood"], "weights": [1, 2]}}]},
             r"expected names of materials beside weights; found \['any', 'wood'\]",

@@ -165,8 +165,8 @@ def test_other_files_stay_and_are_named(photos, tmp_path):
         (("--to", "yolo", "-o", "out"), r"--from: expected one of bop, coco, .*; found none"),
         (("--from", "coco", "-o", "out"), r"--to: expected one or more of airsim, .*; found none"),
         (("--from", "coco", "--to", "yolo"), r"-o: expected a folder for the formats' folders; found none"),
-        (("--from", "imagefolder", "--to", "yolo", "-o", "out"), r"--from: expected one of bop, coco, .*; found 'imagefolder'"),
-        (("--from", "coco", "--to", "yol", "-o", "out"), r"--to: expected .*yolo"),
+        (("--from", "imagefolder", "--to", "yolo", "-o", "out"), r"--from: 'imagefolder' is unknown\. Valid: bop, coco, .*"),
+        (("--from", "coco", "--to", "yol", "-o", "out"), r"--to: 'yol' is unknown; did you mean 'yolo'"),
         (("--from", "yolo", "--to", "voc", "-o", "out"), r"real: expected a YOLO data set \(data.yaml\); found no such file"),
     ],
 )

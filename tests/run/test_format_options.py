@@ -118,12 +118,12 @@ def test_a_format_that_is_only_read_cannot_be_asked_for(plugin, monkeypatch, sma
     assert asked_formats("hello, coco") == ("hello", "coco")
     monkeypatch.delattr("my_hello.writer")
     others = [name for name in plugins.names("formats") if name != "hello"]
-    known = f"expected one of {', '.join(others)}; found 'hello'"
+    known = f"'hello' is unknown. Valid: {', '.join(others)}"
     with pytest.raises(UserError, match=f"^--format: {known}"):
         asked_formats("coco,hello")
     with pytest.raises(UserError, match=f"^format: {known}"):
         export(small_run, "hello")
-    with pytest.raises(UserError, match=r"^--format: expected one of .*; found 'coc'; did you mean 'coco'\?"):
+    with pytest.raises(UserError, match=r"^--format: 'coc' is unknown; did you mean 'coco'\? Valid: .*"):
         asked_formats("coc")
 
 
@@ -152,11 +152,11 @@ def test_render_takes_them_too(tmp_path):
 
 
 WRONG = {
-    "coco.category_ids=oco": "coco.category_ids: expected one of contiguous, coco; found 'oco'; did you mean 'coco'?",
-    "coco.ids=coco": "coco.ids: expected one of category_ids, pictures, segmentation; found 'ids'",
+    "coco.category_ids=oco": "coco.category_ids: 'oco' is unknown; did you mean 'coco'? Valid: contiguous, coco",
+    "coco.ids=coco": "coco.ids: 'ids' is unknown; did you mean 'category_ids'? Valid: category_ids, pictures, segmentation",
     "coco=coco": "coco=coco: expected format.option=value; found no option",
     "coco.category_ids": "coco.category_ids: expected field=value, such as coco.category_ids=coco; found no '='",
-    "csv.a=1": "csv.a: expected one of coco; found 'csv': add it to the formats",
+    "csv.a=1": "csv.a: 'csv' is unknown. Valid: coco, or add it to the formats",
 }
 
 
@@ -171,7 +171,11 @@ def test_a_wrong_option_in_a_recipe_is_one_line_with_its_place(tmp_path):
     file = tmp_path / "recipe.yaml"
     lines = len(text.replace("formats: []\n", "").splitlines())
     for entry, field, told in (
-        ("coco: {category_ids: oco}", "[0].coco.category_ids", "expected one of contiguous, coco; found 'oco'; did you mean"),
+        (
+            "coco: {category_ids: oco}",
+            "[0].coco.category_ids",
+            "'oco' is unknown; did you mean 'coco'? Valid: contiguous, coco",
+        ),
         ("csv: {category_ids: coco}", "[0].csv", "expected no options, format csv has none; found category_ids"),
         ("coco: 5", "[0]", r"expected a format's name, or {name: {option: value}}; found a mapping"),
     ):
@@ -189,5 +193,5 @@ def test_a_format_of_ones_own_has_options(small_dataset):
     export(small_dataset.root, [{"hello": {"times": 3}}])
     assert (small_dataset.root / "hello" / "greeting.txt").read_text() == "hellohellohello"
     assert is_proved(small_dataset.root)
-    with pytest.raises(UserError, match=r"hello\.tmes: expected one of greeting, times; found 'tmes'; did you mean 'times'"):
+    with pytest.raises(UserError, match=r"hello\.tmes: 'tmes' is unknown; did you mean 'times'"):
         export(small_dataset.root, [{"hello": {"tmes": 2}}])

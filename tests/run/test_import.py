@@ -261,7 +261,7 @@ def test_what_is_no_data_set_says_so(tmp_path):
         import_dataset("coco", tmp_path, tmp_path / "out")
     with pytest.raises(StoreError, match=r"dataset1.json: expected the native format's JSON"):
         import_dataset("native", tmp_path, tmp_path / "out")
-    with pytest.raises(UserError, match=r"import: expected one of bop, coco, .*, yolo; found 'viper'"):
+    with pytest.raises(UserError, match=r"import: 'viper' is unknown\. Valid: bop, coco, .*, yolo"):
         import_dataset("viper", tmp_path, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

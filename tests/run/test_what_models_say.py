@@ -167,4 +167,7 @@ def test_the_command_line_ends_with_2(recipe, tmp_path):
     )
     found = viewsphere("render", tmp_path / "recipe.yaml", "-o", tmp_path / "out")
     assert found.returncode == 2
-    assert "box.stl.viewsphere.yaml:1: keypoint: expected one of" in found.stderr and "did you mean 'keypoints'" in found.stderr
+    assert (
+        "box.stl.viewsphere.yaml:1: keypoint: 'keypoint' is unknown; did" in found.stderr
+        and "did you mean 'keypoints'" in found.stderr
+    )

@@ -362,10 +362,10 @@ POINTS = [[0, 0, 0], [1, 0, 0]]
 @pytest.mark.parametrize(
     ("one", "message"),
     [
-        ({"kind": "splin"}, f"{WHERE}.kind: expected one of {', '.join(KINDS)}; found 'splin'; did you mean 'spline'?"),
+        ({"kind": "splin"}, f"{WHERE}.kind: 'splin' is unknown; did you mean 'spline'? Valid: {', '.join(KINDS)}"),
         (
             {"kind": "constant", "speed": 3},
-            f"{WHERE}.speed: expected one of velocity, spin_deg; found 'speed'",
+            f"{WHERE}.speed: 'speed' is unknown. Valid: velocity, spin_deg",
         ),
         ({"kind": "path", "points": POINTS[:1], "speed": 1}, f"{WHERE}.points: expected at least 2 of them; found 1"),
         ({"kind": "spline", "points": POINTS[:1], "speed": 1}, f"{WHERE}.points: expected at least 2 of them; found 1"),
@@ -422,7 +422,7 @@ def test_mistakes(one, message):
 
 def test_mistakes_of_lanes_and_clips():
     lane = {"kind": "path", "lane": "their", "speed": 1}
-    assert mistake(lane, lanes=LANES) == f"{WHERE}.lane: expected one of any, there, back; found 'their'; did you mean 'there'?"
+    assert mistake(lane, lanes=LANES) == f"{WHERE}.lane: 'their' is unknown; did you mean 'there'? Valid: any, there, back"
     beyond = mistake({"kind": "clip", "offset": 1.5}, timeline=WALK)
     assert beyond == f"{WHERE}.offset: expected 0 to 1 s, the length of the animation in walk.fbx; found 1.5"
     assert mistake({"kind": "clip"}, timeline=Timeline(1, 1, 24.0, False)).startswith(f"{WHERE}: expected a file in which")
@@ -430,7 +430,9 @@ def test_mistakes_of_lanes_and_clips():
 
 def test_a_plan_finds_mistakes_without_a_start():
     check_motion(entries({"kind": "path", "lane": "any", "speed": [2, 3]}, {"kind": "clip"}), "models[0].motion")
-    with pytest.raises(RecipeError, match=r"^scene\.company\.motion\[1\]\.spedd: expected one of .*did you mean 'speed'\?$"):
+    with pytest.raises(
+        RecipeError, match=r"^scene\.company\.motion\[1\]\.spedd: 'spedd' is unknown; did you mean 'speed'\? Valid: .*$"
+    ):
         check_motion(entries({"kind": "clip"}, {"kind": "clip", "spedd": 3}), "scene.company.motion")
 
 

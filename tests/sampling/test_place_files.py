@@ -233,11 +233,11 @@ def test_names_that_there_are_not(tmp_path):
     file = write_marked(tmp_path / "yard.gltf")
     scenes = {"count": 1, "objects": 1, "surface": "tabel"}
     assert mistake(recipe(file, scenes=scenes), plan) == (
-        "scenes.surface: expected one of table; found 'tabel'; did you mean 'table'?"
+        "scenes.surface: 'tabel' is unknown; did you mean 'table'? Valid: table"
     )
     time, drive = {"frames": 3}, {"kind": "drive", "lane": "nort"}
     assert mistake(recipe(file, time=time, viewpoints=drive), plan) == (
-        "viewpoints.lane: expected one of loop, north; found 'nort'; did you mean 'north'?"
+        "viewpoints.lane: 'nort' is unknown; did you mean 'north'? Valid: loop, north"
     )
 
 

@@ -101,11 +101,11 @@ def test_a_pattern_that_fits_nothing_is_refused():
     [
         (
             {"models": [{"source": "zoo:car", "motion": {"kind": "random", "hz": 3}}]},
-            r"^models\[0\]\.motion\.hz: expected one of",
+            r"^models\[0\]\.motion\.hz: 'hz' is unknown",
         ),
         (
             {"scene": {"company": {"count": 1, "motion": [{"kind": "randm"}]}}},
-            r"^scene\.company\.motion\[0\]\.kind: expected one of .*; found 'randm'; did you mean 'random'\?$",
+            r"^scene\.company\.motion\[0\]\.kind: 'randm' is unknown; did you mean 'random'\? Valid: .*$",
         ),
         (
             {"scene": {"place": {"source": "zoo:neighbourhood", "motion": {"tree_1": {"kind": "oscillate", "period": 0}}}}},

@@ -139,7 +139,7 @@ MISTAKES = [
     ({"kind": "stereo", "baseline": 0}, "rig.baseline: expected a number greater than 0"),
     ({"kind": "stereo", "baseline": -0.1}, "rig.baseline: expected a number greater than 0"),
     ({"kind": "stereo"}, "rig.baseline: expected a value"),
-    ({"kind": "mono"}, "rig.kind: expected one of sensors, stereo, surround, file"),
+    ({"kind": "mono"}, "rig.kind: 'mono' is unknown. Valid: sensors, stereo, surround, file"),
     ({"sensors": {"Left": {}, "left": {}}}, "rig.sensors: expected names that differ in more than capitals"),
     ({"sensors": {}}, "rig.sensors: expected at least 1"),
     ({"sensors": {"a b": {}}}, "rig.sensors.a b: "),

@@ -179,10 +179,10 @@ def test_more_viewpoints_are_added_to_scenes_that_are_there():
     ("changes", "message"),
     [
         ({"models": 3}, r"scenes\.objects: expected at most \d, as there are \d models of split '\w+'; found 4"),
-        ({"scenes": {"layout": "scater"}}, r"scenes\.layout: expected one of .*; found 'scater'; did you mean 'scatter'\?"),
+        ({"scenes": {"layout": "scater"}}, r"scenes\.layout: 'scater' is unknown; did you mean 'scatter'\? Valid: .*"),
         (
             {"scenes": {"sampler": "scenez"}},
-            r"scenes\.sampler: expected one of .*product, scenes, .*; found 'scenez'; did you mean 'sc",
+            r"scenes\.sampler: 'scenez' is unknown; did you mean 'scenes'\? Valid: .*product, scenes, .*",
         ),
         ({"scene": {"company": 1}}, r"scene\.company: expected none beside scenes"),
         ({"count": 2_000_000_000}, r"scenes\.count: expected at most 1,000,000 frames; found 2,000,000,000 scenes"),

@@ -38,7 +38,7 @@ THINGS = "viewpoints.look: expected a thing's number or key: 1 (car_000); found"
         ({}, ":4: viewpoints.kind: expected a place with lanes for drive; found none: set scene.place, or take spline"),
         (
             {"viewpoints": "{kind: drive, lane: up}", "place": "zoo:neighbourhood"},
-            ":4: viewpoints.lane: expected one of right, left; found 'up'",
+            ":4: viewpoints.lane: 'up' is unknown. Valid: right, left",
         ),
         ({"viewpoints": "{kind: orbit, distance: 8, look: truck}"}, f":4: {THINGS} 'truck'"),
         ({"viewpoints": "{kind: mast, position: [0, 9, 9], look: 2}"}, f":4: {THINGS} 2"),
@@ -50,7 +50,7 @@ THINGS = "viewpoints.look: expected a thing's number or key: 1 (car_000); found"
         ),
         (
             {"place": f"{STREET}tree_*: {{kind: path, lane: up, speed: 1}}"},
-            ":9: scene.place.motion.tree_*.lane: expected one of any, right, left; found 'up'",
+            ":9: scene.place.motion.tree_*.lane: 'up' is unknown. Valid: any, right, left",
         ),
         (
             {"place": f"{STREET}'[tl]*_[0-9]': {{kind: oscillate, period: 0}}"},
@@ -58,7 +58,7 @@ THINGS = "viewpoints.look: expected a thing's number or key: 1 (car_000); found"
         ),
         (
             {"place": f"{STREET}tree_*: [{OSCILLATE}, {{kind: osc}}]"},
-            ":9: scene.place.motion.tree_*[1].kind: expected one of",
+            ":9: scene.place.motion.tree_*[1].kind: 'osc' is unknown; did you mean 'oscillate'? Valid: ",
         ),
     ],
 )

@@ -133,11 +133,11 @@ def test_a_split_slices_and_places_from_the_end(single):
 
 
 def test_what_is_not_there_is_told(dataset):
-    with pytest.raises(UserError, match=r"select: expected one of rgb, .*; found 'dept'; did you mean 'depth'\?"):
+    with pytest.raises(UserError, match=r"select: 'dept' is unknown; did you mean 'depth'\? Valid: rgb, .*"):
         dataset.select("dept")
     with pytest.raises(UserError, match=r"did you mean 'objects\.box2d'"):
         dataset.select("objects.box2")
-    with pytest.raises(UserError, match=r"select: split: expected one of train, val; found 'test'"):
+    with pytest.raises(UserError, match=r"select: split: 'test' is unknown\. Valid: train, val"):
         dataset.select("rgb", split="test")
 
 

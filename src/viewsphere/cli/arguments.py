@@ -149,7 +149,7 @@ def with_options(names: Sequence[str], options: Sequence[str] | None) -> tuple[F
             met = "no option" if field in entries else f"no format: say {names[0]}.{text}" if names else "no format"
             raise UserError(f"--format-option {text}: expected format.option=value; found {met}")
         if name not in entries:
-            raise UserError(f"--format-option {field}: {one_of(name, tuple(entries))}: add it to the formats")
+            raise UserError(f"--format-option {field}: {one_of(name, tuple(entries))}, or add it to the formats")
         entries[name] = FormatEntry(name=name, options={option: value}).over(entries[name].options)
         entries[name].arguments(f"--format-option {name}")
     return tuple(entries.values())

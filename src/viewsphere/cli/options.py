@@ -34,7 +34,7 @@ def said(error: Any) -> str:
     option = getattr(error, "option_name", None)
     if option and getattr(error, "possibilities", None) is not None:
         options = [name for p in error.ctx.command.params for name in p.opts]
-        return f"{where}expected one of its options; found {option}{nearest(option, options)}: see {command} -h"
+        return f"{where}{option} is no option{nearest(option, options) or ':'} See {command} -h"
     if isinstance(error.__cause__, ValidationError) and _option(error):
         return f"{where}{_option(error)}: {first_of(error.__cause__)}: see {command} -h"
     message = " ".join(error.format_message().split()).removesuffix(".")

@@ -6,18 +6,21 @@ import re
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import Any, NamedTuple, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from viewsphere.errors import RecipeError
+from viewsphere.model.suggestions import suggestion
 
 Options = TypeVar("Options", bound=BaseModel)
 
 Path = tuple[str | int, ...]
 EXPLAINED = "explained"
+
+MOST_LISTED = 80
+"""Valid names that a message lists: more than the zoo has families, fewer than a folder has models."""
 
 
 class Place(NamedTuple):
@@ -60,21 +63,15 @@ def _begins(message: str, written: str) -> bool:
 
 
 def nearest(name: object, known: Iterable[str]) -> str:
-    """`; did you mean 'x'?` with the known name most similar to `name`, or beginning with it; empty if none is similar."""
-    meant = _meant(name, known)
+    """`; did you mean 'x'?` with the valid name that was most likely meant; empty if none is close."""
+    meant = suggestion(name, known)
     return f"; did you mean {meant!r}?" if meant else ""
 
 
-def _meant(name: object, known: Iterable[str]) -> str | None:
-    by_lower, lower = {k.lower(): k for k in known}, str(name).lower()
-    begun = [k for k in by_lower if len(lower) > 2 and k.startswith(lower)]
-    close = get_close_matches(lower, by_lower, 1, 0.6) or begun[:1]
-    return by_lower[close[0]] if close else None
-
-
 def one_of(name: object, known: Sequence[str]) -> str:
-    """`expected one of a, b, c; found 'd'; did you mean ...?`."""
-    return f"expected one of {', '.join(known)}; found {shown(name)}{nearest(name, known)}"
+    """`'d' is unknown; did you mean 'c'? Valid: a, b, c`, with the first `MOST_LISTED` names."""
+    more = ", ..." if len(known) > MOST_LISTED else ""
+    return f"{shown(name)} is unknown{nearest(name, known) or '.'} Valid: {', '.join(known[:MOST_LISTED]) or 'none'}{more}"
 
 
 def different(one: Mapping[str, Any], other: Mapping[str, Any], most: int = 5) -> list[str]:
@@ -155,7 +152,7 @@ def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails], fields: Sequen
             return any(len(e["loc"]) > depth and e["loc"][:depth] == place for e in errors)
         case "missing":
             strange = [e["loc"] for e in errors if e["type"] == "extra_forbidden"]
-            return any(loc[:-1] == place[:-1] and _meant(loc[-1], fields) == place[-1] for loc in strange)
+            return any(loc[:-1] == place[:-1] and suggestion(loc[-1], fields) == place[-1] for loc in strange)
         case _:
             return False
 

@@ -10,24 +10,15 @@ from typing import Any, cast
 
 import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
-from yaml.tokens import FlowMappingEndToken, FlowMappingStartToken, FlowSequenceEndToken, FlowSequenceStartToken
 
 from viewsphere.errors import RecipeError
 from viewsphere.limits import limits
 from viewsphere.model.mistakes import Marks, Place, dotted, shown
 from viewsphere.model.mistakes import Path as Steps
+from viewsphere.recipe.yaml_errors import syntax_error
 
 DEEPEST = 200
 """Brackets within one another: each takes the YAML reader as long as all those around it."""
-
-UNCLOSED = ("while scanning a quoted scalar", "while parsing a flow sequence", "while parsing a flow mapping")
-"""What was being read, in the YAML reader's words, where a quote or a bracket is not closed, and the reader knows its place."""
-
-OPENING: dict[str, str] = {"'": "quoted text", '"': "quoted text", "[": "list", "{": "mapping"}
-"""What begins with each sign that has to be closed."""
-
-ENDS = ("end of stream", "<stream end>")
-"""The YAML reader's words for the end of a file."""
 
 _HALF = re.compile("[\ud800-\udfff]")
 _INT = re.compile(r"[-+]?[0-9]+\Z")
@@ -105,7 +96,7 @@ def parse(text: str, source: str) -> tuple[Any, Marks]:
         reader = _Reader(source, loader.most)
         data = reader.value(root, ()) if root is not None else None
     except yaml.MarkedYAMLError as error:
-        raise RecipeError(_syntax(source, text, error)) from None
+        raise RecipeError(f"{source}:{syntax_error(text, error, _Loader)}") from None
     except _TooMany as error:
         found = f"expected at most {loader.most:,} values (limit MAX_RECIPE_VALUES); found more"
         raise RecipeError(f"{source}:{error}: {found}: write fewer, or set VIEWSPHERE_MAX_RECIPE_VALUES higher") from None
@@ -136,40 +127,6 @@ def _text(path: Path) -> str:
         line = text.count("\n", 0, control.start()) + 1
         raise RecipeError(f"{path}:{line}: expected text; found the control character {control.group()!r}")
     return text
-
-
-def _syntax(path: str, text: str, error: yaml.MarkedYAMLError) -> str:
-    mark, lines, problem = error.problem_mark or error.context_mark, text.splitlines(), error.problem or ""
-    line = mark.line + 1 if mark else 1
-    around = lines[line - 1] if line <= len(lines) else ""  # a mistake may be met behind the last line
-    if "\t" in around[: len(around) - len(around.lstrip())] or "'\\t'" in problem:
-        return f"{path}:{line}: expected spaces; found a tab: YAML is indented with spaces"
-    is_ended = any(end in problem for end in ENDS)
-    begun = error.context_mark if error.context in UNCLOSED else _innermost_open(text) if is_ended else None
-    sign = "" if begun is None else lines[begun.line][begun.column : begun.column + 1] if begun.line < len(lines) else ""
-    if begun is None or sign not in OPENING:  # characters that the YAML reader does not count as ends of lines
-        context = f" {error.context}" if error.context else ""
-        return f"{path}:{line}: expected YAML; found a mistake{context}: {problem}"
-    kind, where = OPENING[sign], f"{path}:{begun.line + 1}"
-    what = f"the {kind} that begins with {sign} in column {begun.column + 1}"
-    if is_ended or mark is None or sign in "'\"":
-        met = "the end of the file" if is_ended else f"what does not belong there on line {line}"
-        return f"{where}: expected an end of {what}; found {met}: close it"
-    is_name = around[mark.column : mark.column + 1] == ":"  # a name begins before its colon
-    column = around.rfind(" ", 0, mark.column) + 1 if is_name else mark.column
-    met = f"{shown(around[column:].strip())} in column {column + 1} of line {line}"
-    return f"{where}: expected a comma or the end of {what}; found {met}: set a comma before it, or close the {kind} there"
-
-
-def _innermost_open(text: str) -> yaml.Mark | None:
-    """Where the last bracket stands that is not closed; the YAML reader has come to the end of the text."""
-    opened: list[yaml.Mark] = []
-    for token in yaml.scan(text, Loader=_Loader):
-        if isinstance(token, (FlowSequenceStartToken, FlowMappingStartToken)):
-            opened.append(token.start_mark)
-        elif isinstance(token, (FlowSequenceEndToken, FlowMappingEndToken)):
-            opened.pop()
-    return opened[-1] if opened else None
 
 
 class _Reader:

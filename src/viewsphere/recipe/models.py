@@ -13,7 +13,7 @@ from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.keypoints import MOST_POINTS
 from viewsphere.model.looks import Word
-from viewsphere.model.mistakes import nearest, shown
+from viewsphere.model.mistakes import one_of, shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Positive
 from viewsphere.recipe.draws import CountDrawn, Drawn, is_random
@@ -35,9 +35,7 @@ def _unit(value: Any) -> Any:
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if (number and value > 0) or (isinstance(value, str) and value in UNITS):
         return value
-    raise ValueError(
-        f"expected one of {', '.join(UNITS)} or the metres in one unit; found {shown(value)}{nearest(value, UNITS)}"
-    )
+    raise ValueError(f"{one_of(value, tuple(UNITS))}, or the metres in one unit")
 
 
 Unit = Annotated[

@@ -10,7 +10,7 @@ from typing import cast, get_args
 from viewsphere.assets.inspect import ModelReport, describe
 from viewsphere.assets.timeline import Timeline
 from viewsphere.errors import UserError
-from viewsphere.model.mistakes import nearest
+from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import Axis, ModelSpec
 from viewsphere.recipe.models import UNITS, unit_metres
 from viewsphere.zoo import build_zoo_model
@@ -30,7 +30,7 @@ def model_spec(
     """
     for name, axis in (("up", up), ("forward", forward)):
         if axis is not None and axis not in get_args(Axis):
-            raise UserError(f"--{name}: expected one of {', '.join(get_args(Axis))}, found {axis!r}")
+            raise UserError(f"--{name}: {one_of(axis, get_args(Axis))}")
     zoo = source.startswith("zoo:")
     return ModelSpec(
         key=Path(source.replace(":", "-")).stem or "model",
@@ -51,10 +51,7 @@ def _metres(unit: str) -> float:
     except ValueError:
         metres = 0.0
     if not 0 < metres < math.inf:
-        raise UserError(
-            f"--unit: expected one of {', '.join(UNITS)}, or metres in one unit, more than 0; found {unit!r}"
-            f"{nearest(unit, UNITS)}"
-        )
+        raise UserError(f"--unit: {one_of(unit, tuple(UNITS))}, or the metres in one unit, more than 0")
     return metres
 
 

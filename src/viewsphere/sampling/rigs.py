@@ -114,8 +114,8 @@ def _channels(recipe: Recipe, name: str, entry: SensorEntry) -> tuple[str, ...] 
         kept = "rgba" if channel == "rgb" and "rgba" in recipe.channels else channel
         if kept not in recipe.channels:
             raise RecipeError(
-                f"rig.sensors.{name}.channels[{i}]: {one_of(channel, recipe.channels)}: add it to the recipe's channels, of "
-                "which a sensor keeps all or some"
+                f"rig.sensors.{name}.channels[{i}]: {one_of(channel, recipe.channels)}, or add it to the recipe's "
+                "channels: a sensor keeps all or some of them"
             )
         if (wrong := _not_measured(channel, entry)) is not None:
             raise RecipeError(f"rig.sensors.{name}.channels[{i}]: {wrong}: leave it out")

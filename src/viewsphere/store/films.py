@@ -13,6 +13,7 @@ import numpy as np
 from viewsphere.errors import StoreError
 from viewsphere.labels import TAIL
 from viewsphere.model.channel import picture_of
+from viewsphere.model.mistakes import one_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.store.dataset import Dataset
@@ -119,8 +120,8 @@ def film_named(films: Sequence[Film], name: str) -> Film:
     for film in films:
         if film.sequence == name:
             return film
-    known = ", ".join(film.sequence for film in films[:8]) + (", ..." if len(films) > 8 else "")
-    raise StoreError(f"--sequence: expected one of {known}; found {name!r}")
+    known = tuple(film.sequence for film in films)
+    raise StoreError(f"--sequence: {one_of(name, known)}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.labels import channel_labels, is_shown
 from viewsphere.model.channel import PASSES, PICTURES
+from viewsphere.model.mistakes import one_of
 from viewsphere.report import conventions, model_data
 from viewsphere.report.facts import facts
 from viewsphere.report.frames import frame_data
@@ -199,7 +200,7 @@ def _as_json(value: object) -> Answer:
 
 def _one_of(name: str, found: str, known: list[str]) -> None:
     if found not in known:
-        raise UserError(f"{name}: expected one of {', '.join(known) or 'none'}; found {found!r:.100}")
+        raise UserError(f"{name}: {one_of(found, known)}")
 
 
 def _whole(asked: dict[str, str], name: str, default: int | None = None) -> int:

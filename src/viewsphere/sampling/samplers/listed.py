@@ -8,7 +8,7 @@ from pathlib import Path
 
 from viewsphere.errors import RecipeError, each
 from viewsphere.model.listed import ListedObject
-from viewsphere.model.mistakes import nearest
+from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY
@@ -41,9 +41,7 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
         where, split = f"{path}:{shot.line}", shot.said.split
         if split is not None and split not in recipe.splits.shares:
             known = tuple(recipe.splits.shares)
-            raise RecipeError(
-                f"{where}: split: expected one of the recipe's, {', '.join(known)}; found {split!r}{nearest(split, known)}"
-            )
+            raise RecipeError(f"{where}: split: {one_of(split, known)}")
         for i, one in enumerate(shot.said.objects):
             if one.model not in keys:
                 raise RecipeError(
