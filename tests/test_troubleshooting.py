@@ -61,7 +61,7 @@ FILES = {
     "here/away.obj": "mtllib away.mtl\nusemtl a\n" + TRIANGLE,
     "here/lost.mtl": "newmtl a\nmap_Kd wood.png\n",
     "here/away.mtl": "newmtl a\nmap_Kd ../wood.png\n",
-    "here/packed.gltf": json.dumps({"asset": {"version": "2.0"}, "extensionsRequired": ["EXT_meshopt_compression"]}),
+    "here/packed.gltf": json.dumps({"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_gaussian_splatting"]}),
     "here/line.obj": "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
     "photos/annotations/instances_train.json": json.dumps(
         {"images": [], "categories": [{"id": 1, "name": "x"}], "annotations": [{"id": 1, "image_id": 9, "category_id": 1}]}

@@ -28,6 +28,10 @@ SHARPEST = 4096
 IMAGE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "DDS", "PPM")
 
 
+KTX2 = b"\xabKTX 20\xbb\r\n\x1a\n"
+"""The first bytes of a KTX 2 file."""
+
+
 class UnreadableError(Exception):
     """A file named by the model cannot be used; the message says why."""
 
@@ -183,7 +187,7 @@ class ModelFolder:
 
 
 def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[np.uint8]:
-    """Decode a texture to (H, W, 4) uint8; 16-bit channels keep their upper byte.
+    """Decode a texture to (H, W, 4) uint8; 16-bit channels keep their upper byte. Of a KTX 2 file, its largest level.
 
     With `upright` a photograph is rotated by its EXIF orientation, which does not apply to textures. Raises
     UnreadableError, beginning with `where`: no image, a damaged one, or one beyond `limits`.
@@ -191,6 +195,8 @@ def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[n
     from PIL import Image as Pillow
     from PIL import ImageOps, UnidentifiedImageError
 
+    if data.startswith(KTX2):
+        return _ktx2_pixels(data, where)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -207,7 +213,28 @@ def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[n
         raise
     except Exception as error:  # Pillow's decoders raise whatever their format's parser does
         raise UnreadableError(f"{where} cannot be decoded ({str(error)[:80]})") from None
-    raise UnreadableError(
+    raise _too_large(where, found)
+
+
+def _ktx2_pixels(data: bytes, where: str) -> NDArray[np.uint8]:
+    """Pixels of a KTX 2 file that Basis Universal has compressed, by the package opengl_basisu."""
+    from importlib import import_module
+
+    try:
+        basisu = import_module("opengl_basisu")
+    except ImportError:
+        raise UnreadableError(f"{where}: KTX 2 pictures need a package: pip install 'viewsphere[gltf]'") from None
+    try:
+        texture = basisu.open(data)
+        if texture.width * texture.height <= limits.MAX_PICTURE_PIXELS:
+            return np.array(texture.transcode("rgba8").data, np.uint8)
+    except ValueError as error:  # the package's errors are of this kind
+        raise UnreadableError(f"{where} cannot be decoded ({str(error)[:80]})") from None
+    raise _too_large(where, f"{texture.width} x {texture.height}")
+
+
+def _too_large(where: str, found: str) -> UnreadableError:
+    return UnreadableError(
         f"{where}: expected at most {limits.MAX_PICTURE_PIXELS:,} pixels (limit MAX_PICTURE_PIXELS), found {found}"
     )
 

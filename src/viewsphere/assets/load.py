@@ -83,7 +83,7 @@ def load_frames(
     fps: float | None = None,
 ) -> Iterator[tuple[Mesh, FileFacts]]:
     """A model file's meshes at its first frame, then at each of the ascending `frames`; the file is opened once, by Blender
-    unless it is a glTF file that this package reads by itself.
+    unless it is a glTF file.
 
     `clip` names the animation that is played, where the file has several; `fps` is how many frames make a second, None for
     what the file says.
@@ -94,27 +94,14 @@ def load_frames(
     file, inside = split_source(path)
     folder = ModelFolder(file, confined, inside, shown, clip, fps)
     with np.errstate(all="ignore"):
-        yield from _gltf_frames(folder, frames) if suffix in GLTF else _frames_via_blender(folder, frames)
+        if suffix in GLTF:
+            from viewsphere.assets.gltf import read_gltf_frames
 
+            yield from read_gltf_frames(folder, frames)
+        else:
+            from viewsphere.assets.via_blender import read_frames
 
-def _frames_via_blender(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
-    from viewsphere.assets.via_blender import read_frames
-
-    return read_frames(folder, frames)
-
-
-def _gltf_frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
-    """A glTF file's meshes; by Blender where it is compressed in a way that only Blender reads."""
-    from viewsphere.assets.gltf import read_gltf_frames
-    from viewsphere.assets.gltf.document import ForBlenderError
-
-    read = read_gltf_frames(folder.copy(), frames)
-    try:
-        yield next(read)
-    except ForBlenderError:
-        yield from _frames_via_blender(folder, frames)
-        return
-    yield from read
+            yield from read_frames(folder, frames)
 
 
 def check_animated(path: Path) -> str:
@@ -141,7 +128,9 @@ def check_source(path: Path) -> str:
 
 def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, FileFacts]:
     if suffix in GLTF:
-        return _read_gltf(folder, node)
+        from viewsphere.assets.gltf import read_gltf
+
+        return read_gltf(folder, node)
     if suffix in BLENDER_SUFFIXES:
         from viewsphere.assets.via_blender import read_via_blender
 
@@ -157,19 +146,3 @@ def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, Fil
     from viewsphere.assets.via_trimesh import read_via_trimesh
 
     return read_via_trimesh(folder)
-
-
-def _read_gltf(folder: ModelFolder, node: str | None) -> tuple[Mesh, FileFacts]:
-    """A glTF file; by Blender where it is compressed in a way that only Blender reads, and there is one."""
-    from viewsphere.assets.gltf import read_gltf
-    from viewsphere.assets.gltf.document import ForBlenderError
-
-    try:
-        return read_gltf(folder, node)
-    except ForBlenderError as error:
-        from viewsphere.assets.via_blender import read_via_blender
-
-        try:
-            return read_via_blender(ModelFolder(folder.model, folder.confined))
-        except ModelError as second:
-            raise ModelError(f"{error}; {str(second).removeprefix(f'{folder.model}: ')}") from None

@@ -14,15 +14,12 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import HIGHEST_IOR, Image, Material, Texture
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.assets.srgb import linear, srgb_bytes
 
 Float = NDArray[Any]
 Told = Mapping[str, Any]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-FINE = 65_535
-"""Steps of linear light in the table of sRGB values."""
-
 
 WALL = 0.003
 """Metres: the glass of Blender's shaders refracts, however thick it is."""
@@ -247,7 +244,7 @@ class _Work:
             size = max(self._pixels(leaf).shape[0] for leaf in leaves), max(self._pixels(leaf).shape[1] for leaf in leaves)
             pixels = np.empty((*size, 4), np.uint8)
             light = np.clip(self.value(color, size), 0, 1)
-            pixels[..., :3] = _srgb_bytes(light) if is_color else np.rint(light * 255)
+            pixels[..., :3] = srgb_bytes(light) if is_color else np.rint(light * 255)
             pixels[..., 3] = np.rint(np.clip(self.value(alpha, size), 0, 1) * 255)
             return Image(name, pixels)
 
@@ -378,11 +375,6 @@ def _floats(color: Float) -> tuple[float, float, float]:
 
 def _unit(color: Float) -> tuple[float, float, float]:
     return _floats(np.clip(color, 0, 1))
-
-
-def _srgb_bytes(light: Float) -> NDArray[np.uint8]:
-    table = np.rint(encoded(np.arange(FINE + 1) / FINE) * 255).astype(np.uint8)
-    return table[np.rint(light * FINE).astype(np.uint16)]
 
 
 # One function for each kind of expression, on arrays whose last axis is the colour's if any operand is a colour.

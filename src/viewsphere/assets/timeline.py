@@ -13,7 +13,7 @@ from typing import Any
 from viewsphere.assets.cache import kept
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.gltf.animation import timeline
-from viewsphere.assets.gltf.document import Document, ForBlenderError
+from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.load import ANIMATED_SUFFIXES, GLTF, check_animated
 from viewsphere.assets.via_blender import asked, read_named, remember_layers, started
@@ -95,12 +95,9 @@ class Blenders:
     def _of_gltf(
         self, file: Path, confined: bool, clip: str | None, fps: float | None
     ) -> tuple[dict[str, Any], Sequence[Path]]:
-        """The timeline of a glTF file, by Blender where only Blender can read it, and which files say it."""
+        """The timeline of a glTF file, and the files that hold it."""
         folder = ModelFolder(file, confined)
-        try:
-            return timeline(Document.read(folder), clip, fps), tuple(folder.files)
-        except ForBlenderError:
-            return self.told(file, confined, "timeline", {"clip": clip, "fps": fps}), [file]
+        return timeline(Document.read(folder), clip, fps), tuple(folder.files)
 
     def _asked(self, folder: ModelFolder, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
         place = folder.model.parent.resolve(), folder.confined
@@ -135,7 +132,4 @@ def _may_move(folder: ModelFolder) -> bool:
     kind = folder.model.suffix[1:].lower()
     if kind not in GLTF:
         return kind in ANIMATED_SUFFIXES
-    try:
-        return bool(list(Document.read(folder).root.items("animations")))
-    except ForBlenderError:
-        return True
+    return bool(list(Document.read(folder).root.items("animations")))

@@ -1,4 +1,4 @@
-"""FBX, USD, Alembic and .blend files, and compressed glTF: Blender opens and evaluates them, in its own process.
+"""FBX, USD, Alembic and .blend files: Blender opens and evaluates them, in its own process.
 
 Blender reads only the model's folder unless the model says `confined: false`, writes nowhere, runs no scripts and reaches no
 network. Textures are read here, like any other model's.
@@ -16,7 +16,6 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewsphere.assets import endings
 from viewsphere.assets.alpha import SOLID, with_alpha_modes
@@ -31,7 +30,6 @@ from viewsphere.assets.transform import moved
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
-from viewsphere.geometry.rotation import transform
 from viewsphere.limits import limits
 from viewsphere.model.keypoints import Keypoints
 
@@ -40,15 +38,12 @@ NAMES = {
     "blend": "Blender",
     "fbx": "FBX",
     **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "USD"),
-    **dict.fromkeys(("glb", "gltf"), "compressed glTF"),
+    **dict.fromkeys(("glb", "gltf"), "glTF"),
 }
 SETUP = "set it up by viewsphere doctor --setup-blender"
 
 OPENED = re.compile(r"SdfLayer::FindOrOpen\('([^']+)'")
 UNOPENED = re.compile(r"Could not open asset @([^@]+)@")
-
-
-GLTF_FROM_BLENDER = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def read_via_blender(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
@@ -61,19 +56,12 @@ def read_via_blender(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
 
 
 def read_frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
-    """The file as it would be rendered at its first frame, then at each of the ascending `frames`; opened once.
-
-    Axes are those of `read_via_blender`, but glTF files keep their own (up +Y, front +Z).
-    """
-    kind = folder.model.suffix[1:].lower()
-    for mesh, facts in _read(folder, [None, *frames], GLTF_FROM_BLENDER if kind in ("glb", "gltf") else None):
-        yield mesh, facts if kind not in ("glb", "gltf") else replace(facts, up="+y", forward="+z")
+    """The file as `read_via_blender` reads it, then as rendered at each of the ascending `frames`; opened once."""
+    return _read(folder, [None, *frames])
 
 
-def _read(
-    folder: ModelFolder, frames: Sequence[int | None], turn: NDArray[np.float64] | None = None
-) -> Iterator[tuple[Mesh, FileFacts]]:
-    """The file's mesh at each of the frames, rotated to the expected axes."""
+def _read(folder: ModelFolder, frames: Sequence[int | None]) -> Iterator[tuple[Mesh, FileFacts]]:
+    """The file's mesh at each of the frames."""
     kind = folder.model.suffix[1:].lower()
     _check_beginning(folder, kind, read_named(folder))
     with started(folder) as process:
@@ -92,7 +80,7 @@ def _read(
             at_frame = folder.copy()
             for warning in told["warnings"]:
                 at_frame.warn(warning)
-            yield _built(at_frame, told, FileFacts(folder.model, kind, "+z", "-y", unit), turn)
+            yield _built(at_frame, told, FileFacts(folder.model, kind, "+z", "-y", unit))
             for file in process.folder.glob("piece*.npy"):
                 file.unlink()
 
@@ -200,9 +188,7 @@ def _may_read(folder: ModelFolder, path: Path) -> bool:
     return not folder.confined or path.resolve().is_relative_to(folder.model.parent.resolve())
 
 
-def _built(
-    folder: ModelFolder, told: Mapping[str, Any], facts: FileFacts, turn: NDArray[np.float64] | None
-) -> tuple[Mesh, FileFacts]:
+def _built(folder: ModelFolder, told: Mapping[str, Any], facts: FileFacts) -> tuple[Mesh, FileFacts]:
     for file in told["files"]:
         _remember(folder, Path(file))
     used = {one["material"] for one in told["pieces"]} - {None}
@@ -219,32 +205,28 @@ def _built(
             materials.append(material)
         local.append(_piece(one, materials.index(material)))
     pieces = [
-        replace(moved(local[number], matrix if turn is None else turn @ matrix), part=placed["part"])
+        replace(moved(local[number], np.array(placed["matrix"])), part=placed["part"])
         for placed in told["placed"]
-        for matrix in (np.array(placed["matrix"]),)
         for number in placed["pieces"]
     ]
     if not pieces:
         why = f" ({folder.warnings[0].partition(': ')[2]})" if folder.warnings else ""
         raise folder.error(f"no triangles found that a render would show{why}; export the model as a mesh of faces")
-    facts = replace(facts, keypoints=_points(folder, told["points"], turn), marks=_marks(told["marks"], turn))
+    facts = replace(facts, keypoints=_points(folder, told["points"]), marks=_marks(told["marks"]))
     return assemble(folder, pieces, _with_modes(pieces, materials, folder.images), facts)
 
 
-def _points(folder: ModelFolder, told: Sequence[Mapping[str, Any]], turn: NDArray[np.float64] | None) -> Keypoints | None:
+def _points(folder: ModelFolder, told: Sequence[Mapping[str, Any]]) -> Keypoints | None:
     """The points that the file names, in the axes of its mesh."""
-
-    def place(one: Mapping[str, Any]) -> Float:
-        return np.array(one["place"], np.float64) if turn is None else transform(turn, one["place"])
-
-    return named_points(folder, {i: NamedPoint(one["name"], place(one), one["above"]) for i, one in enumerate(told)})
+    named = {i: NamedPoint(one["name"], np.array(one["place"], np.float64), one["above"]) for i, one in enumerate(told)}
+    return named_points(folder, named)
 
 
-def _marks(told: Sequence[Mapping[str, Any]], turn: NDArray[np.float64] | None) -> tuple[Mark, ...]:
+def _marks(told: Sequence[Mapping[str, Any]]) -> tuple[Mark, ...]:
     """The marks that the file's objects are, in the axes of its mesh."""
 
     def place(point: Sequence[float]) -> Point:
-        x, y, z = (transform(np.eye(4) if turn is None else turn, np.array(point, np.float64))).tolist()
+        x, y, z = map(float, point)
         return x, y, z
 
     markers = (

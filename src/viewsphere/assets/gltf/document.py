@@ -12,8 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder, UnreadableError
+from viewsphere.assets.gltf.compression import (
+    BASISU,
+    DRACO,
+    MESHOPT,
+    is_readable,
+    lacking,
+    meshopt_of,
+    unpacked_primitive,
+    unpacked_view,
+)
 from viewsphere.assets.gltf.field import Field
-from viewsphere.errors import ModelError
 
 COMPONENTS: dict[int, type[np.generic]] = {
     5120: np.int8,
@@ -26,6 +35,9 @@ COMPONENTS: dict[int, type[np.generic]] = {
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 READ_EXTENSIONS = {
+    BASISU,
+    DRACO,
+    *MESHOPT,
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_materials_clearcoat",
@@ -37,7 +49,9 @@ READ_EXTENSIONS = {
     "KHR_materials_unlit",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
+    "MSFT_texture_dds",
 }
 HARMLESS_EXTENSIONS = {
     "KHR_animation_pointer",
@@ -52,14 +66,6 @@ HARMLESS_EXTENSIONS = {
 }
 """Extensions that change neither the geometry nor what this package keeps of a material."""
 
-DRACO = "KHR_draco_mesh_compression"
-BLENDER_EXTENSIONS = {DRACO}
-"""Extensions that this reader lacks and Blender has."""
-
-
-class ForBlenderError(ModelError):
-    """This reader cannot read the file, but Blender may."""
-
 
 @dataclass(eq=False)
 class Document:
@@ -69,6 +75,8 @@ class Document:
     root: Field
     binary: bytes | None
     _buffers: dict[int, bytes] = field(default_factory=dict[int, bytes])
+    _views: dict[int, bytes] = field(default_factory=dict[int, bytes])
+    _elements: dict[int, NDArray[Any]] = field(default_factory=dict[int, "NDArray[Any]"])
 
     @classmethod
     def read(cls, folder: ModelFolder) -> Document:
@@ -93,8 +101,7 @@ class Document:
         required = {str(extension.value) for extension in self.root.items("extensionsRequired")}
         unknown = sorted(required - READ_EXTENSIONS - HARMLESS_EXTENSIONS)
         if unknown:
-            said = f"{self.folder.model}: requires the extension {', '.join(unknown)}, not read here; export without it"
-            raise (ForBlenderError if BLENDER_EXTENSIONS.issuperset(unknown) else ModelError)(said)
+            raise self.folder.error(f"requires the extension {', '.join(unknown)}, not read here; export without it")
 
     def buffer(self, index: int) -> bytes:
         """Bytes of a buffer; ModelError when it is missing or shorter than it says."""
@@ -120,16 +127,43 @@ class Document:
             raise self.folder.error(f"{entry.where.rpartition('.')[2]}: {error}") from None
 
     def view(self, index: int) -> tuple[memoryview, int | None]:
-        """Bytes of a bufferView and its stride."""
+        """Plain bytes of a bufferView and its stride."""
         entry = self.root.at("bufferViews", index)
-        if entry.extension("EXT_meshopt_compression") is not None:
-            raise self.folder.error("uses EXT_meshopt_compression, not read here; export without compression")
+        stride = entry.integer("byteStride", 0) or None
+        packed = meshopt_of(entry)
+        if packed is None or (not is_readable(packed[0]) and self._has_plain_copy(entry)):
+            return self.slice(entry), stride
+        if index not in self._views:
+            self._views[index] = unpacked_view(self, *packed)
+        return memoryview(self._views[index]), stride
+
+    def _has_plain_copy(self, entry: Field) -> bool:
+        """Whether the buffer of a compressed bufferView holds the plain data, too."""
+        index = entry.integer("buffer")
+        return "uri" in self.root.at("buffers", index) or (index == 0 and self.binary is not None)
+
+    def slice(self, entry: Field) -> memoryview:
+        """The bytes of a buffer that an entry names by `buffer`, `byteOffset` and `byteLength`."""
         offset, length = entry.integer("byteOffset", 0), entry.integer("byteLength")
         data = self.buffer(entry.integer("buffer"))
         if offset + length > len(data):
-            raise self.folder.error(f"bufferViews[{index}]: expected bytes up to {offset + length}, the buffer has {len(data)}")
-        stride = entry.integer("byteStride", 0) or None
-        return memoryview(data)[offset : offset + length], stride
+            place = entry.where.rpartition(": ")[2]
+            raise self.folder.error(f"{place}: expected bytes up to {offset + length}, the buffer has {len(data)}")
+        return memoryview(data)[offset : offset + length]
+
+    def unpack(self, primitive: Field) -> bool:
+        """Decode a primitive's Draco data, from which `accessor` then serves its elements; False for plain data."""
+        packed = primitive.extension(DRACO)
+        if packed is None:
+            return False
+        if is_readable(DRACO):
+            position = primitive.get("attributes").integer("POSITION")
+            if position not in self._elements:
+                self._elements |= unpacked_primitive(self, primitive, packed)
+            return True
+        if DRACO in {entry.value for entry in self.root.items("extensionsRequired")}:
+            raise lacking(self.folder, DRACO)
+        return False
 
     def accessor(self, index: int, widths: tuple[int, ...]) -> NDArray[Any]:
         """Elements (count, width): normalised integers as float64 in [-1, 1], others in their own dtype."""
@@ -139,7 +173,7 @@ class Document:
         if width not in widths or code not in COMPONENTS:
             raise entry.fail(f"components {sorted(COMPONENTS)} and {' or '.join(map(str, widths))} of them")
         dtype = np.dtype(COMPONENTS[code]).newbyteorder("<")
-        values = self._dense(entry, dtype, width, kind)
+        values = self._dense(entry, dtype, width, kind) if index not in self._elements else self._decoded(index, dtype, width)
         sparse = entry.get("sparse")
         if "count" in sparse:
             values = self._patched(sparse, values)
@@ -147,6 +181,12 @@ class Document:
             greatest = 2 ** (8 * dtype.itemsize - (dtype.kind == "i")) - 1
             return np.maximum(values / greatest, -1.0)
         return values
+
+    def _decoded(self, index: int, dtype: np.dtype[Any], width: int) -> NDArray[Any]:
+        elements = self._elements[index]
+        if elements.shape[1] != width:
+            raise self.folder.error(f"accessors[{index}]: expected {width} components, Draco's data has {elements.shape[1]}")
+        return elements.astype(dtype)
 
     def _dense(self, entry: Field, dtype: np.dtype[Any], width: int, kind: str) -> NDArray[Any]:
         count = entry.integer("count")

@@ -7,15 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 from urllib.parse import unquote
 
-import numpy as np
-
+from viewsphere.assets.gltf.compression import BASISU, is_readable, lacking
 from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.field import Field
+from viewsphere.assets.gltf.specular_glossiness import SpecularGlossiness, as_metallic_roughness
 from viewsphere.assets.mesh import HIGHEST_IOR, Material, Texture, Wrap
 
 WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 NEAREST = 9728
-DIELECTRIC = 0.04  # reflectance at normal incidence of ior 1.5
+IMAGE_EXTENSIONS = ("EXT_texture_webp", "MSFT_texture_dds")
+"""Extensions of textures that name an image of a kind that Pillow decodes."""
 
 
 def read_materials(document: Document, used: Collection[int]) -> list[Material]:
@@ -96,26 +97,20 @@ class _Reader:
         return found
 
     def _specular_glossiness(self, entry: Field, material: Material) -> Material:
-        """KHR_materials_pbrSpecularGlossiness as metallic-roughness; the specular-glossiness texture is dropped."""
+        """The material, or its replacement by KHR_materials_pbrSpecularGlossiness."""
         old = entry.extension("KHR_materials_pbrSpecularGlossiness")
         if old is None:
             return material
-        diffuse = old.numbers("diffuseFactor", 4, (1.0, 1.0, 1.0, 1.0))
-        specular = old.numbers("specularFactor", 3, (1.0, 1.0, 1.0))
-        diffuse_texture = self.texture(old, "diffuseTexture")
-        if "specularGlossinessTexture" in old:
-            self.document.folder.warn(f"material {material.name!r}: specularGlossinessTexture is not read")
-            metallic, color = 0.0, diffuse[:3]
-        else:
-            metallic, color = _metallic(diffuse[:3], specular)
-        return replace(
-            material,
-            base_color=(color[0], color[1], color[2], diffuse[3]),
-            base_color_texture=diffuse_texture,
-            metallic=metallic,
-            roughness=1.0 - old.number("glossinessFactor", 1.0),
-            metallic_roughness_texture=None,
+        red, green, blue, alpha = old.numbers("diffuseFactor", 4, (1.0, 1.0, 1.0, 1.0))
+        look = SpecularGlossiness(
+            diffuse=(red, green, blue),
+            alpha=alpha,
+            diffuse_texture=self.texture(old, "diffuseTexture"),
+            specular=old.numbers("specularFactor", 3, (1.0, 1.0, 1.0)),
+            glossiness=old.number("glossinessFactor", 1.0),
+            texture=self.texture(old, "specularGlossinessTexture"),
         )
+        return as_metallic_roughness(self.document.folder, material, look)
 
     def texture(self, parent: Field, key: str) -> Texture | None:
         """The textureInfo under `key`, None when there is none or its image cannot be used."""
@@ -146,12 +141,11 @@ class _Reader:
 
     def _image(self, texture: Field) -> int | None:
         folder = self.document.folder
-        webp = texture.extension("EXT_texture_webp")
-        if "source" not in texture and webp is None:
+        index = self._source(texture)
+        if index is None:
             other = ", ".join(texture.get("extensions").mapping()) or "no source"
             folder.warn(f"a texture with {other} is not read; the material's plain factor is used")
             return None
-        index = texture.integer("source") if webp is None else webp.integer("source")
         entry = self.document.root.at("images", index)
         name = entry.text("name") or f"image{index}"
         if "bufferView" in entry:
@@ -162,20 +156,17 @@ class _Reader:
             return folder.image(uri, name)
         return folder.image(unquote(uri), entry.text("name") or unquote(uri))
 
-
-def _metallic(diffuse: tuple[float, ...], specular: tuple[float, ...]) -> tuple[float, tuple[float, ...]]:
-    """Metallic factor and base colour with the same diffuse and specular brightness."""
-    weights = np.array([0.299, 0.587, 0.114])
-    d, s = (float(np.sqrt((weights * np.square(c)).sum())) for c in (diffuse, specular))
-    strength = 1.0 - max(specular)
-    if s < DIELECTRIC:
-        metallic = 0.0
-    else:
-        b = d * strength / (1 - DIELECTRIC) + s - 2 * DIELECTRIC
-        c = DIELECTRIC - s
-        metallic = float(np.clip((-b + np.sqrt(max(b * b - 4 * DIELECTRIC * c, 0.0))) / (2 * DIELECTRIC), 0.0, 1.0))
-    tiny = 1e-6
-    from_diffuse = np.array(diffuse) * strength / (1 - DIELECTRIC) / max(1 - metallic, tiny)
-    from_specular = (np.array(specular) - DIELECTRIC * (1 - metallic)) / max(metallic, tiny)
-    mixed = from_diffuse + (from_specular - from_diffuse) * metallic**2
-    return metallic, tuple(float(x) for x in np.clip(mixed, 0.0, 1.0))
+    def _source(self, texture: Field) -> int | None:
+        """Index of the texture's image; of several the first that can be decoded here."""
+        basisu = texture.extension(BASISU)
+        if basisu is not None and is_readable(BASISU):
+            return basisu.integer("source")
+        for name in IMAGE_EXTENSIONS:
+            extension = texture.extension(name)
+            if extension is not None:
+                return extension.integer("source")
+        if "source" in texture:
+            return texture.integer("source")
+        if basisu is not None:
+            raise lacking(self.document.folder, BASISU)
+        return None

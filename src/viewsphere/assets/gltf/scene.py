@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from viewsphere.assets.gltf.animation import Posed
-from viewsphere.assets.gltf.document import DRACO, Document, ForBlenderError
+from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.field import Field
 from viewsphere.assets.gltf.marks import is_line
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
@@ -49,18 +49,32 @@ def read_pieces(document: Document, worlds: Mapping[int, Float], now: Posed = Ma
         document.folder.check("MAX_TRIANGLES", total, "triangles, all instances counted,")
         placed = (replace(moved(piece, matrix), part=part) for matrix in matrices for piece in local)
         pieces.extend(piece if piece.normals is not None else flat(piece) for piece in placed)
+    if not pieces and any("mesh" in document.root.at("nodes", index) for index in _hidden(document, worlds)):
+        raise document.folder.error("all of its meshes are hidden (KHR_node_visibility); show some, and export it again")
     return pieces
 
 
 def part_names(document: Document, worlds: Mapping[int, Float]) -> dict[int, str]:
-    """The name of each node's part of the mesh, by the node's number; none for nodes that draw nothing."""
+    """The name of each node's part of the mesh, by the node's number; none for nodes that draw nothing or are hidden."""
     names, taken = dict[int, str](), dict[str, int]()
+    hidden = _hidden(document, worlds)
     for index, world in worlds.items():
         node = document.root.at("nodes", index)
-        if "mesh" in node and world[:3, :3].any() and not is_line(document, node):
+        if "mesh" in node and index not in hidden and world[:3, :3].any() and not is_line(document, node):
             entry = document.root.at("meshes", node.integer("mesh"))
             names[index] = _unused(node.text("name") or entry.text("name") or f"node{index}", taken)
     return names
+
+
+def _hidden(document: Document, worlds: Mapping[int, Float]) -> set[int]:
+    """The nodes that KHR_node_visibility hides, and all below them; `worlds` lists parents first."""
+    hidden = set[int]()
+    for index in worlds:
+        node = document.root.at("nodes", index)
+        visibility = node.extension("KHR_node_visibility")
+        if index in hidden or not (visibility is None or visibility.boolean("visible", True)):
+            hidden |= {index, *_indices(node, "children")}
+    return hidden
 
 
 def _unused(name: str, taken: dict[str, int]) -> str:
@@ -253,10 +267,10 @@ def _primitive(document: Document, entry: Field) -> Primitive | None:
         document.folder.warn("points and lines are left out")
         return None
     if "POSITION" not in attributes:
-        if entry.extension(DRACO) is not None:
-            raise ForBlenderError(f"{document.folder.model}: uses {DRACO}, not read here; export without compression")
         document.folder.warn("a primitive without positions is left out")
         return None
+    if document.unpack(entry):
+        mode = TRIANGLES  # Draco stores strips as triangles
     positions = _attribute(document, attributes, "POSITION", (3,), None)
     assert positions is not None
     count = len(positions)
