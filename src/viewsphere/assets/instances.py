@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from viewsphere.assets.folder import ModelFolder
 from viewsphere.limits import limits
 
 ENOUGH = 10**12
@@ -41,6 +42,15 @@ def count_instances(references: Mapping[str, Sequence[str]], root: str) -> tuple
                     return None, 0
                 stack.append((other, False))
     return counts[root], depths[root]
+
+
+def check_instances(folder: ModelFolder, references: Mapping[str, Sequence[str]]) -> None:
+    """Raise ModelError for objects that are part of themselves, nested too deeply, or too many."""
+    count, depth = count_instances(references, "")
+    if count is None:
+        raise folder.error("an object is part of itself: expected a tree, found a cycle")
+    folder.check("MAX_NESTING", depth, "objects within one another")
+    folder.check("MAX_INSTANCES", count, "instances")
 
 
 def dae_references(data: bytes) -> dict[str, list[str]]:

@@ -143,6 +143,10 @@ def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, Fil
         from viewsphere.assets.picture import read_picture
 
         return read_picture(folder)
+    if suffix == "dae":
+        from viewsphere.assets.readers.dae import read_dae
+
+        return read_dae(folder)
     from viewsphere.assets.via_trimesh import read_via_trimesh
 
     return read_via_trimesh(folder)

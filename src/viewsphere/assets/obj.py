@@ -14,7 +14,7 @@ from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import ModelFolder, UnreadableError
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.mtl import read_materials
-from viewsphere.assets.polygon import triangulate
+from viewsphere.assets.polygon_proof import cut_polygons
 from viewsphere.assets.primitive import FileFacts, Float, Int, Primitive, assemble, compact
 from viewsphere.assets.smoothing import creased
 from viewsphere.assets.srgb import linear
@@ -130,7 +130,7 @@ def _whole(folder: ModelFolder, source: _Source) -> tuple[Primitive, Int]:
     corners = np.array([table.setdefault(token, len(table)) for token in source.corners])
     indices = _corner_indices(folder, list(table), (len(positions), len(uv), len(vectors)))
     at, uv_at, normal_at = indices.T
-    cut, owner = triangulate(positions[at], corners, np.array(source.counts))
+    cut, owner = cut_polygons(folder, positions[at], corners, np.array(source.counts))
     whole = Primitive(
         part="",
         material=0,

@@ -41,7 +41,7 @@ def triangulate(positions: Float, corners: Int, counts: Int) -> tuple[Int, Int]:
         triangles[at], triangles[at + 1] = other[2 * better], other[2 * better + 1]
     for polygon in folded[counts[folded] > 4]:
         start, count = int(starts[polygon]), int(counts[polygon])
-        flat = _flattened(points[start : start + count], normals[polygon])
+        flat = flattened(points[start : start + count], normals[polygon])
         if flat is not None:
             triangles[first[polygon] : first[polygon] + count - 2] = start + _ears(flat)
     return triangles, owner
@@ -56,7 +56,7 @@ def _lean(points: Float, triangles: Int, owner: Int, first: Int) -> tuple[Float,
     return np.minimum.reduceat(np.nan_to_num(along), first), normals
 
 
-def _flattened(points: Float, normal: Float) -> Float | None:
+def flattened(points: Float, normal: Float) -> Float | None:
     """The polygon's points (n, 2) in its own plane, counter-clockwise; None if the polygon has no area."""
     # Neither @ nor the norm of one vector: BLAS, which rounds by processor, does both.
     (z,) = unit(normal[None])

@@ -91,11 +91,11 @@ def _welded(piece: Primitive, vertex: Int) -> Primitive:
     """Join corners that came from the same vertex and have the same normal."""
     assert piece.normals is not None
     bits = np.ascontiguousarray(piece.normals.astype(np.float32)).view(np.int32)
-    _, first, inverse = np.unique(_row_numbers(vertex, *bits.T), return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(row_numbers(vertex, *bits.T), return_index=True, return_inverse=True)
     return replace(pick(piece, first), triangles=inverse.reshape(-1, 3))
 
 
-def _row_numbers(*columns: NDArray[Any]) -> Int:
+def row_numbers(*columns: NDArray[Any]) -> Int:
     """One number a row, equal for equal rows: much faster than numpy's unique along an axis."""
     number = np.zeros(len(columns[0]), np.int64)
     for column in columns:
@@ -107,4 +107,4 @@ def _row_numbers(*columns: NDArray[Any]) -> Int:
 
 def _same_points(positions: Float) -> Int:
     """One number a vertex, equal for equal positions, (V,) int64."""
-    return _row_numbers(*positions.T)
+    return row_numbers(*positions.T)

@@ -9,7 +9,7 @@ import io
 import re
 import warnings
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import ModelFolder, image_pixels
-from viewsphere.assets.instances import count_instances, dae_references, threemf_references
+from viewsphere.assets.instances import check_instances, threemf_references
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
 from viewsphere.assets.smoothing import creased, split
@@ -32,11 +32,6 @@ UNITS = {
 }  # fmt: skip
 """Units of 3MF, metres."""
 
-COLLADA_AXES: dict[str, tuple[Axis, Axis]] = {
-    "X_UP": ("+x", "+z"),
-    "Y_UP": ("+y", "+z"),
-    "Z_UP": ("+z", "-y"),
-}
 STL_HEADER, STL_TRIANGLE = 84, 50
 Rgba = tuple[float, float, float, float]
 
@@ -85,9 +80,7 @@ def _check_promises(folder: ModelFolder, kind: str, data: bytes) -> None:
     if any(count > len(data) for count in counts):
         raise folder.error(f"promises {max(counts):,} elements in {len(data):,} bytes: truncated or damaged")
     try:
-        if kind == "dae":
-            _check_instances(folder, dae_references(data))
-        elif kind == "3mf":
+        if kind == "3mf":
             _check_archive(folder, data)
     except (ModelError, MemoryError):
         raise
@@ -99,20 +92,12 @@ def _check_archive(folder: ModelFolder, data: bytes) -> None:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         size = sum(entry.file_size for entry in archive.infolist())
         folder.check("MAX_ARCHIVE_BYTES", size, "bytes in the unpacked archive")
-        _check_instances(folder, threemf_references(archive))
+        check_instances(folder, threemf_references(archive))
 
 
 def _unreadable(folder: ModelFolder, kind: str, error: Exception) -> ModelError:
     reason = str(error).split("\n")[0][:120]
     return folder.error(f"cannot be read as {kind.upper()} ({type(error).__name__}: {reason}): damaged?")
-
-
-def _check_instances(folder: ModelFolder, references: Mapping[str, Sequence[str]]) -> None:
-    count, depth = count_instances(references, "")
-    if count is None:
-        raise folder.error("an object is part of itself: expected a tree, found a cycle")
-    folder.check("MAX_NESTING", depth, "objects within one another")
-    folder.check("MAX_INSTANCES", count, "instances")
 
 
 def _parse(folder: ModelFolder, kind: str, data: bytes) -> dict[str, Any]:
@@ -266,20 +251,7 @@ def _facts(folder: ModelFolder, kind: str, data: bytes, loaded: Mapping[str, Any
     up: Axis = "+z"
     forward: Axis = "-y"
     unit = 1.0
-    if kind == "dae":
-        axis = re.search(rb"<up_axis>\s*([XYZ]_UP)\s*</up_axis>", data)
-        up, forward = COLLADA_AXES[axis[1].decode() if axis else "Y_UP"]
-        metre = re.search(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([0-9.eE+-]+)[\"']", data)
-        unit = _positive(metre[1].decode()) if metre else 1.0
-    elif kind == "3mf":
+    if kind == "3mf":
         name = str(loaded.get("metadata", {}).get("units", "millimeter")).rstrip("s")
         unit = UNITS.get(name, UNITS["millimeter"])
     return FileFacts(folder.model, kind, up, forward, unit)
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        return 1.0
-    return value if np.isfinite(value) and value > 0 else 1.0
