@@ -12,7 +12,7 @@ from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
 from viewsphere.check import check
-from viewsphere.errors import RecipeError, StoreError, UserError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.formats.pointcloud import Options, verify
 from viewsphere.geometry.camera import project
 from viewsphere.model.camera import Distortion
@@ -129,14 +129,6 @@ def test_complete_surface(tmp_path):
         np.testing.assert_array_equal(rows["visible"].reshape(-1), sample.surface_samples["state"] == 0)
         assert 0 < rows["visible"].sum() < 200
     assert check(made, rays=False).ok
-
-
-def test_channels_that_it_needs_are_asked_for_before_anything_is_rendered(tmp_path):
-    with pytest.raises(RecipeError, match=r"^channels: expected depth, which format pointcloud needs; found rgb"):
-        generate(small_recipe(channels=["rgb", "instances"], formats=["pointcloud"]), tmp_path, workers=0)
-    complete = [{"pointcloud": {"surface": "complete"}}]
-    with pytest.raises(RecipeError, match=r"^channels: expected surface_samples, which format pointcloud needs; found rgb"):
-        generate(small_recipe(channels=["rgb", "depth", "instances"], formats=complete), tmp_path, workers=0)
 
 
 def test_complete_clouds_of_a_data_set_without_their_points(dataset, tmp_path):

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import Format
-from viewsphere.labels import Needs, Sight, annotated, channel_labels, labels, on_request, sample_values
+from viewsphere.labels import Sight, annotated, channel_labels, labels, on_request, sample_values
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.scenery import Scenery
-from viewsphere.run.scope import needs_of
+from viewsphere.run.scope import is_computed, needs_of
 from viewsphere.run.sights import Sights
 from viewsphere.store import Choice, Dataset, Exported
 
@@ -47,8 +47,7 @@ def lacking(dataset: Dataset, module: Format, entry: FormatEntry) -> tuple[str, 
             "channels, and render with --append"
         )
     for name in names:
-        needs = labels()[name].needs if name in labels() else Needs()
-        if needs.tracks or needs.lidar or needs.looks:
+        if name not in PASSES and not is_computed(name):
             raise UserError(f"{where}: expected label {name}, found none: add it to the recipe, and render")
     if unknown and any(shots):
         raise UserError(f"{where}: expected label {next(iter(unknown))} of all pictures; found imported ones that lack it")

@@ -7,14 +7,15 @@ from contextlib import suppress
 from importlib.metadata import version
 
 from viewsphere.errors import RecipeError, StoreError, UserError
-from viewsphere.formats import Format, Scope
+from viewsphere.formats import Format
 from viewsphere.labels import on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.rig import Sensor
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import writable
-from viewsphere.run.scope import needs_of, not_held, scope_of_plan
+from viewsphere.run.scope import is_computed, needs_of, not_held, scope_of_plan
+from viewsphere.sampling.checks import check_needs
 from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.sampling.extension import Portion, extend, resumed, whole
 from viewsphere.sampling.fitting import LOOK
@@ -35,8 +36,10 @@ def prepare(recipe: Recipe) -> Plan:
 
 
 def check_formats(planned: Plan, wanted: Iterable[FormatEntry], channels: Sequence[str]) -> None:
-    """Raises UserError for a format that is not known, does not work here, cannot hold what is planned, or needs a label that
-    is not asked for: one of the channels which a sensor does not keep, or one on request.
+    """See that each format can be written, by the rule of `export`; labels that follow from the shots need not be recorded.
+
+    Raises UserError for a format that is unknown, does not work here, or cannot hold the plan, and for one that needs a
+    channel which no shot gives: a pass that an engine paints, point tracks, a LiDAR's points, or neighbouring frames.
     """
     scope = scope_of_plan(planned, channels)
     with planned.recipe.located():
@@ -45,32 +48,31 @@ def check_formats(planned: Plan, wanted: Iterable[FormatEntry], channels: Sequen
             for problem in not_held(module, entry, scope):
                 raise UserError(f"formats: format {entry.name}: {problem}")
             for sensor in planned.rig.sensors:
-                _check_channels(entry, module, channels, sensor)
-            _check_annotations(entry, module, scope)
+                _check_labels(entry, module, planned.recipe, channels, sensor)
 
 
-def _check_annotations(entry: FormatEntry, module: Format, scope: Scope) -> None:
-    lacking = [name for name in needs_of(module, entry) if name in on_request() and name not in scope.annotations]
-    if lacking:
-        found = ", ".join(scope.annotations) or "none"
-        raise RecipeError(
-            f"annotations: expected {lacking[0]}, which format {entry.name} needs; found {found}: add it, or leave "
-            f"{entry.name} out of formats"
-        )
-
-
-def _check_channels(entry: FormatEntry, module: Format, channels: Sequence[str], sensor: Sensor) -> None:
+def _check_labels(entry: FormatEntry, module: Format, recipe: Recipe, channels: Sequence[str], sensor: Sensor) -> None:
     if sensor.lidar is not None and getattr(module, "LIDAR", False):
         return
     kept = sensor.kept(tuple(channels))
-    lacking = missing([name for name in needs_of(module, entry) if name not in on_request()], kept)
-    if lacking:
-        where = f"rig.sensors.{sensor.name}.channels" if sensor.channels or sensor.lidar else "channels"
-        remedy = "" if sensor.lidar and lacking[0] in PASSES else "add it, or "
-        raise RecipeError(
-            f"{where}: expected {lacking[0]}, which format {entry.name} needs; found {', '.join(kept)}: "
-            f"{remedy}leave {entry.name} out of formats"
-        )
+    lacking = missing(needs_of(module, entry), {*kept, *recipe.annotations})
+    absent = [name for name in lacking if not is_computed(name) or (sensor.lidar is not None and name in PASSES)]
+    if absent:
+        raise RecipeError(_absent(entry, absent[0], kept, recipe, sensor))
+    for name in lacking:
+        check_needs(recipe, f"formats: format {entry.name}", name)
+
+
+def _absent(entry: FormatEntry, name: str, kept: Sequence[str], recipe: Recipe, sensor: Sensor) -> str:
+    """The message of a label that a format needs, and that has to be recorded."""
+    where, found = ("annotations", recipe.annotations) if name in on_request() else ("channels", kept)
+    if where == "channels" and (sensor.channels or sensor.lidar):
+        where = f"rig.sensors.{sensor.name}.channels"
+    remedy = "" if sensor.lidar and name in PASSES else "add it, or "
+    return (
+        f"{where}: expected {name}, which format {entry.name} needs; found {', '.join(found) or 'none'}: "
+        f"{remedy}leave {entry.name} out of formats"
+    )
 
 
 def to_render(planned: Plan, store: Store) -> Portion:

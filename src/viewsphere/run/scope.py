@@ -10,7 +10,7 @@ from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Format, Scope
 from viewsphere.formats._refusals import lacking_labels
-from viewsphere.labels import channel_labels, on_request
+from viewsphere.labels import Needs, channel_labels, labels, on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
@@ -89,6 +89,14 @@ def needs_of(module: Format, entry: FormatEntry) -> tuple[str, ...]:
     more: Callable[..., Sequence[str]] | None = getattr(module, "needs", None)
     always: Sequence[str] = getattr(module, "CHANNELS", ())
     return tuple(dict.fromkeys((*always, *(more(*entry.arguments()) if more else ()))))
+
+
+def is_computed(name: str) -> bool:
+    """Whether a label follows from shots and models, so that formats need no recording of it; a pass, which is painted, does
+    not, and neither do point tracks, a LiDAR's points and looks that were drawn.
+    """
+    needs = labels()[name].needs if name in labels() else Needs()
+    return name not in PASSES and not (needs.tracks or needs.lidar or needs.looks)
 
 
 def refuse(entries: Sequence[FormatEntry], scope: Scope, where: object) -> None:

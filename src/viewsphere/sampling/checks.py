@@ -89,7 +89,7 @@ def check_names(recipe: Recipe) -> None:
             raise RecipeError(f"channels[{i}]: expected a channel; found {name}, which is one of annotations")
         if name not in channels():
             raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
-        _check_needs(recipe, f"channels[{i}]", name)
+        check_needs(recipe, f"channels[{i}]", name)
         _check_painted(recipe, f"channels[{i}]", name)
     for i, name in enumerate(recipe.annotations):
         _check_annotation(recipe, f"annotations[{i}]", name)
@@ -107,7 +107,7 @@ def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
         of = [label.name for label in on_request().values() if name in {field.name for field in label.fields}]
         known = f"expected a label; found {name}, a field of {of[0]}: name that" if of else one_of(name, tuple(on_request()))
         raise RecipeError(f"{where}: {known}")
-    _check_needs(recipe, where, name)
+    check_needs(recipe, where, name)
 
 
 def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) -> None:
@@ -124,8 +124,8 @@ def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) ->
     read_options(options, given, f"labels.{name}")
 
 
-def _check_needs(recipe: Recipe, where: str, name: str) -> None:
-    """A label that compares pictures needs these."""
+def check_needs(recipe: Recipe, where: str, name: str) -> None:
+    """See that the recipe has what a label compares: instants, sensors, a LiDAR, tracks; raises RecipeError."""
     needs, rig = labels()[name].needs if name in labels() else Needs(), recipe.rig
     for field, what, is_lacking in (
         ("time", "whose instants are compared", bool(needs.instants or needs.poses) and recipe.time is None),
