@@ -178,7 +178,7 @@ def test_more_viewpoints_are_added_to_scenes_that_are_there():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"models": 3}, r"scenes\.objects: expected at most \d, as there are \d models of split '\w+'; found 4"),
+        ({"models": 3}, r"scenes\.objects: splits are by model, so a scene of split '\w+' needs up to 4 models .* has \d of 3"),
         ({"scenes": {"layout": "scater"}}, r"scenes\.layout: 'scater' is unknown; did you mean 'scatter'\? Valid: .*"),
         (
             {"scenes": {"sampler": "scenez"}},

@@ -45,7 +45,7 @@ from viewsphere.recipe.scenes import ScenesField
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.recipe.tracks import TracksEntry
 from viewsphere.recipe.values import OrShort, shape_of
-from viewsphere.recipe.variations import VariationsField, check_alike, varied
+from viewsphere.recipe.variations import Variations, check_alike, varied
 from viewsphere.recipe.viewpoints import Viewpoints
 from viewsphere.recipe.wanted import WantedEntry
 
@@ -171,10 +171,11 @@ class Recipe(Shown, Frozen):
         description="points that are followed through each sequence: {grid: 16}, {count: 1024, on: objects}, or {points: file}",
     )
     scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
-    variations: VariationsField | None = Field(
+    variations: Variations | None = Field(
         default=None,
         description="conditions under each of which all shots are rendered, with the same labels: names, and the fields of "
-        "scene that are others there: {morning: {sun: {elevation_deg: 9}}, overcast: {sky: {daylight: {clouds: 1}}}}",
+        "scene that each changes, drawn on its own unless paired: true: {morning: {sun: {elevation_deg: 9}}, "
+        "overcast: {sky: {daylight: {clouds: 1}}}}",
     )
     min_visibility: Annotated[Number, Field(gt=0, le=1)] | None = Field(
         default=None,
@@ -264,7 +265,7 @@ class Recipe(Shown, Frozen):
 
     @field_validator("variations")
     @classmethod
-    def _fit_scene(cls, value: dict[str, SceneEntry] | None, info: ValidationInfo) -> dict[str, SceneEntry] | None:
+    def _fit_scene(cls, value: Variations | None, info: ValidationInfo) -> Variations | None:
         scene, timed = info.data.get("scene"), info.data.get("time") is not None
         if value is None or scene is None:
             return value

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, cast
 
-from pydantic import AfterValidator, Field, PlainSerializer, StringConstraints
+from pydantic import (
+    AfterValidator,
+    Field,
+    GetCoreSchemaHandler,
+    PlainSerializer,
+    SerializerFunctionWrapHandler,
+    StringConstraints,
+    ValidatorFunctionWrapHandler,
+)
+from pydantic_core import CoreSchema, core_schema
 
 from viewsphere.model.mistakes import at
 from viewsphere.recipe.draws import alternatives
@@ -12,6 +22,9 @@ from viewsphere.recipe.scene import SceneEntry
 
 CONDITIONS = ("sun", "sky", "lights", "fog", "rain", "snow", "wet", "lamps", "background", "smoother", "view", "effects")
 """Fields of a scene that no label depends on."""
+
+PAIRED = "paired"
+"""The key, among the names of variations, that says whether they have the same draws."""
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 
@@ -39,7 +52,59 @@ def _as_written(entry: SceneEntry) -> dict[str, Any]:
 
 
 Change = Annotated[SceneEntry, AfterValidator(_of_light_alone), PlainSerializer(_as_written)]
-VariationsField = Annotated[dict[Name, Change], Field(min_length=1), AfterValidator(_distinct)]
+
+_Changes = Annotated[
+    dict[Name, Change],
+    Field(
+        min_length=1,
+        json_schema_extra={
+            "properties": {
+                PAIRED: {
+                    "type": "boolean",
+                    "default": False,
+                    "description": "whether equal distributions of several variations have equal draws",
+                }
+            }
+        },
+    ),
+    AfterValidator(_distinct),
+]
+
+
+class Variations(dict[str, SceneEntry]):
+    """Changes of a scene by their names. Each draws the fields that it sets on its own; where they are `paired`, equal
+    distributions of several have equal draws.
+    """
+
+    paired: bool = False
+
+    def drawn_alone(self, name: str) -> frozenset[str]:
+        """The fields of the scene that a variation draws on its own."""
+        return frozenset() if self.paired else frozenset(self[name].model_fields_set)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """That of a mapping, which may have the key `paired`, too."""
+        changes = handler(_Changes)
+        written = core_schema.wrap_serializer_function_ser_schema(_written, schema=changes)
+        return core_schema.no_info_wrap_validator_function(_read, changes, serialization=written)
+
+
+def _read(value: Any, handler: ValidatorFunctionWrapHandler) -> Variations:
+    paired = getattr(value, PAIRED, False)
+    if isinstance(value, Mapping) and PAIRED in value:
+        value = dict(cast(Mapping[str, Any], value))
+        paired = value.pop(PAIRED)
+        if not isinstance(paired, bool):
+            with at(PAIRED):
+                raise ValueError(f"expected true or false, as no variation can have this name; found {paired!r:.40}")
+    made = Variations(handler(value))
+    made.paired = paired
+    return made
+
+
+def _written(value: Variations, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    return {**({PAIRED: True} if value.paired else {}), **handler(dict(value))}
 
 
 def varied(scene: SceneEntry, change: SceneEntry) -> SceneEntry:

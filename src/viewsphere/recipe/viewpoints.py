@@ -135,12 +135,23 @@ def _check_width(width: Spread, field: str, instead: str) -> None:
             )
 
 
+Shared = Annotated[
+    bool,
+    Field(
+        strict=True,
+        description="whether all models, or all random scenes, are seen from the same draws; by default each has its own",
+    ),
+]
+"""Whether random viewpoints are drawn once for all."""
+
+
 class Jitter(_Axes):
     """A grid whose every viewpoint is moved at random, uniformly within plus or minus a width, not beyond the poles."""
 
     kind: Literal["jitter"] = Field(description="a grid with random offsets")
     plus_minus: Spread = Field(description="the widest offset of each coordinate")
     count: Count = Field(default=1, description="viewpoints for each one of the grid")
+    shared: Shared = False
 
     @model_validator(mode="after")
     def _in_front(self) -> Jitter:
@@ -156,7 +167,8 @@ class Sphere(Aimed):
     """Random viewpoints, uniform by area on the sphere or on a part of it."""
 
     kind: Literal["sphere"] = Field(description="uniform on the sphere")
-    count: Count = Field(description="how many viewpoints")
+    count: Count = Field(description="how many viewpoints of each model, or random scene")
+    shared: Shared = False
     azimuth: Interval = Field(default=(0.0, 360.0), description=f"[low, high] in degrees; {AZIMUTH}")
     elevation: Interval = Field(default=(-90.0, 90.0), description=f"[low, high] in degrees {ELEVATION}")
     distance: DistanceBetween = Field(
@@ -182,7 +194,8 @@ class Normal(Aimed):
     """Random viewpoints, normal around one; draws beyond the poles or at no distance are drawn again."""
 
     kind: Literal["normal"] = Field(description="normal around a viewpoint")
-    count: Count = Field(description="how many viewpoints")
+    count: Count = Field(description="how many viewpoints of each model, or random scene")
+    shared: Shared = False
     azimuth: Number = Field(default=0.0, description=f"mean, degrees; {AZIMUTH}")
     elevation: Annotated[Number, Field(ge=-90, le=90)] = Field(default=20.0, description=f"mean, degrees {ELEVATION}")
     distance: DistanceAround = Field(description=f"mean; {DISTANCE}; {FILL}; or fill: [low, high] (uniform)")

@@ -11,6 +11,7 @@ from pydantic import JsonValue
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import shown
 from viewsphere.recipe.recipe import Splits
+from viewsphere.recipe.variations import PAIRED
 from viewsphere.sampling.engine_digest import engine_digest, script_digest
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Part, PlanRecord
@@ -79,7 +80,9 @@ def settings(planned: Plan) -> Settings:
         value["viewpoints.shake"] = viewpoints.get("shake")
     if recipe.tracks is not None:
         value["tracks"] = recipe.tracks.model_dump(mode="json")
-    value |= {f"{VARIED}{name}": change for name, change in (recipe.model_dump(mode="json")["variations"] or {}).items()}
+    if recipe.variations is not None:
+        value |= {f"{VARIED}{name}": change for name, change in recipe.model_dump(mode="json")["variations"].items()}
+        value[f"{VARIED}{PAIRED}"] = recipe.variations.paired
     value |= _movements(planned)
     digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
     return digests | {LOOK: engine_digest(recipe.engine.name)}

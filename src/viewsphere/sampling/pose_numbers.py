@@ -37,9 +37,10 @@ def pose_names(views: Poses) -> Names:
     """The digest of every pose; one of a camera that moves is known by its whole motion."""
     moving = isinstance(views, SequencePoses) and isinstance(views.base, TrajectoryPoses)
     motion = (views.viewpoints.model_dump_json(), views.digest) if moving else ()
+    shared = ("shared",) if views.are_shared else ()
     filled = () if views.are_known or moving else (views.fill,)
     known = (
-        (views.name(i), tuple(views.view(i)), views.target(i), *motion, *(fill(i) for fill in filled))
+        (views.name(i), tuple(views.view(i)), views.target(i), *motion, *shared, *(fill(i) for fill in filled))
         for i in range(len(views))
     )
     digests = (hashlib.blake2b(repr(one).encode(), digest_size=8).digest() for one in known)

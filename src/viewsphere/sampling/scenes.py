@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 from viewsphere import materials
@@ -51,6 +51,9 @@ from viewsphere.sampling.weather import through_windows, weathered
 PARTS = tuple(Finish.model_fields)
 """The parts of a finish, which have their names in a recipe's scene, too."""
 
+WEATHER = frozenset({"rain", "snow", "wet"})
+"""Fields of a scene whose drops, flakes and puddles have random places."""
+
 INDOOR_STOPS = 3.5
 """The exposure at which a room by day is as bright as a street."""
 
@@ -58,13 +61,14 @@ INDOOR_STOPS = 3.5
 @dataclass(frozen=True, eq=False)
 class Scenes:
     """The scenes of a recipe. `model` is a model's key, `pose` a pose's name, or, for what all frames of a sequence share, the
-    name of the pose whenever it is taken. Only noise differs by the name of a `variation`: equal distributions of its light
-    and of others' have equal draws.
+    name of the pose whenever it is taken. By the name of a `variation` differ the noise, and the draws of the fields of the
+    scene that are `drawn_alone` for it.
     """
 
     recipe: Recipe
     pictures: Pictures
     variation: str = ""
+    drawn_alone: frozenset[str] = frozenset()
 
     @cached_property
     def is_jittered(self) -> bool:
@@ -133,7 +137,13 @@ class Scenes:
         )
 
     def _rng_of(self, names: Names) -> RngOf:
-        return scene_generators(self.recipe.seed, names)
+        shared = scene_generators(self.recipe.seed, names)
+        alone = scene_generators(self.recipe.seed, self._alone(names))
+        return lambda path: (alone if path[0] in self.drawn_alone else shared)(path)
+
+    def _alone(self, names: Names) -> Names:
+        """What is drawn for this variation alone is drawn for."""
+        return (*names, "variation", self.variation)
 
     def _names_of_finish(self, model: str, pose: str | None, place: str) -> tuple[Names, ...]:
         """What background, smoother, view and effects are drawn for; empty where every frame has a finish of its own."""
@@ -173,10 +183,15 @@ class Scenes:
                 ground=self._ground(drawn(entry.ground, rng_of, ("ground",)), rng_of),
                 finish=self._finish(names_of_finish, ()) if names_of_finish else Finish(),
             )
-            outdoors = weathered(made, entry, rng_of, lambda use: int(share(self.recipe.seed, "weather", use, *names) * 2**32))
+            outdoors = weathered(made, entry, rng_of, partial(self._weather_seed, names))
             return through_windows(made, outdoors) if self._is_indoors else outdoors
 
         return scene
+
+    def _weather_seed(self, names: Names, use: str) -> int:
+        """The seed of what falls or lies on the ground: of a variation alone where that has weather of its own."""
+        of = self._alone(names) if self.drawn_alone & WEATHER else names
+        return int(share(self.recipe.seed, "weather", use, *of) * 2**32)
 
     def _sky(self, entry: Any, names: Names) -> AnySky:
         if isinstance(entry, HdriSky):

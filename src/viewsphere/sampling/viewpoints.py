@@ -95,6 +95,15 @@ class Poses(Sequence[Viewpoint]):
     def view(self, index: int) -> Orbit:
         """Where the camera stands."""
 
+    @property
+    def are_shared(self) -> bool:
+        """Whether random poses are the same for all subjects."""
+        return getattr(self.viewpoints, "shared", False)
+
+    def of(self, subject: str) -> Poses:
+        """The poses that a subject is taken from: random ones are drawn for each, unless they are shared."""
+        return self if self.are_shared else self.drawn_for(subject)
+
     def drawn_for(self, name: str) -> Poses:
         """The same poses, random ones drawn anew for this name."""
         return replace(self, seed=int(generator(self.seed, "viewpoints", name).integers(2**63)))
@@ -145,7 +154,7 @@ class RepeatedPoses(Poses):
     def drawn_for(self, name: str) -> Self:
         """The same poses as often, random ones drawn anew for this name."""
         base = self.base.drawn_for(name)
-        return replace(self, viewpoints=base.viewpoints, seed=base.seed, base=base)
+        return self if base is self.base else replace(self, viewpoints=base.viewpoints, seed=base.seed, base=base)
 
     def target(self, index: int) -> Vector | None:
         """The pose's."""

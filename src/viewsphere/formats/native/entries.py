@@ -94,7 +94,20 @@ def _group(dataset: Dataset, sample: Sample) -> str:
 
 
 def _pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
-    """The JSON keys of a sample's pose, but for the list of rendered objects."""
+    """The JSON keys of a sample's pose, but for the list of rendered objects; where models have viewpoints of their own at a
+    pose, those of its first frame.
+    """
+    viewpoint = sample.pose
+    return {
+        **_viewpoint(sample),
+        **({"frame": viewpoint.time.frame, "seconds": viewpoint.time.seconds} if viewpoint.time else {}),
+        "folder": _pose_folder(dataset, sample),
+        "transformation_matrix": transformation_matrix(sample.camera),
+    }
+
+
+def _viewpoint(sample: Sample) -> dict[str, Any]:
+    """Where a frame was taken from."""
     viewpoint = sample.pose
     return {
         "distance": viewpoint.distance,
@@ -102,9 +115,6 @@ def _pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
         "azimuth": viewpoint.azimuth_deg,
         "tilt": viewpoint.tilt_deg,
         "pose_category": viewpoint.category,
-        **({"frame": viewpoint.time.frame, "seconds": viewpoint.time.seconds} if viewpoint.time else {}),
-        "folder": _pose_folder(dataset, sample),
-        "transformation_matrix": transformation_matrix(sample.camera),
     }
 
 
@@ -121,6 +131,7 @@ def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str
         "bbox_2D": o.box2d,
         "visibility": o.visibility,
         "truncation": o.truncation,
+        "viewpoint": _viewpoint(sample),
         "id_model": o.key,
         **({"id_track": o.track} if o.track else {}),
         "split": sample.split,

@@ -194,6 +194,7 @@ def _frame(
     folder = PurePosixPath(pose.get("folder", f"Pose-{number}"))
     matrix = first.get("transformation_matrix") or pose["transformation_matrix"]
     camera = _camera(matrix, first["render_resolution"], first.get("distortion"))
+    view: Mapping[str, Any] = first.get("viewpoint") or pose  # the paper's own files have one a pose
     split = str(first.get("split") or "train")
     if not _is_name(split) or not 0 <= int(number) < LARGEST_POSE:
         raise ValueError(f"found pose {number} of split {split!r}")
@@ -208,11 +209,11 @@ def _frame(
         split=split,
         pose=Viewpoint(
             index=int(number),
-            azimuth_deg=pose["azimuth"],
-            elevation_deg=pose["elevation"],
-            distance=abs(pose["distance"]),
-            tilt_deg=pose.get("tilt", 0.0),
-            category=pose.get("pose_category", ""),
+            azimuth_deg=view["azimuth"],
+            elevation_deg=view["elevation"],
+            distance=abs(view["distance"]),
+            tilt_deg=view.get("tilt", 0.0),
+            category=view.get("pose_category", ""),
         ),
         camera=camera,
         rgb=_picture(root, folder / "RGB" / first["path_rgb"], camera),

@@ -180,7 +180,7 @@ def _rig(
     stock: Stock, course: Course, subject: str, start: int, lanes: tuple[Lane, ...], box_of: BoxOf
 ) -> tuple[RigPose, ...] | None:
     """Where the rig is at all instants, None where it stands still."""
-    time, views = time_of(stock), stock.views_of(subject)
+    time, views = time_of(stock), stock.sequences_of(subject)
     times = np.array([time.at(i) for i in range(time.count)])
     names = (subject, stock.pose_list.place(start))
     world = World(

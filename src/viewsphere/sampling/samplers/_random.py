@@ -229,11 +229,27 @@ def check_scene_models(stock: Stock) -> None:
         groups, names = Counter(stock.dealt_splits.values()), list(_shares(stock))
     for name in names:
         if groups[name] < (1 if entry.repeat else entry.most_objects):
-            of = f" of split {name!r}" if name else ""
-            raise RecipeError(
-                f"scenes.objects: expected at most {groups[name]}, as there are {groups[name]} models{of}; found "
-                f"{entry.most_objects}: add models, ask for fewer, or set scenes.repeat: true"
-            )
+            raise RecipeError(f"scenes.objects: {_too_few(entry, groups[name], stock.models, name)}")
+
+
+def _too_few(entry: ScenesEntry, there: int, models: int, split: str) -> str:
+    """The problem of scenes that need more models than there are, and what mends it."""
+    wanted = "at least one model" if entry.repeat else f"up to {_models(entry.most_objects)}"
+    if not split:
+        return (
+            f"a scene needs {wanted}, and the recipe has {_models(there)}. Add models, ask for fewer, or set "
+            "`scenes.repeat: true`."
+        )
+    others = ("set `scenes.repeat: true`", "ask for fewer") if there and not entry.repeat else ()
+    remedies = ", ".join(("Set `splits: {by: scene}`", *others, "or add models"))
+    return (
+        f"splits are by model, so a scene of split {split!r} needs {wanted} of that split, which has {there} of "
+        f"{_models(models)}. {remedies}."
+    )
+
+
+def _models(count: int) -> str:
+    return f"{count} model{'' if count == 1 else 's'}"
 
 
 @lru_cache(maxsize=2)

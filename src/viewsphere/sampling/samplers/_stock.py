@@ -96,7 +96,9 @@ class Stock(Sendable):
     @cached_property
     def scenes(self) -> Scenes:
         """Where light, ground, materials, finishes and jitter are drawn."""
-        return Scenes(self.recipe, self.pictures, self.variation)
+        variations = (self.untried or self).recipe.variations
+        alone = variations.drawn_alone(self.variation) if self.variation and variations else frozenset[str]()
+        return Scenes(self.recipe, self.pictures, self.variation, alone)
 
     @property
     def models(self) -> int:
@@ -160,10 +162,11 @@ class Stock(Sendable):
         starts = range(0, len(self.pose_list), self.pose_list.instants)
         return ((self.sequence(subject, start) for start in starts) for subject in self.subjects)
 
-    def views_of(self, subject: str) -> SequencePoses:
-        """The poses of a subject's sequences: random ones are drawn anew for each random scene."""
-        assert isinstance(self.pose_list, SequencePoses)
-        return self.pose_list if self.recipe.scenes is None else self.pose_list.drawn_for(subject)
+    def sequences_of(self, subject: str) -> SequencePoses:
+        """The poses of a subject's sequences."""
+        views = self.pose_list.of(subject)
+        assert isinstance(views, SequencePoses)
+        return views
 
     def sequence(self, subject: str, pose: int) -> str:
         """The name of the sequence that a pose belongs to: the subject's, and where it has several the viewpoint's number."""

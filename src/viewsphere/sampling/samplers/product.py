@@ -81,7 +81,7 @@ def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
         target = stock.composition.center(things, box_of)
     for run in stock.schedule(spec).runs:
         at = _target(stock, things[0], run, target, box_of)
-        yield Standing(_at(stock, things, run), at, stock.pose_list, range(run.first, run.stop))
+        yield Standing(_at(stock, things, run), at, stock.pose_list.of(subject), range(run.first, run.stop))
 
 
 def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
@@ -99,9 +99,9 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     target, placed = _target(stock, things[0], run, target, box_of), _at(stock, things, run)
     focus = target or center(placed[0], box_of)
     scene = _scene(stock, subject, stock.pose_list.name(poses[0]), run).model_copy(update=_floor(stock, spec, things, box_of))
+    own = stock.pose_list.of(subject)
     views = (
-        (i, stock.view(stock.pose_list, pose), split(stock, subject, pose))
-        for i, pose in enumerate(poses, first // len(stock.rig.sensors))
+        (i, stock.view(own, pose), split(stock, subject, pose)) for i, pose in enumerate(poses, first // len(stock.rig.sensors))
     )
     instants = [stock.instant(subject, view, target, focus, part, i) for i, view, part in views]
     return stock.finished(key, first, placed, scene, instants)
@@ -111,7 +111,7 @@ def _seen_from(stock: Stock, subject: str, poses: Sequence[int]) -> tuple[float,
     """Azimuth and elevation of the camera of a shot's only pose; None where shots have several."""
     if not stock.recipe.scene.is_moved_each_frame or isinstance(stock.pose_list, TimedPoses):
         return None
-    view = stock.viewpoint(subject, stock.view(stock.pose_list, poses[0]), None)
+    view = stock.viewpoint(subject, stock.view(stock.pose_list.of(subject), poses[0]), None)
     return view.azimuth_deg, view.elevation_deg
 
 

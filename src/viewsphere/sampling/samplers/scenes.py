@@ -90,7 +90,7 @@ def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The models of a scene; nothing where the place they stand in is drawn for each frame."""
     if not stock.recipe.scene.is_moved_each_frame and not is_slow(scenes_entry(stock.recipe).layout):
         things = scene_things(stock, subject, None, box_of)
-        views, poses = stock.pose_list.drawn_for(subject), tuple(numbers(_poses(stock, subject)))
+        views, poses = stock.pose_list.of(subject), tuple(numbers(_poses(stock, subject)))
         yield Standing(things, center_of_all(things, box_of), views, poses)
 
 
@@ -102,7 +102,7 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     if stock.composition is not None:
         things = stock.composition.things(subject, things, pose, box_of)
     things += scene_distractors(stock, subject, pose, box_of) + scene_around(stock, subject, pose, box_of)
-    views = stock.pose_list.drawn_for(subject)
+    views = stock.pose_list.of(subject)
     instants = [
         stock.instant(subject, stock.view(views, pose), middle, middle, split(stock, subject, pose), i)
         for i, pose in enumerate(poses, first // len(stock.rig.sensors))

@@ -100,7 +100,7 @@ def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The things as they are placed, seen by cameras that stand still; nothing where they are drawn for each sequence."""
     if not stock.recipe.scene.is_moved_each_frame and is_still(stock.recipe.viewpoints) and not _is_slow(stock.recipe):
         things = placed_targets(stock, subject, None, box_of)
-        count, views = time_of(stock).count, stock.views_of(subject)
+        count, views = time_of(stock).count, stock.sequences_of(subject)
         poses = [view * count for view, names in _taken(stock).items() if subject in names]
         yield Standing(things, middle(things, box_of), views, poses)
 
@@ -143,7 +143,7 @@ def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) 
     time, part = time_of(stock), split(stock, subject, pose)
     i = pose % time.count
     if own.rig is None:
-        view, at = stock.views_of(subject)[pose], own.focus_at(i, stock.recipe.viewpoints.target == "follow", box_of)
+        view, at = stock.sequences_of(subject)[pose], own.focus_at(i, stock.recipe.viewpoints.target == "follow", box_of)
         return stock.instant(subject, view, at, at, part, i).model_copy(update={"seconds": time.at(i)})
     finish, now = stock.finish(subject, pose), own.rig[i]
     if not stock.recipe.camera.of_viewpoints:
