@@ -12,7 +12,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from stat import S_IFBLK, S_IFCHR, S_IFDIR, S_IFIFO, S_IFMT, S_IFSOCK, S_ISREG
-from typing import IO, Any
+from typing import IO, Any, cast
 
 from viewsphere.errors import UserError
 from viewsphere.limits import limits
@@ -65,20 +65,20 @@ def read_text(file: Path, limit: str = "MAX_FILE_BYTES", encoding: str = "utf-8"
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
-def open_file(file: Path, limit: str = "MAX_FILE_BYTES") -> IO[bytes]:
+def open_file(file: Path, limit: str = "MAX_STREAMED_BYTES") -> io.BufferedReader:
     """A regular file, or one at a URL, as a stream of bytes; raises as `read_bytes` does, also while it is read."""
     if not isinstance(file, Path):
         _refuse_larger(str(file), file.stat().st_size, limit)
-        return file.open("rb")
+        return cast(io.BufferedReader, file.open("rb"))
     return io.BufferedReader(_Bounded(file, limit))
 
 
-def open_text(file: Path, limit: str = "MAX_FILE_BYTES", newline: str | None = None) -> IO[str]:
+def open_text(file: Path, limit: str = "MAX_STREAMED_BYTES", newline: str | None = None) -> IO[str]:
     """A regular file as a stream of UTF-8 text; raises as `read_bytes` does, also while it is read."""
     return io.TextIOWrapper(open_file(file, limit), "utf-8", newline=newline)
 
 
-def check_file(file: Path, limit: str = "MAX_FILE_BYTES") -> None:
+def check_file(file: Path, limit: str) -> None:
     """Raise as `read_bytes` does. Call it before a library opens a file by its path."""
     open_file(file, limit).close()
 
@@ -135,7 +135,7 @@ def _descriptor(file: str, flags: int) -> int:
 def _refuse_larger(file: str, size: int, limit: str) -> None:
     most = getattr(limits, limit)
     if size > most:
-        found = f"larger than {most:,} bytes (limit {limit}): it has {size:,} or more"
+        found = f"{size:,} bytes long, and at most {most:,} bytes are allowed (limit {limit})"
         raise FileError(file, f"{found}. Set VIEWSPHERE_{limit} higher if it is meant so")
 
 

@@ -26,6 +26,7 @@ TESTED = {
     "MAX_RECIPE_BYTES": "test_file",
     "MAX_POSES_BYTES": "test_pose_files",
     "MAX_RIG_BYTES": "test_rig_files",
+    **dict.fromkeys(("MAX_STREAMED_BYTES", "MAX_TABLE_BYTES", "MAX_PICTURE_BYTES", "MAX_RECORD_BYTES"), "test_files"),
     "MAX_REPAIRED_SHOTS": "test_endless_plans",
     "MAX_REMOTE_TRIES": "test_places",
     "MAX_FETCHED_BYTES": "test_fetched",
@@ -69,7 +70,7 @@ def refused(monkeypatch):
         text = str(error.value)
         assert path.name in text
         assert f"at most {value:,} " in text
-        assert f"found {found}" in text
+        assert f"found {found}" in text or f"{found} bytes long" in text
         assert "\n" not in text
 
     return check

@@ -98,7 +98,7 @@ SYNTAX = [
     ("name: a\n name: b\n", "recipe.yaml:2: a colon does not fit here: "),
     ("name: a\nseed: 1\nname: b\n", "recipe.yaml:3: name: expected every field once; found 'name' again, after line 1"),
     ("models:\n - {count: 1, count: 2}\n", "recipe.yaml:2: models[0].count: expected every field once"),
-    ("- a\n- b\n", "recipe.yaml:1: expected a mapping of name, models, viewpoints, ...; found ['a', 'b']"),
+    ("- a\n- b\n", "recipe.yaml:1: expected a mapping of name, models, viewpoints, ...; found a list"),
     ("", "recipe.yaml:1: expected a mapping of name, models, viewpoints, ...; found an empty file"),
     ("# nothing\n", "recipe.yaml:1: expected a mapping of name, models, viewpoints, ...; found an empty file"),
     ("name: a\n---\nname: b\n", "recipe.yaml:2: a second document begins with ---"),
@@ -288,5 +288,5 @@ def test_brackets_within_one_another_cost_little_and_halves_of_characters_are_re
             parse(text, "recipe.yaml")
     (tmp_path / "a.yaml").write_text("name: long\n")
     monkeypatch.setenv("VIEWSPHERE_MAX_RECIPE_BYTES", "5")
-    with pytest.raises(RecipeError, match=r"at most 5 bytes \(limit MAX_RECIPE_BYTES\), found 11"):
+    with pytest.raises(RecipeError, match=r"found: 11 bytes long, and at most 5 bytes are allowed \(limit MAX_RECIPE_BYTES\)"):
         read(tmp_path / "a.yaml")

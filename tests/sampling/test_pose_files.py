@@ -294,5 +294,18 @@ def test_a_lens_out_of_bounds_and_a_large_file_are_one_line(tmp_path, monkeypatc
         with pytest.raises(RecipeError, match=r"cameras\.txt:1: expected a number"):
             read_poses(tmp_path)
     monkeypatch.setenv("VIEWSPHERE_MAX_POSES_BYTES", "9")
-    with pytest.raises(RecipeError, match=r"at most 9 bytes \(limit MAX_POSES_BYTES\); found 45"):
+    with pytest.raises(RecipeError, match=r"found: 45 bytes long, and at most 9 bytes are allowed \(limit MAX_POSES_BYTES\)"):
         read_poses(tmp_path)
+
+
+PRIVATE = "root:$6$s3cr3t:19000\nmachine example.org password s3cr3t\n"
+
+
+@pytest.mark.parametrize("name", ["p.csv", "p.txt", "p.json", "images.txt", "cameras.txt"])
+def test_a_file_that_lists_no_poses_is_not_quoted(tmp_path, name):
+    (tmp_path / "cameras.txt").write_text("1 PINHOLE 640 480 420 425 315 239\n")
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 3 1 a.png\n\n")
+    (tmp_path / name).write_text(PRIVATE)
+    with pytest.raises(RecipeError) as caught:
+        make(tmp_path / (name if name.startswith("p.") else "images.txt"))
+    assert "s3cr3t" not in str(caught.value)

@@ -32,6 +32,7 @@ from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.caches import cache_of
 from viewsphere.errors import ModelError
+from viewsphere.files import open_file, read_bytes, read_text
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
@@ -134,13 +135,13 @@ def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) 
     """What `ask` says of a file, plain data, and which files it read for it; from the cache as long as they stay the same."""
     folder = cache_folder()
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             own = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return ask()[0]
     entry = folder / f"{hashlib.sha256(f'{readers_digest()} {about} {path.name} {own}'.encode()).hexdigest()}.json"
     with suppress(OSError, ValueError, TypeError, KeyError):
-        held = json.loads(entry.read_text(encoding="utf-8"))
+        held = json.loads(read_text(entry))
         if held["state"] == _second_digest(own, path, held["files"]):
             return held["told"]
     told, files = ask()
@@ -207,7 +208,7 @@ def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec, frame: i
     digest = hashlib.sha256(readers_digest().encode())
     digest.update(f"{frame} {spec.model_dump_json(include=set(SETTINGS))}".encode())
     digest.update(path.suffix.lower().encode() + path.name.encode() + b"\0".join(text.encode() for text in inside))
-    with path.open("rb") as file:
+    with open_file(path) as file:
         digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()
 
@@ -222,7 +223,7 @@ def readers_digest() -> str:
             digest.update(f"{library} unknown;".encode())
     own = Path(__file__).parent
     for source in [*sorted(own.rglob("*.py")), *sorted((own.with_name("blender") / "worker").glob("*.py"))]:
-        digest.update(source.read_bytes())
+        digest.update(read_bytes(source))
     return digest.hexdigest()
 
 
@@ -234,7 +235,7 @@ def _second_digest(first: str, path: Path, names: Iterable[str]) -> str:
         try:
             if not other.is_file():  # a pipe would never end
                 raise FileNotFoundError(other)
-            with other.open("rb") as file:
+            with open_file(other) as file:
                 digest.update(hashlib.file_digest(file, "sha256").digest())
         except (OSError, ValueError):
             digest.update(b"absent")
@@ -243,7 +244,7 @@ def _second_digest(first: str, path: Path, names: Iterable[str]) -> str:
 
 def _is_stored(folder: Path, first: str, path: Path) -> bool:
     try:
-        names = json.loads((folder / f"{first}.json").read_text(encoding="utf-8"))
+        names = json.loads(read_text(folder / f"{first}.json"))
         return (folder / f"{_second_digest(first, path, names)}.npz").is_file()
     except (OSError, ValueError):
         return False
@@ -252,7 +253,7 @@ def _is_stored(folder: Path, first: str, path: Path) -> bool:
 def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | None:
     """The mesh in the cache and its facts, None when they are not there or damaged."""
     try:
-        names = json.loads((folder / f"{first}.json").read_text(encoding="utf-8"))
+        names = json.loads(read_text(folder / f"{first}.json"))
         mesh, facts = read_mesh(folder / f"{_second_digest(first, path, names)}.npz", path)
         return mesh, replace(facts, files=tuple(path.parent / name for name in names))
     except Exception:  # whatever is wrong with an entry, the answer is to build it again

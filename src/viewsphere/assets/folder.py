@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.finder import Finder, NotFoundError
 from viewsphere.assets.mesh import Image
 from viewsphere.errors import ModelError
+from viewsphere.files import read_bytes
 from viewsphere.limits import limits
 
 SHARPEST = 4096
@@ -91,11 +92,7 @@ class ModelFolder:
         """The model file's own bytes; ModelError when it is missing, empty, unreadable or too large."""
         self.files[self.model] = None
         try:
-            size = self.model.stat().st_size
-            if not self.model.is_file():
-                raise self.error("expected a file, found a folder or a device")
-            self.check("MAX_FILE_BYTES", size, "bytes")
-            data = self.model.read_bytes()
+            data = read_bytes(self.model)
         except FileNotFoundError:
             raise self.error("no such file; check the path") from None
         except OSError as error:
@@ -113,12 +110,8 @@ class ModelFolder:
         if reference.startswith("data:"):
             return _data_uri(reference)
         path = self.path_of(reference, what, base)
-        if (size := path.stat().st_size) > (most := limits.MAX_FILE_BYTES):
-            raise UnreadableError(
-                f"{what} {_short(reference)}: expected at most {most:,} bytes (limit MAX_FILE_BYTES), found {size:,}"
-            )
         try:
-            return path.read_bytes()
+            return read_bytes(path)
         except OSError as error:
             raise UnreadableError(f"{what} {reference!r} cannot be read: {error.strerror or error}") from None
 

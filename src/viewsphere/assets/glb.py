@@ -19,6 +19,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.rigged import Clip, RiggedModel, quaternions
 from viewsphere.assets.runs import Run, runs
 from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.files import open_file
 
 WRAP_CODES = {"clamp": 33071, "mirror": 33648, "repeat": 10497}
 NEAREST, LINEAR, LINEAR_MIPMAP_LINEAR = 9728, 9729, 9987
@@ -137,7 +138,7 @@ def _turned(pose: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def material_names(file: Path) -> tuple[str, ...]:
     """Names of the materials in a GLB file that `glb_bytes` made, in its order; its arrays are not read."""
-    with file.open("rb") as glb:
+    with open_file(file) as glb:
         size, _ = struct.unpack_from("<II", glb.read(20), 12)
         root: Object = json.loads(glb.read(size))
     return tuple(material.get("name", "") for material in root.get("materials", ()))

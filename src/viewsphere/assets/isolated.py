@@ -16,6 +16,7 @@ from viewsphere.assets import endings
 from viewsphere.assets.load import BLENDER_SUFFIXES, check_source
 from viewsphere.assets.reader import OUTCOME, Job, mesh_name, read
 from viewsphere.errors import ModelError
+from viewsphere.files import open_file, read_text
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 
@@ -60,7 +61,7 @@ def _run(job: Job) -> dict[str, Any]:
         process.wait()
         os.close(lifeline)
     try:
-        return json.loads((folder / OUTCOME).read_text(encoding="utf-8"))
+        return json.loads(read_text(folder / OUTCOME))
     except (OSError, ValueError):
         raise ModelError(f"{job.spec['source']}: {_end(job, code, late=late.is_set())}") from None
 
@@ -98,7 +99,7 @@ def _end(job: Job, code: int, *, late: bool) -> str:
 
 def _last_line(log: Path) -> str:
     try:
-        with log.open("rb") as file:
+        with open_file(log) as file:
             file.seek(max(log.stat().st_size - 4096, 0))
             lines = file.read().decode(errors="replace").split("\n")
     except OSError:

@@ -12,6 +12,7 @@ import numpy as np
 from viewsphere.assets.marks import Mark
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import TEXTURE_FIELDS, FileFacts
+from viewsphere.files import open_file
 from viewsphere.model.keypoints import Keypoints
 
 ARRAYS = (
@@ -48,7 +49,7 @@ def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
 
 def read_mesh(path: Path, source: Path) -> tuple[Mesh, FileFacts]:
     """The mesh of the model `source` as `write_mesh` stored it, bit for bit; a damaged file raises numpy's or json's errors."""
-    with np.load(path, allow_pickle=False) as stored:
+    with open_file(path) as file, np.load(file, allow_pickle=False) as stored:
         header: dict[str, Any] = json.loads(stored["header"].tobytes())
         arrays = {name: stored[name] for name in ARRAYS if name in stored}
         pixels = [stored[f"image{i}"] for i in range(len(header["images"]))]

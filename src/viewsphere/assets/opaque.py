@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.folder import SHARPEST, UnreadableError, decode_image, reduced
 from viewsphere.errors import RecipeError
+from viewsphere.files import read_bytes
 
 Stamp = tuple[int, int]
 """A file's size in bytes and its time of change in nanoseconds: another one where the file has changed."""
@@ -30,7 +31,7 @@ def opaque_picture(path: str, field: str, *, upright: bool = False, on_white: bo
     RecipeError for a picture that cannot be read.
     """
     try:
-        pixels = reduced(decode_image(Path(path).read_bytes(), path, upright=upright), SHARPEST)
+        pixels = reduced(decode_image(read_bytes(Path(path), "MAX_PICTURE_BYTES"), path, upright=upright), SHARPEST)
     except UnreadableError as error:
         raise RecipeError(f"{field}: expected a readable image; {error}: mend or replace it") from None
     except OSError as error:

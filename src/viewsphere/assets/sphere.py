@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.assets.folder import UnreadableError
+from viewsphere.files import check_file, open_file
 from viewsphere.limits import limits
 
 EXPECTED = "expected an equirectangular EXR or HDR picture"
@@ -58,7 +59,7 @@ def read_head(path: Path) -> ExrHead | HdrHead | None:
     pixels than `limits` allows, or is not twice as wide as high.
     """
     try:
-        with path.open("rb") as file:
+        with open_file(path, "MAX_PICTURE_BYTES") as file:
             start = file.read(_LONGEST_HEAD)
     except OSError as error:
         raise _unreadable(path, f"found {error.strerror or error}") from None
@@ -104,6 +105,7 @@ def _exr(path: Path) -> ExrHead:
     import OpenEXR
 
     try:
+        check_file(path, "MAX_PICTURE_BYTES")
         with silenced(), OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
             found = _colors(file)
             if found is None:

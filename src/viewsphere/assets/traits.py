@@ -20,6 +20,7 @@ from viewsphere.assets.spread_points import spread_points
 from viewsphere.assets.surface import Surface
 from viewsphere.assets.symmetries import find, lacking
 from viewsphere.errors import ModelError, RecipeError
+from viewsphere.files import read_text
 from viewsphere.geometry.diameter import diameter
 from viewsphere.model.keypoints import Keypoints, Place
 from viewsphere.model.mistakes import nearest, shown
@@ -112,7 +113,7 @@ def found_symmetries(mesh: Mesh) -> Symmetries:
         digest.update(repr(array.shape).encode() + array.tobytes())
     entry = cache_folder() / f"{digest.hexdigest()}.json"
     with suppress(OSError, ValueError):
-        return Symmetries.model_validate(json.loads(entry.read_text(encoding="utf-8")))
+        return Symmetries.model_validate(json.loads(read_text(entry)))
     found = find(Surface.of(mesh))
     keep(entry, found.model_dump_json())
     return found

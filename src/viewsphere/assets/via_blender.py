@@ -29,7 +29,9 @@ from viewsphere.assets.skin import strongest
 from viewsphere.assets.transform import moved
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
+from viewsphere.codecs.npz import load_array
 from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
+from viewsphere.files import open_file, read_bytes
 from viewsphere.limits import limits
 from viewsphere.model.keypoints import Keypoints
 
@@ -168,7 +170,7 @@ def remember_layers(folder: ModelFolder, log: Path, begun: int) -> None:
 
 def _layers(log: Path, begun: int = 0) -> tuple[set[str], set[str]]:
     """The layers of USD files that the log says were looked for, and the ones that could not be opened."""
-    with log.open("rb") as file:
+    with open_file(log) as file:
         file.seek(begun)
         said = file.read().decode("utf-8", "replace")
     return set(OPENED.findall(said)), set(UNOPENED.findall(said))
@@ -245,26 +247,27 @@ def _marks(told: Sequence[Mapping[str, Any]]) -> tuple[Mark, ...]:
 
 
 def _piece(told: Mapping[str, Any], material: int) -> Primitive:
+    def array(name: str) -> NDArray[Any]:
+        return load_array(Path(told[name]))
+
     def loaded(name: str) -> Float | None:
-        return None if told[name] is None else np.load(told[name]).astype(np.float64)
+        return None if told[name] is None else array(name).astype(np.float64)
 
     def downwards(name: str) -> Float | None:
         uv = loaded(name)
         return None if uv is None else np.column_stack([uv[:, 0], 1 - uv[:, 1]])
 
-    triangles, skin = np.load(told["triangles"]).astype(np.int64), told["skin"] or ()
+    triangles, skin = array("triangles").astype(np.int64), told["skin"] or ()
     return Primitive(
         part="",
         material=material,
-        positions=np.load(told["positions"]).astype(np.float64),
+        positions=array("positions").astype(np.float64),
         triangles=triangles,
         normals=loaded("normals"),
         uv0=downwards("uv0"),
         uv1=downwards("uv1"),
         colors=loaded("colors"),
-        bone=strongest(np.load(told["bones"]).astype(np.int64), np.load(told["weights"]).astype(np.float64), triangles)
-        if skin
-        else None,
+        bone=strongest(array("bones").astype(np.int64), array("weights").astype(np.float64), triangles) if skin else None,
         bones=tuple(skin),
     )
 
@@ -273,9 +276,9 @@ def _picture(folder: ModelFolder, told: Mapping[str, Any], number: int) -> Pictu
     """The picture in the folder's images: read from its file, from bytes packed in the model, or as decoded by Blender."""
     name = told["name"]
     if "pixels" in told:
-        index = folder.derived(f"#{number}", lambda: Image(name, reduced(np.load(told["pixels"]), SHARPEST)))
+        index = folder.derived(f"#{number}", lambda: Image(name, reduced(load_array(Path(told["pixels"])), SHARPEST)))
     elif "data" in told:
-        index = folder.image(f"#{number}", name, Path(told["data"]).read_bytes())
+        index = folder.image(f"#{number}", name, read_bytes(Path(told["data"])))
     elif told.get("path"):
         path, root = Path(told["path"]), folder.model.parent.resolve()
         reference = path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)

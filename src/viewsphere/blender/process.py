@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from viewsphere.aside import Aside, sweep
 from viewsphere.errors import BlenderDied, BlenderError
+from viewsphere.files import open_file
 
 START = """\
 import sys, runpy
@@ -170,7 +171,7 @@ class BlenderProcess:
 
     def _last_lines(self) -> list[str]:
         """The last lines that this Blender wrote to its log."""
-        with suppress(OSError), self.log.open("rb") as file:
+        with suppress(OSError), open_file(self.log) as file:
             size = file.seek(0, os.SEEK_END)
             file.seek(max(self._log_start, size - TAIL_BYTES))
             lines = file.read().decode("utf-8", "replace").splitlines()

@@ -21,6 +21,7 @@ from viewsphere.assets.traits import far_points
 from viewsphere.check.failure import failure
 from viewsphere.codecs.png_tiff import decode_png
 from viewsphere.errors import UserError
+from viewsphere.files import open_text, read_bytes
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.diameter import diameter
 from viewsphere.store import Category, Dataset, ModelInfo
@@ -72,7 +73,7 @@ def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]
 
 def _library(obj: Path, name: str) -> str | None:
     """The file of materials that a time step's OBJ names, without its suffix: the model's or a step's; None for any other."""
-    with obj.open(encoding="utf-8") as file:
+    with open_text(obj) as file:
         found = re.fullmatch(r"mtllib (.+)\.mtl\n", next(islice(file, 1, None), ""))
     known = re.compile(rf"{re.escape(name)}(-f-?\d+)?")
     return found[1] if found and known.fullmatch(found[1]) else None
@@ -107,12 +108,12 @@ def _compared(wanted: Path, found: Path) -> Iterator[str]:
     """The first difference of a file from what the GLB's mesh gives."""
     if not found.is_file():
         yield f"{found.name}: expected the file that the GLB's mesh gives, found none"
-    elif wanted.read_bytes() != found.read_bytes():
+    elif read_bytes(wanted) != read_bytes(found):
         yield from _pixels(wanted, found) if found.suffix == ".png" else _lines(wanted, found)
 
 
 def _lines(wanted: Path, found: Path) -> Iterator[str]:
-    with wanted.open(encoding="utf-8", newline="\n") as one, found.open(encoding="utf-8", newline="\n") as other:
+    with open_text(wanted, newline="\n") as one, open_text(found, newline="\n") as other:
         for number, (a, b) in enumerate(zip_longest(one, other, fillvalue=""), 1):
             if a != b and not _is_same_line(a, b):
                 yield f"{found.name}, line {number}: expected {a.strip()!r:.80} of the GLB, found {b.strip()!r:.80}"
@@ -135,7 +136,7 @@ def _is_same_number(one: str, other: str) -> bool:
 def _pixels(wanted: Path, found: Path) -> Iterator[str]:
     """Another version of the encoder may have written the same texture in other bytes."""
     try:
-        same = np.array_equal(decode_png(wanted.read_bytes()), decode_png(found.read_bytes()))
+        same = np.array_equal(decode_png(read_bytes(wanted)), decode_png(read_bytes(found)))
         if not same:
             yield f"{found.name}: expected the texture of the GLB, found another"
     except UserError as error:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import MissingExtraError
+from viewsphere.files import open_file
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import Sample
@@ -22,7 +23,6 @@ from viewsphere.run.scenery import Scenery
 from viewsphere.store import Dataset, depth_step
 from viewsphere.store.channel_files import MOST_STEPS
 from viewsphere.truth.visibility import EDGE_ON
-from viewsphere.urls import here
 
 Float = NDArray[np.float64]
 
@@ -208,8 +208,8 @@ def _read(file: Path, step: str | None) -> _Soup:
     """An exported GLB in the object's axes; of a model that deforms what is below a time step's node."""
     import trimesh
 
-    with here(file) as local:
-        scene: Any = trimesh.load_scene(local, process=False)
+    with open_file(file, "MAX_FILE_BYTES") as stream:
+        scene: Any = trimesh.load_scene(stream, file_type="glb", process=False)
     corners: list[Float] = []
     opaque: list[NDArray[np.bool_]] = []
     shown = scene.graph.transforms.successors(step or scene.graph.base_frame)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import struct
 import zipfile
+from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from viewsphere.codecs.deflate import deflate
 from viewsphere.codecs.size import check_size
 from viewsphere.errors import UserError
+from viewsphere.files import open_file
 
 _DEFLATED, _VERSION, _DATE = 8, 20, 33  # ZIP 2.0; dated 1 January 1980, so that equal arrays make equal files
 
@@ -53,6 +55,12 @@ def decode_npz(data: bytes, name: str) -> NDArray[Any]:
         raise UserError(
             f"NPZ: expected an archive with the array {name!r}, found {error}: the file is damaged or none"
         ) from error
+
+
+def load_array(file: Path) -> NDArray[Any]:
+    """The array in a .npy file that another process wrote; raises OSError and ValueError where there is none."""
+    with open_file(file) as stream:
+        return np.load(stream, allow_pickle=False)
 
 
 def _promised(member: IO[bytes]) -> tuple[int, int]:

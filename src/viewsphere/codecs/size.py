@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from contextlib import contextmanager
-from pathlib import Path
+from contextlib import ExitStack, contextmanager
+from pathlib import Path, PurePath
 from typing import IO, TYPE_CHECKING
 
 from viewsphere.errors import UserError
+from viewsphere.files import open_file
 from viewsphere.limits import limits
 
 if TYPE_CHECKING:
@@ -31,12 +32,13 @@ def opened(file: Path | IO[bytes]) -> Generator[Image]:
     """
     from PIL import Image
 
-    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # Pillow has no other way; ours is checked at once
-    try:
-        image = Image.open(file)
-    finally:
-        Image.MAX_IMAGE_PIXELS = limit
-    with image:
+    with ExitStack() as then:
+        stream = then.enter_context(open_file(file, "MAX_PICTURE_BYTES")) if isinstance(file, PurePath) else file
+        limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # Pillow has no other way; ours is checked at once
+        try:
+            image = then.enter_context(Image.open(stream))
+        finally:
+            Image.MAX_IMAGE_PIXELS = limit
         check_size(*image.size)
         try:
             yield image

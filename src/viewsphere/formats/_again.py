@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from viewsphere.errors import StoreError
+from viewsphere.files import open_file
 from viewsphere.model.listed import ListedObject, ListedShot, Pose
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.scene import IDENTITY
@@ -74,7 +75,7 @@ def _meshes(root: Path, folders: Iterable[str]) -> Iterator[Path]:
 
 def _has_faces(ply: Path) -> bool:
     """Whether a PLY file is a mesh rather than a cloud of points."""
-    with ply.open("rb") as file:
+    with open_file(ply) as file:
         head, _, rest = file.read(HEAD_BYTES).partition(b"end_header")
     words = [line.split() for line in head.splitlines()]
     return bool(rest) and any(line[:2] == [b"element", b"face"] and line[2:] not in ([], [b"0"]) for line in words)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.codecs.png_tiff import decode_png, encode_png
 from viewsphere.errors import UserError
+from viewsphere.files import open_file, read_bytes
 from viewsphere.formats import Remark
 from viewsphere.store import Dataset
 from viewsphere.store.checksums import CHECKSUMS
@@ -88,9 +89,9 @@ def _problem(dataset: Dataset, content: Content, file: Path) -> str | None:
         return "expected a file, found none"
     if isinstance(content, str):
         stored = dataset.stored(content)
-        same = file.read_bytes() == stored.data if isinstance(stored, Loaded) else same_bytes(stored, file)
+        same = read_bytes(file) == stored.data if isinstance(stored, Loaded) else same_bytes(stored, file)
         return None if same else f"expected the bytes of {content}, found others"
-    data = file.read_bytes()
+    data = read_bytes(file)
     if isinstance(content, bytes | Coded):
         made = content if isinstance(content, bytes) else content.make()
         return None if data == made else _different(made, data)
@@ -120,7 +121,7 @@ def same_bytes(one: Path, other: Path) -> bool:
         return True
     if one.stat().st_size != other.stat().st_size:
         return False
-    with one.open("rb") as a, other.open("rb") as b:
+    with open_file(one) as a, open_file(other) as b:
         while block := a.read(BLOCK):
             if block != b.read(BLOCK):
                 return False

@@ -7,6 +7,8 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import IO, Any
 
+from viewsphere.files import open_text
+
 BLOCK = 1 << 16
 LONGEST = 1 << 24
 """Fewest characters read at once (`BLOCK`), and most characters of a row (`LONGEST`)."""
@@ -26,7 +28,7 @@ def rows(file: Path, opened: Collection[Where]) -> Iterator[Row]:
 
     Raises ValueError for a file that is no JSON, OSError where the file cannot be read.
     """
-    with file.open(encoding="utf-8", newline="") as text:
+    with open_text(file, newline="") as text:
         reader = _Reader(text)
         yield from _below((), reader, opened, numbered=False)
         reader.end()

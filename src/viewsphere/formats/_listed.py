@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from viewsphere.errors import StoreError, UserError
+from viewsphere.files import read_bytes, read_text
 from viewsphere.formats._upright import upright
-from viewsphere.limits import limits
 from viewsphere.model.mistakes import dotted, first_of
 from viewsphere.model.sample import Sample
 from viewsphere.store import Category
@@ -59,17 +59,9 @@ def one_line(error: object) -> str:
     return " ".join(text.split())
 
 
-def check_bytes(file: Path, count: int) -> None:
-    """Raise StoreError for a file of annotations that has, or unpacks to, more bytes than the limit."""
-    if count > limits.MAX_ANNOTATION_BYTES:
-        most = f"{limits.MAX_ANNOTATION_BYTES:,} bytes (limit MAX_ANNOTATION_BYTES)"
-        raise StoreError(f"expected at most {most} of {file.name}; found {count:,}")
-
-
 def text_of(file: Path) -> list[str]:
     """The lines of a text of a size that the limit allows; raises ValueError for what is no UTF-8."""
-    check_bytes(file, file.stat().st_size)
-    return file.read_text("utf-8").splitlines()
+    return read_text(file, "MAX_ANNOTATION_BYTES").splitlines()
 
 
 def lists(root: Path, folder: str, problems: list[str]) -> Iterator[tuple[str, Path, Sequence[str]]]:
@@ -142,7 +134,7 @@ def _digest(pictures: Sequence[Listed], texts: Sequence[str]) -> str:
         digest.update(f"{picture.split}/{picture.name}\0".encode(errors="backslashreplace"))
         for file in picture.said:
             if file is None or file not in seen:
-                digest.update(hashlib.sha256(file.read_bytes() if file else b"").digest())
+                digest.update(hashlib.sha256(read_bytes(file, "MAX_ANNOTATION_BYTES") if file else b"").digest())
                 seen |= {file} if file else set()
     digest.update("\n".join(texts).encode(errors="backslashreplace"))
     return digest.hexdigest()

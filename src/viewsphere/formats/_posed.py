@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from viewsphere.codecs.png_tiff import decode_png, encode_png
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
+from viewsphere.files import read_bytes
 from viewsphere.formats._cameras import world_from_camera
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera, Intrinsics
@@ -90,7 +91,7 @@ def posed_dataset(
         raise StoreError(f"{path}: expected pictures that can be used; found none")
     digest = hashlib.sha256()
     for file in texts:
-        digest.update(f"{file.name}\0{hashlib.sha256(file.read_bytes()).hexdigest()}".encode())
+        digest.update(f"{file.name}\0{hashlib.sha256(read_bytes(file, 'MAX_RECORD_BYTES')).hexdigest()}".encode())
     for problem in problems:
         digest.update(problem.encode(errors="backslashreplace"))
     return ForeignDataset(
@@ -120,7 +121,7 @@ def _frames(found: Sequence[Posed]) -> Iterator[ForeignFrame]:
 def _depth(file: Path, one: Posed) -> Loaded:
     """A map of depth that says its step, as stored ones do."""
     try:
-        steps = decode_png(file.read_bytes())
+        steps = decode_png(read_bytes(file, "MAX_PICTURE_BYTES"))
     except (OSError, UserError) as error:
         raise StoreError(f"{file}: expected depth as PNG of 16 bits; found: {error}") from None
     size = (one.camera.height, one.camera.width)

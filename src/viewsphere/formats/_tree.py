@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from viewsphere.aside import temporary
 from viewsphere.errors import UserError
+from viewsphere.files import open_file
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import Content, Expected, check_files, put, same_bytes
 from viewsphere.formats._paper import json_bytes
@@ -205,7 +206,7 @@ def _assemble(tree: Tree, path: str, sections: Mapping[str, _Section], file: Pat
             if isinstance(part, bytes):
                 out.write(part)
             elif part in sections:
-                with sections[part].file.open("rb") as pieces:
+                with open_file(sections[part].file) as pieces:
                     shutil.copyfileobj(pieces, out)
 
 
@@ -244,7 +245,7 @@ def _different(wanted: Path, found: Path) -> Iterator[Remark]:
     """Where a file that is put together is not what it should be."""
     if not found.is_file() or same_bytes(wanted, found):
         return
-    with wanted.open("rb") as ours, found.open("rb") as theirs:
+    with open_file(wanted) as ours, open_file(found) as theirs:
         for number, (one, other) in enumerate(zip_longest(ours, theirs, fillvalue=b""), 1):
             if one != other:
                 at = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))

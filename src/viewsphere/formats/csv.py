@@ -17,6 +17,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from viewsphere.aside import temporary
+from viewsphere.files import open_file
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, put
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -128,7 +129,7 @@ def _cell(value: Any) -> Any:
 
 def _rows_that_differ(wanted: Path, found: Path) -> Iterator[Remark]:
     """Rows of two tables, one after another."""
-    with wanted.open("rb") as ours, found.open("rb") as theirs:
+    with open_file(wanted) as ours, open_file(found) as theirs:
         for number, (one, other) in enumerate(zip_longest(ours, theirs, fillvalue=b"")):
             if one != other:
                 yield _frame_of(one), f"{TABLE}: row {number}: expected {one[:200]!r}, found {other[:200]!r}: export again"

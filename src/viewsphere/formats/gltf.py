@@ -30,6 +30,7 @@ import xxhash
 
 from viewsphere.aside import temporary
 from viewsphere.assets.glb import Looking, Placed, scene_glb_bytes
+from viewsphere.files import read_bytes, read_text
 from viewsphere.formats import Remark, Scope
 from viewsphere.formats._cameras import opengl_pose
 from viewsphere.formats._contents import check_files
@@ -79,10 +80,10 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator
         names = [TABLE]
         for frame, name, content in scenes.files():
             names.append(name)
-            if (folder / name).is_file() and (folder / name).read_bytes() != content:
+            if (folder / name).is_file() and read_bytes(folder / name) != content:
                 yield frame, f"{name}: expected the objects and cameras of its frames, found others: export again"
     yield from check_files(dataset, folder, (), (), names)
-    if (folder / TABLE).is_file() and (folder / TABLE).read_bytes() != "".join(rows).encode():
+    if (folder / TABLE).is_file() and read_bytes(folder / TABLE) != "".join(rows).encode():
         yield None, f"{TABLE}: expected the scenes of the frames, found others: export again"
 
 
@@ -129,7 +130,7 @@ class _Scenes:
         """The first frame of each scene, the scene's file, and what is in it."""
         for name, first in self._files.values():
             sample, kept = self.dataset[first], self.aside / str(first)
-            lines = kept.read_text(encoding="utf-8").splitlines() if kept.is_file() else []
+            lines = read_text(kept).splitlines() if kept.is_file() else []
             cameras = (_read(json.loads(line)) for line in lines)
             yield sample.index, name, scene_glb_bytes([self._placed(o) for o in _known(sample)], cameras)
 

@@ -19,6 +19,7 @@ from pydantic import Field
 
 from viewsphere.codecs.ply import encode_ply
 from viewsphere.errors import UserError
+from viewsphere.files import read_bytes
 from viewsphere.formats import Remark, Scope
 from viewsphere.formats._contents import check_files
 from viewsphere.formats._refusals import any_camera
@@ -90,7 +91,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
     yield from check_files(dataset, folder, (), (), names)
     for sample in dataset:
         file = folder / _name(dataset, sample)
-        if sample.known_camera is not None and file.is_file() and file.read_bytes() != _content(sample, options):
+        if sample.known_camera is not None and file.is_file() and read_bytes(file) != _content(sample, options):
             yield sample.index, f"{_name(dataset, sample)}: expected the points of its picture, found others: export again"
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.codecs import tar
+from viewsphere.files import open_file
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import check_files
 from viewsphere.formats._paper import json_bytes
@@ -90,7 +91,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
 
 
 def _found(file: Path, piece: Piece) -> bytes:
-    with file.open("rb") as shard:
+    with open_file(file) as shard:
         shard.seek(piece.begin)
         return shard.read(len(piece.data))
 

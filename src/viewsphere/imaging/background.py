@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from pathlib import Path
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.srgb import linear
 from viewsphere.codecs.orientation import SWAPPED, orientation
 from viewsphere.errors import RecipeError
+from viewsphere.files import open_file
 from viewsphere.limits import limits
 from viewsphere.model.scene import Background
 
@@ -157,19 +160,23 @@ def _head(path: str, stamp: int) -> tuple[Size, int]:
     return ((height, width) if turn in SWAPPED else (width, height)), turn
 
 
-def _opened(path: str) -> Image:
+@contextmanager
+def _opened(path: str) -> Generator[Image]:
     from PIL import Image, UnidentifiedImageError
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # warnings of large pictures: `limits` decides on these
-            return Image.open(path, formats=FORMATS)
-    except UnidentifiedImageError:
-        _refuse(path, f"none of {', '.join(FORMATS)}")
-    except Image.DecompressionBombError:
-        _too_large(path, "many more")
-    except (OSError, ValueError, SyntaxError) as error:
-        _refuse(path, str(error))
+    with ExitStack() as then:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # warnings of large pictures: `limits` decides on these
+                stream = then.enter_context(open_file(Path(path), "MAX_PICTURE_BYTES"))
+                picture = then.enter_context(Image.open(stream, formats=FORMATS))
+        except UnidentifiedImageError:
+            _refuse(path, f"none of {', '.join(FORMATS)}")
+        except Image.DecompressionBombError:
+            _too_large(path, "many more")
+        except (OSError, ValueError, SyntaxError) as error:
+            _refuse(path, (error.strerror if isinstance(error, OSError) else None) or str(error))
+        yield picture
 
 
 def _decoded(wanted: _Wanted) -> Image:
@@ -260,7 +267,7 @@ def _convolved(pixels: Float32, variance: float, axis: int) -> Float32:
 
 
 def _refuse(path: str, problem: str) -> NoReturn:
-    problem = " ".join(problem.split())[:120]
+    problem = " ".join(problem.split())[:200]
     raise RecipeError(
         f"scene.background: background image {path}: expected a readable image, found {problem}: mend or remove it"
     ) from None

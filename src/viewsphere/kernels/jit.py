@@ -26,6 +26,7 @@ from typing import Any
 from numba.core import config
 
 from viewsphere.aside import STALE_S, Aside, sweep
+from viewsphere.files import read_bytes, read_text
 from viewsphere.kernels.kernel_cache import BUILD, IS_STOCK, kernel_folder
 
 if IS_STOCK:
@@ -83,7 +84,7 @@ def _sources(file: str) -> frozenset[str]:
     """
     found, waiting = {file}, [file]
     while waiting:
-        for name in _IMPORT.findall(Path(waiting.pop()).read_text(encoding="utf-8")):
+        for name in _IMPORT.findall(read_text(Path(waiting.pop()))):
             source = getattr(sys.modules.get(name), "__file__", None)
             if source is not None and source not in found:
                 found.add(source)
@@ -98,7 +99,7 @@ def _cache_folder(sources: frozenset[str]) -> str:
     """A writable folder for these sources: in the user's cache, else in the temporary folder."""
     digest = hashlib.sha256(repr(BUILD).encode())
     for source in (*_COMPILER, *sorted(sources)):
-        digest.update(Path(source).read_bytes())
+        digest.update(read_bytes(Path(source)))
     for root in (kernel_folder(), Path(tempfile.gettempdir()) / f"viewsphere-{Path.home().name}" / "kernels"):
         folder = root / digest.hexdigest()[:16]
         try:

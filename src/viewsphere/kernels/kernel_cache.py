@@ -12,6 +12,7 @@ from pathlib import Path
 import llvmlite.binding
 
 from viewsphere.caches import cache_of
+from viewsphere.files import read_bytes
 
 QUICKER = ("0.66", "0.67", "0.68")
 """numba's minor versions whose internals are as `compiler` and `lowering` expect; with other versions `stock` compiles."""
@@ -39,5 +40,5 @@ def sources_digest(folder: Path) -> str:
     digest = hashlib.sha256(repr((BUILD, sys.implementation.cache_tag)).encode())
     for source in sorted(folder.rglob("*.py")):
         about = source.stat()
-        digest.update(repr((str(source), about.st_mtime_ns, about.st_size)).encode() + source.read_bytes())
+        digest.update(repr((str(source), about.st_mtime_ns, about.st_size)).encode() + read_bytes(source))
     return digest.hexdigest()

@@ -14,6 +14,7 @@ from pathlib import Path
 from viewsphere.aside import aside, sweep
 from viewsphere.caches import cache_of
 from viewsphere.errors import RecipeError
+from viewsphere.files import open_file
 from viewsphere.limits import limits
 from viewsphere.urls import RemotePath, download, files_below, located
 
@@ -82,6 +83,6 @@ def _replace(target: Path, own: Path) -> None:
 def _digests(folder: Path) -> dict[str, str]:
     found: dict[str, str] = {}
     for inside in files_below(folder):
-        with (folder / inside).open("rb") as stream:
+        with open_file(folder / inside) as stream:
             found[inside] = hashlib.file_digest(stream, "sha256").hexdigest()
     return found

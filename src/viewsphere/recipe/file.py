@@ -12,6 +12,7 @@ import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from viewsphere.errors import RecipeError
+from viewsphere.files import read_bytes
 from viewsphere.limits import limits
 from viewsphere.model.mistakes import Marks, Place, dotted, shown
 from viewsphere.model.mistakes import Path as Steps
@@ -19,6 +20,9 @@ from viewsphere.recipe.yaml_errors import syntax_error
 
 DEEPEST = 200
 """Brackets within one another: each takes the YAML reader as long as all those around it."""
+
+FOUND: dict[type | tuple[type, ...], str] = {type(None): "an empty file", list: "a list", str: "a text", object: "a number"}
+"""What a file holds instead of a mapping. The message does not quote the file: it may be a private one that is no recipe."""
 
 _HALF = re.compile("[\ud800-\udfff]")
 _INT = re.compile(r"[-+]?[0-9]+\Z")
@@ -83,7 +87,7 @@ def read(path: Path, fields: str = "name, models, viewpoints") -> tuple[Any, Mar
     """
     data, marks = parse(_text(path), str(path))
     if not isinstance(data, dict):
-        found = "an empty file" if data is None else shown(data)
+        found = next(kind for kinds, kind in FOUND.items() if isinstance(data, kinds))
         raise RecipeError(f"{path}:1: expected a mapping of {fields}, ...; found {found}")
     return data, marks
 
@@ -109,10 +113,7 @@ def _text(path: Path) -> str:
     try:
         if path.is_dir():
             raise RecipeError(f"{path}: expected a recipe file, found a folder: name the .yaml file in it")
-        size, most = path.stat().st_size, limits.MAX_RECIPE_BYTES
-        if size > most:
-            raise RecipeError(f"{path}: expected a recipe of at most {most:,} bytes (limit MAX_RECIPE_BYTES), found {size:,}")
-        raw = path.read_bytes()
+        raw = read_bytes(path, "MAX_RECIPE_BYTES")
     except OSError as error:
         raise RecipeError(f"{path}: expected a readable recipe file, found: {error.strerror or error}") from None
     try:

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from viewsphere.files import read_bytes, read_text
+
 WEB = Path(__file__).parent / "web"
 VENDOR = WEB / "vendor" / "vendor.min.js"
 
@@ -22,10 +24,10 @@ def page(title: str, data: Mapping[str, Any]) -> str:
         "pictures": "",
         "scripts": "'unsafe-inline' data:",
         "nonce": "",
-        "style": (WEB / "style.css").read_text("utf-8"),
+        "style": read_text(WEB / "style.css"),
         "modules": json.dumps({"imports": _modules(WEB, "report")}),
         "main": "report/main.js",
-        "vendor": VENDOR.read_text("utf-8"),
+        "vendor": read_text(VENDOR),
     }
     return _filled(title, data, parts)
 
@@ -44,7 +46,7 @@ def served_page(title: str, data: Mapping[str, Any], own: Path, vendor: str) -> 
         "pictures": "'self'",
         "scripts": f"'nonce-{nonce}'",
         "nonce": f' nonce="{nonce}"',
-        "style": (WEB / "style.css").read_text("utf-8") + (own / "style.css").read_text("utf-8"),
+        "style": read_text(WEB / "style.css") + read_text(own / "style.css"),
         "modules": json.dumps({"imports": modules}),
         "main": "own/main.js",
         "vendor": "",
@@ -54,13 +56,13 @@ def served_page(title: str, data: Mapping[str, Any], own: Path, vendor: str) -> 
 
 def vendor_module() -> str:
     """The libraries as a module's text."""
-    return f"{VENDOR.read_text('utf-8')}\nglobalThis.viewsphereVendor = viewsphereVendor;"
+    return f"{read_text(VENDOR)}\nglobalThis.viewsphereVendor = viewsphereVendor;"
 
 
 def _filled(title: str, data: Mapping[str, Any], parts: Mapping[str, str]) -> str:
-    licenses = (WEB / "vendor" / "LICENSES.txt").read_text("utf-8")
+    licenses = read_text(WEB / "vendor" / "LICENSES.txt")
     parts = {**parts, "title": html.escape(title), "licenses": html.escape(licenses), "data": script_json(data)}
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], (WEB / "page.html").read_text("utf-8"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], read_text(WEB / "page.html"))
 
 
 def script_json(value: object) -> str:
@@ -70,7 +72,7 @@ def script_json(value: object) -> str:
 
 def _modules(folder: Path, name: str) -> dict[str, str]:
     """A folder's modules as data URLs, by the names under which they import one another."""
-    return {f"{name}/{file.name}": _data_url(file.read_bytes()) for file in sorted(folder.glob("*.js"))}
+    return {f"{name}/{file.name}": _data_url(read_bytes(file)) for file in sorted(folder.glob("*.js"))}
 
 
 def _data_url(script: bytes) -> str:

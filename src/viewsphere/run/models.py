@@ -16,6 +16,7 @@ from viewsphere.assets.deforming import DeformingMesh
 from viewsphere.assets.export import export_deforming, export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.labels import labels
 from viewsphere.model.credit import Credit
@@ -86,7 +87,7 @@ class Models:
         """What the record of a model says, if its manifest vouches for it."""
         file = self.store.model_folder(key) / "model.json"
         try:
-            Manifest.read(file.parent).check(file.name, file.read_bytes(), file)
+            Manifest.read(file.parent).check(file.name, read_bytes(file), file)
             known = self.store.model_info(key)
         except (StoreError, OSError):
             return otherwise

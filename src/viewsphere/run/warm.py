@@ -18,6 +18,7 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.files import read_text
 from viewsphere.geometry.box import box_vertices
 from viewsphere.kernels.garbage import pause_collection
 from viewsphere.kernels.kernel_cache import kernel_folder, sources_digest
@@ -155,7 +156,7 @@ def _mark(small: Shot) -> Path:
 def _is_true(mark: Path) -> bool:
     """Whether the kernels it lists are there, where this user's workers look for them."""
     try:
-        kernels = mark.read_text(encoding="utf-8").splitlines()
+        kernels = read_text(mark).splitlines()
     except OSError:
         return False
     folder = f"{mark.parent}"  # of hundreds of files: a Path of each would take a tenth of a second

@@ -14,6 +14,7 @@ import numpy as np
 
 from viewsphere.assets.scene_file import SceneFile, SceneObject, places, scene_file
 from viewsphere.errors import ModelError, RecipeError
+from viewsphere.files import open_file
 from viewsphere.geometry.rotation import Float, compose, transform
 from viewsphere.model.mistakes import nearest
 from viewsphere.model.model_spec import ModelSpec, Parts
@@ -87,7 +88,7 @@ class BlendScenery(Sendable):
     @cached_property
     def digest(self) -> str:
         """SHA-256 of the file."""
-        with self.path.open("rb") as file:
+        with open_file(self.path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
 
     @cached_property

@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import JsonValue
 
 from viewsphere import plugins
+from viewsphere.files import read_bytes
 from viewsphere.recipe.recipe import Recipe
 
 SHARED = tuple(Path(__file__).parents[1] / name for name in ("imaging", "materials", "surroundings", "model/scene.py"))
@@ -31,7 +32,7 @@ def engine_digest(name: str) -> str:
     digest = hashlib.sha256()
     for root in (*own, *getattr(engine, "PROGRAMS", ()), *SHARED):
         for source in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
-            digest.update(source.name.encode() + b"\0" + source.read_bytes())
+            digest.update(source.name.encode() + b"\0" + read_bytes(source))
     return digest.hexdigest()[:16]
 
 
@@ -47,4 +48,4 @@ def script_digest(recipe: Recipe) -> str | None:
     script = engine_options(recipe).get("script")
     if not isinstance(script, str) or not Path(script).is_file():
         return None
-    return hashlib.sha256(Path(script).read_bytes()).hexdigest()
+    return hashlib.sha256(read_bytes(Path(script))).hexdigest()

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal
 from viewsphere.assets.folder import UnreadableError
 from viewsphere.assets.sphere import read_head
 from viewsphere.errors import RecipeError
+from viewsphere.files import open_file
 from viewsphere.limits import limits
 from viewsphere.model.mistakes import nearest
 from viewsphere.model.scene import Background, Ground
@@ -128,7 +129,7 @@ def proportions(path: str, field: str = "scene.planes") -> float:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of large pictures, which a limit decides on
-            with Image.open(path, formats=PICTURE_FORMATS) as image:
+            with open_file(Path(path), "MAX_PICTURE_BYTES") as file, Image.open(file, formats=PICTURE_FORMATS) as image:
                 width, height = image.size
                 sideways = _is_sideways(image)
                 if width * height <= limits.MAX_PICTURE_PIXELS and not _ends_well(path, image.format or ""):
@@ -139,7 +140,7 @@ def proportions(path: str, field: str = "scene.planes") -> float:
         raise _too_large(field, f"{int(re.findall(r'[0-9]+', str(error))[0]):,}", path) from None
     except Exception as error:  # Pillow's decoders raise whatever their format's parser does
         problem = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise _unreadable(field, " ".join(problem.split())[:120], path) from None
+        raise _unreadable(field, " ".join(problem.split())[:200], path) from None
     if width * height > limits.MAX_PICTURE_PIXELS:
         raise _too_large(field, f"{width * height:,} ({width} x {height})", path)
     return height / width if sideways else width / height
@@ -166,7 +167,7 @@ def _ends_well(path: str, kind: str) -> bool:
     """Whether a file's last bytes are those that end its kind; True where the kind has no such."""
     if kind not in _ENDS:
         return True
-    with Path(path).open("rb") as file:
+    with open_file(Path(path), "MAX_PICTURE_BYTES") as file:
         file.seek(0, os.SEEK_END)
         file.seek(-min(file.tell(), _TAIL), os.SEEK_END)
         return _ENDS[kind] in file.read()

@@ -8,6 +8,7 @@ from io import StringIO
 from pathlib import Path
 
 from viewsphere.errors import RecipeError
+from viewsphere.files import read_bytes
 
 Cells = dict[str, str | None]
 
@@ -22,7 +23,7 @@ def table_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[str, Cells]
         found = [name.strip().lower() for name in rows.fieldnames or ()]
         rows.fieldnames = found
         if not set(columns) <= set(found):
-            raise RecipeError(f"{path}:1: expected columns {', '.join(columns)}; found {', '.join(found) or 'nothing'}")
+            raise RecipeError(f"{path}:1: expected columns {', '.join(columns)}; found {known_columns(columns, found)}")
         for row in rows:
             if None in row:
                 raise RecipeError(
@@ -34,9 +35,16 @@ def table_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[str, Cells]
         raise _unreadable(f"{path}:{rows.reader.line_num}", columns, error) from None
 
 
+def known_columns(wanted: Sequence[str], found: Sequence[str]) -> str:
+    """A table's columns for a message. Where none is a wanted one the file is no such table, and none of it is quoted."""
+    if not found:
+        return "nothing"
+    return ", ".join(found) if set(wanted) & set(found) else "none of these"
+
+
 def _text(path: Path, columns: Sequence[str]) -> str:
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, "MAX_TABLE_BYTES")
     except OSError as error:
         raise _unreadable(str(path), columns, error.strerror or error) from None
     try:

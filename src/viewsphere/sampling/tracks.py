@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from viewsphere.errors import RecipeError
+from viewsphere.files import read_text
 from viewsphere.model.rig import Rig
 from viewsphere.model.tracks import Query, Tracks
 from viewsphere.recipe.recipe import Recipe
@@ -54,7 +55,7 @@ def _grid(step: int, width: int, height: int) -> int:
 def _read(path: Path) -> Iterator[Query]:
     """The queries of a CSV file; a first line of words is a heading."""
     try:
-        rows = list(csv.reader(path.read_text("utf-8-sig").splitlines()))
+        rows = list(csv.reader(read_text(path, "MAX_TABLE_BYTES", encoding="utf-8-sig").splitlines()))
     except (OSError, ValueError, csv.Error) as error:
         problem = (error.strerror if isinstance(error, OSError) else None) or error
         raise RecipeError(f"tracks.points: {path}: expected a CSV file of instant, x, y; found: {problem}") from None
@@ -67,8 +68,9 @@ def _read(path: Path) -> Iterator[Query]:
             at, x, y = row
             yield int(at), float(x), float(y)
         except ValueError:
+            found = f"{len(row)} cells" if number == 1 or len(row) != 3 else repr(",".join(row))
             raise RecipeError(
-                f"tracks.points: {path}:{number}: expected instant, x, y, the first a whole number; found {','.join(row)!r}"
+                f"tracks.points: {path}:{number}: expected instant, x, y, the first a whole number; found {found}"
             ) from None
 
 

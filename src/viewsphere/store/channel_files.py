@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.codecs.palette import MOST_COLORS, palette
 from viewsphere.errors import MissingExtraError, RemoteError, StoreError, UserError
+from viewsphere.files import read_bytes
 from viewsphere.model.channel import Channel
 from viewsphere.model.files import Files
 
@@ -91,7 +92,7 @@ def decode(channel: Channel, file: Path, read: Callable[[], bytes] | None = None
     lie elsewhere. Raises StoreError if the file is missing or broken, MissingExtraError where its codec is not installed.
     """
     try:
-        array = _decoded(channel, (read or file.read_bytes)())
+        array = _decoded(channel, read() if read else read_bytes(file, "MAX_PICTURE_BYTES"))
         is_rows = channel.components == 0 and array.dtype != channel.dtype
         if is_rows or np.issubdtype(channel.dtype, np.floating) != np.issubdtype(array.dtype, np.floating):
             raise UserError(f"expected {np.dtype(channel.dtype)}, found {array.dtype}")

@@ -23,6 +23,7 @@ from typing import Any
 import xxhash
 
 from viewsphere.errors import StoreError
+from viewsphere.files import open_file, open_text
 from viewsphere.store.manifest import seal_of
 from viewsphere.store.paths import file_inside
 from viewsphere.store.texts import parsed
@@ -95,7 +96,7 @@ def written_frames(folder: Path) -> int | None:
 
 def _said(folder: Path, mark: str) -> Any:
     """What a line at the list's head says; None where there is no such line, or no list that can be read."""
-    with suppress(OSError, ValueError), (folder / CHECKSUMS).open(encoding="utf-8") as file:
+    with suppress(OSError, ValueError), open_text(folder / CHECKSUMS) as file:
         head = takewhile(lambda line: line.startswith("# "), file)
         return next((parsed(line.removeprefix(mark)) for line in head if line.startswith(mark)), None)
     return None
@@ -129,7 +130,7 @@ def _compared(folder: Path) -> Iterator[tuple[str, str, str | None]]:
 def _lines(folder: Path) -> Iterator[tuple[str, str]]:
     """Digest and path of every file that is listed; raises ValueError at the end where the list was changed."""
     seal, last = xxhash.xxh3_128(), b""
-    with (folder / CHECKSUMS).open("rb") as file:
+    with open_file(folder / CHECKSUMS) as file:
         for line in file:
             if last:
                 seal.update(last)

@@ -9,6 +9,7 @@ from contextlib import suppress
 
 import xxhash
 
+from viewsphere.files import read_bytes
 from viewsphere.model.credit import Credit
 from viewsphere.store.dataset import Dataset
 from viewsphere.store.records import ModelInfo
@@ -68,7 +69,7 @@ def credits_problem(dataset: Dataset) -> str | None:
     """What is wrong with the file: it is not what the models' records say."""
     wanted, found = credits_text(dataset.models), None
     with suppress(OSError, UnicodeDecodeError):
-        found = (dataset.root / CREDITS).read_bytes().decode()
+        found = read_bytes(dataset.root / CREDITS, "MAX_RECORD_BYTES").decode()
     if not wanted or wanted == found:
         return None
     return f"{CREDITS}: expected what the models' records say, found {'no such text' if found is None else 'another text'}"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes
 from viewsphere.labels import channels
 from viewsphere.model.classes import SemanticClass
 from viewsphere.model.files import Files
@@ -299,7 +300,7 @@ class Dataset(Shown, Sequence[Sample]):
         for name in ("frames.json", "shot.json"):
             file_inside(self.root, file.with_name(name).relative_to(self.root).as_posix())
         try:
-            records: list[dict[str, Any]] = parsed(file.read_bytes())
+            records: list[dict[str, Any]] = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
             row = self.plan.find(key)
             if not isinstance(records, list) or not all(isinstance(record, dict) for record in records):
                 raise ValueError("no list of records")

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from viewsphere.aside import lives
 from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes, read_text
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
 from viewsphere.model.mistakes import different, first_of
@@ -74,7 +75,7 @@ class Store:
                 f"(viewsphere render {self.root} -o FOLDER)"
             )
         try:
-            return PlanRecord.from_json(self.plan_file.read_text("utf-8"))
+            return PlanRecord.from_json(read_text(self.plan_file, "MAX_RECORD_BYTES"))
         except FileNotFoundError:
             if not self.root.exists():
                 raise StoreError(
@@ -324,7 +325,7 @@ class Store:
         """Models and shots that were left out at the user's wish, and why; raises StoreError if that cannot be read."""
         file = file_inside(self.root, "store/skipped.json")
         try:
-            found: dict[Any, Any] = parsed(file.read_bytes())
+            found: dict[Any, Any] = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
             if not isinstance(found, dict) or not all(isinstance(text, str) for text in found.values()):
                 raise ValueError("no object of texts")
             return found
@@ -380,7 +381,7 @@ class Store:
         """
         file = self.shot_folder(key) / "shot.json"
         try:
-            return Shot.model_validate_json(file.read_bytes())
+            return Shot.model_validate_json(read_bytes(file, "MAX_RECORD_BYTES"))
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
@@ -405,7 +406,7 @@ class Store:
     def scenery(self, key: str) -> str:
         """The text that `write_shot` was given of a shot's scenery; empty if none."""
         try:
-            return (self.shot_folder(key) / "scenery.json").read_text("utf-8")
+            return read_text(self.shot_folder(key) / "scenery.json", "MAX_RECORD_BYTES")
         except FileNotFoundError:
             return ""
 
@@ -417,7 +418,7 @@ class Store:
         """What is known of a finished model; None if it is not there, StoreError if it cannot be read."""
         file = file_inside(self.root, (self.model_folder(key) / "model.json").relative_to(self.root).as_posix())
         try:
-            info = ModelInfo.from_plain(parsed(file.read_bytes()))
+            info = ModelInfo.from_plain(parsed(read_bytes(file, "MAX_RECORD_BYTES")))
             if info.key != key:
                 raise ValueError(f"model {info.key!r:.100}")
             return info

@@ -17,6 +17,7 @@ from threading import Event, Thread
 from typing import Any
 
 from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes
 from viewsphere.store.texts import parsed
 
 BEAT_S = 5.0
@@ -67,7 +68,7 @@ class Heartbeat:
     def read(file: Path) -> Heartbeat | None:
         """The one in a file; None where there is none, or none that can be read: it may be gone by now."""
         try:
-            value: dict[str, Any] = parsed(file.read_bytes())
+            value: dict[str, Any] = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
             number, of = value["shard"]
             shown = tuple(map(str, value["working_on"]))
             begun, beat = float(value["begun"]), float(value["beat"])

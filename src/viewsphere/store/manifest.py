@@ -21,6 +21,7 @@ from typing import Any
 import xxhash
 
 from viewsphere.errors import StoreError
+from viewsphere.files import open_file, read_bytes, read_text
 from viewsphere.store.paths import file_inside
 from viewsphere.store.texts import parsed
 from viewsphere.urls import byte_range
@@ -64,7 +65,7 @@ def unsealed(text: str) -> dict[str, Any]:
 def seal_of(file: Path) -> Seal:
     """A file's size and digest, read block by block."""
     found, size = xxhash.xxh3_128(), 0
-    with file.open("rb", buffering=0) as stream:  # blocks are large, and most files smaller
+    with open_file(file) as stream:  # blocks are large, and most files smaller
         while block := stream.read(BLOCK):
             found.update(block)
             size += len(block)
@@ -89,7 +90,7 @@ class Manifest:
         """The manifest of a finished folder; raises StoreError where there is none, or it was damaged."""
         file = folder / MANIFEST
         try:
-            value = unsealed(file.read_text("utf-8"))
+            value = unsealed(read_text(file, "MAX_RECORD_BYTES"))
             files = {str(path): (int(size), str(found)) for path, (size, found) in value["files"].items()}
             spans = {str(path): (int(at), int(size), str(found)) for path, (at, size, found) in value.get("spans", {}).items()}
             outside = next((path for path in (*files, *spans) if not is_inside(path)), None)
@@ -122,7 +123,7 @@ class Manifest:
         that were written, OSError where they cannot be read.
         """
         if path not in self.spans:
-            data = holder.read_bytes()
+            data = read_bytes(holder, "MAX_PICTURE_BYTES")
             self.check(path, data, holder)
             return data
         at, size, told = self.spans[path]
@@ -184,7 +185,7 @@ def refuse_another(damaged: Path, again: Path) -> None:
 
 def _is_json(file: Path) -> bool:
     try:
-        parsed(file.read_bytes())
+        parsed(read_bytes(file, "MAX_RECORD_BYTES"))
     except (OSError, ValueError):
         return False
     return True

@@ -10,6 +10,7 @@ from typing import BinaryIO, Self
 import xxhash
 
 from viewsphere.codecs import tar
+from viewsphere.files import read_bytes
 from viewsphere.model.files import Files
 from viewsphere.store.manifest import SHARD, Manifest, Seal, Span, digest, seal_of
 from viewsphere.urls import link_file
@@ -47,7 +48,7 @@ class ShotFiles:
         for `add`.
         """
         if self._shard:
-            self._shard.add(inside, file.read_bytes())
+            self._shard.add(inside, read_bytes(file, "MAX_PICTURE_BYTES"))
         else:
             place = self._place(inside)
             link_file(file.resolve(), place)

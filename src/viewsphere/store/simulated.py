@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.errors import StoreError
+from viewsphere.files import read_text
 from viewsphere.store.folder import Store
 
 MADE = "made.json"
@@ -41,6 +42,6 @@ class Simulated:
             with store.aside(folder) as aside:
                 (aside / MADE).write_text(text, "utf-8", newline="\n")
         try:
-            return json.loads((folder / MADE).read_text("utf-8"))
+            return json.loads(read_text(folder / MADE, "MAX_RECORD_BYTES"))
         except (OSError, ValueError) as error:
             raise StoreError(f"{folder / MADE}: expected what was simulated, found {error}: remove this file") from None

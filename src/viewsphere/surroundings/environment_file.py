@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.folder import UnreadableError
 from viewsphere.assets.sphere import EXPECTED, ExrHead, HdrHead, check_shape, read_head, silenced
 from viewsphere.errors import RecipeError
+from viewsphere.files import check_file, open_file, read_bytes
 from viewsphere.surroundings.kernels_rgbe import decode_rows
 
 Float32 = NDArray[np.float32]
@@ -71,6 +72,7 @@ def _read_exr(path: Path, head: ExrHead) -> Float32:
     import OpenEXR
 
     try:
+        check_file(path, "MAX_PICTURE_BYTES")
         with silenced(), OpenEXR.File(str(path), separate_channels=True) as file:
             if not file.parts:  # OpenEXR returns no parts for pixels that it cannot read
                 raise _error(path, "found one whose pixels cannot be read: damaged or cut off; get or export it again")
@@ -86,7 +88,7 @@ def _read_exr(path: Path, head: ExrHead) -> Float32:
 
 
 def _read_hdr(path: Path, head: HdrHead) -> Float32:
-    data = path.read_bytes()
+    data = read_bytes(path, "MAX_PICTURE_BYTES")
     body = np.frombuffer(data, np.uint8)[data.index(head.text.splitlines()[-1]) :]
     body = body[int(np.argmax(body == ord("\n"))) + 1 :]
     exposure = np.prod(
@@ -109,7 +111,7 @@ def _read_ordinary(path: Path) -> Float32:
     from viewsphere.assets.srgb import linear
 
     try:
-        with Image.open(path) as image:
+        with open_file(path, "MAX_PICTURE_BYTES") as file, Image.open(file) as image:
             check_shape(path, *image.size)
             grey_16 = image.mode.startswith("I;16")
             eight = np.asarray(image.point(lambda v: v / 256).convert("L") if grey_16 else image.convert("RGB"))

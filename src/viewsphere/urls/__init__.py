@@ -20,6 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from viewsphere.aside import temporary
+from viewsphere.files import check_file, open_file
 from viewsphere.urls.remote_path import BLOCK
 from viewsphere.urls.remote_path import RemotePath as RemotePath
 
@@ -56,7 +57,7 @@ def byte_range(file: Path, start: int, size: int) -> bytes:
     """So many bytes of a file from `start` on, fewer where it ends before; raises OSError as reading does."""
     if isinstance(file, RemotePath):
         return file.byte_range(start, size)
-    with file.open("rb") as stream:
+    with open_file(file) as stream:
         held = os.fstat(stream.fileno()).st_size
         stream.seek(min(start, held))
         return stream.read(max(0, min(size, held - start)))
@@ -83,7 +84,7 @@ def here(path: Path) -> Generator[Path]:
 def download(file: Path, destination: Path, most: int = sys.maxsize) -> bool:
     """Copy a file from a URL to a disk, block by block, at most so many bytes of it; returns whether that is all of it."""
     destination.parent.mkdir(parents=True, exist_ok=True)
-    with file.open("rb") as read, destination.open("wb") as write:
+    with open_file(file) as read, destination.open("wb") as write:
         while block := read.read(min(BLOCK, most + 1)):
             write.write(block[:most])
             most -= len(block)
@@ -105,9 +106,10 @@ def link_file(source: Path, destination: Path) -> str:
     try:
         import fcntl
 
-        with source.open("rb") as read, destination.open("wb") as write:
+        with open_file(source) as read, destination.open("wb") as write:
             fcntl.ioctl(write.fileno(), 0x40049409, read.fileno())  # FICLONE of linux/fs.h
         return "reflink"
     except (ImportError, OSError):
+        check_file(source, "MAX_STREAMED_BYTES")
         shutil.copyfile(source, destination)
         return "copy"

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from viewsphere import plugins
 from viewsphere.aside import aside, temporary
 from viewsphere.caches import cache_of
+from viewsphere.files import read_bytes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -122,7 +123,7 @@ def _sources() -> str:
     own = Path(__file__).parent
     digest = hashlib.sha256()
     for source in [*sorted(own.rglob("*.py")), *(own.with_name("assets") / name for name in ("glb.py", "rigged.py"))]:
-        digest.update(source.read_bytes())
+        digest.update(read_bytes(source))
     return digest.hexdigest()
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.deforming import Load
+from viewsphere.codecs.npz import load_array
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.requests import members_of
 from viewsphere.engines._blender.staging import FRAME_SECONDS, STAGE_SECONDS, Arrangement, build_stage, camera_request
@@ -47,4 +48,4 @@ def _rendered(stage: Arrangement, view: dict[str, Any]) -> NDArray[np.int32]:
     out = process.folder / "seen.npy"
     process.ask("number", STAGE_SECONDS, members=members_of(stage.shot), alpha=stage.shot.label_alpha)
     process.ask("render", FRAME_SECONDS, camera=view, out=str(out), transparent=True, border=None, passes=["index"])
-    return np.rint(np.load(out.with_suffix(".index.npy"))[..., 0]).astype(np.int32)
+    return np.rint(load_array(out.with_suffix(".index.npy"))[..., 0]).astype(np.int32)

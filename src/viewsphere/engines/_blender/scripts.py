@@ -10,6 +10,7 @@ from typing import Any
 from viewsphere.blender.interpreter import SCRIPTS
 from viewsphere.engines._blender.options import AnyOptions
 from viewsphere.errors import RecipeError
+from viewsphere.files import read_text
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 
@@ -38,5 +39,5 @@ def script_request(options: AnyOptions, shot: Shot, things: Sequence[Thing]) -> 
         {"id": thing.id, "category": thing.model.category, "model": thing.model.key, "is_scenery": thing.scenery}
         for thing in things
     ]
-    text = Path(options.script).read_text("utf-8")
+    text = read_text(Path(options.script))
     return {"file": options.script, "text": text, "things": known, "shot": {"key": shot.key, "frames": shot.first}}

@@ -15,6 +15,7 @@ from viewsphere.assets.deforming import Load
 from viewsphere.assets.mesh import Mesh
 from viewsphere.blender.interpreter import GRAPHICS, find_blender
 from viewsphere.blender.process import BlenderProcess
+from viewsphere.codecs.npz import load_array
 from viewsphere.engines._arranged import Arrangements
 from viewsphere.engines._blender.backdrop import Backdrop
 from viewsphere.engines._blender.border import border_of
@@ -355,7 +356,7 @@ class Arrangement:
             process.ask("render", FRAME_SECONDS, camera=request, out=str(out), **told)
         except BlenderError as error:
             raise ModelError(f"{self.named}: {str(error).partition(': ')[2]}") from error
-        return {"picture": np.load(out)} | {name: np.load(out.with_suffix(f".{name}.npy")) for name in wanted}
+        return {"picture": load_array(out)} | {name: load_array(out.with_suffix(f".{name}.npy")) for name in wanted}
 
     @cached_property
     def kinds(self) -> tuple[Kind, ...]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes
 from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats._placed import placed
 from viewsphere.formats.bop.cads import foreign_models, model_files
@@ -114,7 +115,9 @@ def _digest(files: list[Path], left_out: list[str]) -> str:
     """SHA-256 of all scenes' JSON, and of the messages about pictures that were left out."""
     digest = hashlib.sha256()
     for file in (file for camera in files for file in sorted(camera.parent.glob("scene_*.json"))):
-        digest.update(f"{file.parent.name}/{file.name}\0{hashlib.sha256(file.read_bytes()).hexdigest()}".encode())
+        digest.update(
+            f"{file.parent.name}/{file.name}\0{hashlib.sha256(read_bytes(file, 'MAX_RECORD_BYTES')).hexdigest()}".encode()
+        )
     digest.update("\n".join(left_out).encode(errors="backslashreplace"))
     return digest.hexdigest()
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes
 from viewsphere.store.texts import parsed
 
 
@@ -14,7 +15,7 @@ def load(file: Path) -> dict[str, Any]:
     if not file.is_file():
         return {}
     try:
-        found = parsed(file.read_bytes())
+        found = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
     except (OSError, ValueError) as error:
         raise StoreError(f"{file}: expected BOP's JSON; found: {error}") from None
     if not isinstance(found, dict):

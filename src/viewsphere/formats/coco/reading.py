@@ -14,6 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from viewsphere.errors import StoreError, UserError
+from viewsphere.files import read_bytes
 from viewsphere.formats._upright import shown_size, upright
 from viewsphere.formats.coco.places import annotation_files, picture_file
 from viewsphere.formats.coco.points import KEYPOINTS, named_points
@@ -76,7 +77,7 @@ def _digest(files: Sequence[tuple[str, Path]], left_out: Sequence[str]) -> str:
     """SHA-256 of the files' contents, and of the messages about entries that were left out."""
     digest = hashlib.sha256()
     for split, file in files:
-        digest.update(f"{split}\0{file.name}\0{hashlib.sha256(file.read_bytes()).hexdigest()}".encode())
+        digest.update(f"{split}\0{file.name}\0{hashlib.sha256(read_bytes(file, 'MAX_RECORD_BYTES')).hexdigest()}".encode())
     for problem in left_out:
         digest.update(problem.encode(errors="backslashreplace"))
     return digest.hexdigest()
@@ -97,7 +98,7 @@ class _Split:
 
 def _read_split(split: str, file: Path, root: Path) -> _Split:
     try:
-        data = parsed(file.read_bytes())
+        data = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
     except (OSError, ValueError) as error:
         raise StoreError(f"{file}: expected COCO's JSON; found: {error}") from None
     if not isinstance(data, dict) or not all(isinstance(data.get(k), list) for k in ("images", "annotations", "categories")):

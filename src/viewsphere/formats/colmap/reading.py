@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes, read_text
 from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats._posed import MOST, Posed, camera_of, check_picture, picture_inside, posed_dataset, without_world
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
@@ -139,7 +140,7 @@ def _lens(model: str, size: tuple[int, int], values: Sequence[float]) -> Intrins
 def _lines(file: Path) -> list[str]:
     """Lines that are no comments."""
     try:
-        text = file.read_text(encoding="utf-8")
+        text = read_text(file, "MAX_RECORD_BYTES")
     except (OSError, ValueError) as error:
         raise StoreError(f"{file}: expected text; found: {error}") from None
     return [line.strip() for line in text.splitlines() if not line.lstrip().startswith("#")]
@@ -169,7 +170,7 @@ def _text_images(file: Path) -> Iterator[_Image]:
 
 
 def _binary_cameras(file: Path) -> Iterator[tuple[int, str, tuple[int, int], list[float]]]:
-    data, at = file.read_bytes(), 8
+    data, at = read_bytes(file, "MAX_RECORD_BYTES"), 8
     for _ in range(struct.unpack_from("<Q", data)[0]):
         number, model, width, height = struct.unpack_from("<IiQQ", data, at)
         name = NAMES.get(model, str(model))
@@ -179,7 +180,7 @@ def _binary_cameras(file: Path) -> Iterator[tuple[int, str, tuple[int, int], lis
 
 
 def _binary_images(file: Path) -> Iterator[_Image]:
-    data, at = file.read_bytes(), 8
+    data, at = read_bytes(file, "MAX_RECORD_BYTES"), 8
     for _ in range(struct.unpack_from("<Q", data)[0]):
         _, *pose, camera = struct.unpack_from("<I7dI", data, at)
         end = data.find(b"\0", at + 64)

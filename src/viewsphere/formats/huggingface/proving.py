@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from viewsphere.files import read_bytes
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import check_files, same_bytes
 from viewsphere.formats.huggingface.arrow import arrow
@@ -32,7 +33,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
                 yield from ((frame, f"{name}: {what}: export again") for frame, what in _changes(Path(aside), folder, name))
             (Path(aside) / name).unlink()
     file = folder / CARD
-    if file.is_file() and file.read_bytes() != card(dataset, shards).encode():
+    if file.is_file() and read_bytes(file) != card(dataset, shards).encode():
         yield None, f"{CARD}: expected the card that is exported, found another: export again"
     yield from check_files(dataset, folder, (), (), names)
 

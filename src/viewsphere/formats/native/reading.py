@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
+from viewsphere.files import read_bytes
 from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.geometry.box import box_size
 from viewsphere.geometry.mask import encode_rle, mask_box, mask_polygons
@@ -81,7 +82,7 @@ class _Frame:
 
 def _load(file: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
     try:
-        text = file.read_bytes()
+        text = read_bytes(file, "MAX_RECORD_BYTES")
         data = parsed(text, lambda _: None)  # NaN stands for unknown values
     except (OSError, ValueError) as error:
         raise StoreError(f"{file}: expected the native format's JSON; found: {error}") from None
@@ -161,7 +162,7 @@ def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) ->
         real_size=(_number(width), _number(height), _number(length)) if width and height and length else None,
         parts=(),
         triangles=0,
-        digest=hashlib.sha256(file.read_bytes()).hexdigest(),
+        digest=hashlib.sha256(read_bytes(file, "MAX_RECORD_BYTES")).hexdigest(),
         step=TimeStep(frame=int(vehicle["frame"]), seconds=_number(vehicle.get("seconds", 0))) if animation else None,
         track=str(vehicle.get("id_track", "")) if animation else "",
         credit=Credit.model_validate(vehicle["credit"]) if "credit" in vehicle else None,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes
 from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats._posed import Posed, camera_of, check_picture, picture_inside, posed_dataset, without_world
 from viewsphere.formats.nerfstudio.synthetic import SPLITS
@@ -70,7 +71,7 @@ def said_frames(file: Path) -> Iterator[tuple[int, Mapping[str, Any], Mapping[st
     StoreError for a file of another structure.
     """
     try:
-        data = parsed(file.read_bytes())
+        data = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
     except (OSError, ValueError) as error:
         raise StoreError(f"{file}: expected JSON; found: {error}") from None
     if not isinstance(data, dict) or not isinstance(cast(dict[str, Any], data).get("frames"), list):

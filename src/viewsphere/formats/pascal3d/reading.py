@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
+from viewsphere.files import read_text
 from viewsphere.formats._listed import MISTAKES, Listed, listed_dataset, one_line, unposed
 from viewsphere.formats._maps import ALIKE, boxes_of, check_map, numbered, numbers_of, overlap
 from viewsphere.formats._placed import placed
@@ -89,7 +90,9 @@ def _named(root: Path) -> Iterator[str]:
     file = root / KIT / "classes.txt"
     if file.is_file():
         try:
-            rows = [row.split() for row in file_inside(root, f"{KIT}/classes.txt").read_text("utf-8").splitlines()]
+            rows = [
+                row.split() for row in read_text(file_inside(root, f"{KIT}/classes.txt"), "MAX_ANNOTATION_BYTES").splitlines()
+            ]
             yield from (name for _, name in sorted((int(number), name) for number, name in rows))
         except MISTAKES as error:
             raise StoreError(f"{file}: expected a number and a name a line; found: {one_line(error)}") from None

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.codecs.mat import Struct, read_mat
-from viewsphere.formats._listed import check_bytes
+from viewsphere.files import read_bytes
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.limits import limits
 from viewsphere.model.sample import Box
@@ -66,8 +66,7 @@ class Record:
 
 def variables(file: Path) -> dict[str, Any]:
     """The variables of a file; raises ValueError for what is no MATLAB file, StoreError for one that is too large."""
-    check_bytes(file, file.stat().st_size)
-    return read_mat(file.read_bytes(), limits.MAX_ANNOTATION_BYTES)
+    return read_mat(read_bytes(file, "MAX_ANNOTATION_BYTES"), limits.MAX_ANNOTATION_BYTES)
 
 
 def structs_of(value: Any, what: str) -> Struct:

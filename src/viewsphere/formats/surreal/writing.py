@@ -18,6 +18,7 @@ from viewsphere.codecs.deflate import compressed
 from viewsphere.codecs.mat import COMPRESSED, HEAD
 from viewsphere.codecs.mp4 import Encoder, encoder, write_mp4
 from viewsphere.errors import UserError
+from viewsphere.files import read_bytes
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import opaque
 from viewsphere.formats._sequences import check_whole, scene
@@ -202,7 +203,7 @@ def _film(clip: Clip) -> bytes:
     with temporary("film") as aside:
         pictures = (opaque(replace(sample, channels=copy(sample.channels)).picture) for sample in clip.samples)
         write_mp4(aside / "film.mp4", zip(pictures, lasts, strict=True), film_encoder())
-        return (aside / "film.mp4").read_bytes()
+        return read_bytes(aside / "film.mp4")
 
 
 def _variable(name: str, array: NDArray[Any]) -> bytes:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
+from viewsphere.files import read_text
 from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats._posed import Posed, camera_of, picture_inside, posed_dataset
 from viewsphere.geometry.rotation import matrix_from_quaternion
@@ -76,7 +77,7 @@ def _lists(path: Path, texts: list[Path]) -> tuple[list[Timed], list[Timed]]:
 def _rows(file: Path) -> list[list[str]]:
     """The words of each line that is no comment."""
     try:
-        text = file.read_text(encoding="utf-8")
+        text = read_text(file, "MAX_RECORD_BYTES")
     except (OSError, ValueError) as error:
         raise StoreError(f"{file}: expected a text of a line each; found: {error}") from None
     return [line.split() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.formats._listed import MISTAKES, SUFFIXES, TRAIN, Listed, check_bytes, listed_dataset, lists, one_line, unposed
+from viewsphere.files import read_bytes, read_text
+from viewsphere.formats._listed import MISTAKES, SUFFIXES, TRAIN, Listed, listed_dataset, lists, one_line, unposed
 from viewsphere.formats._maps import boxes_of, check_map, numbered, numbers_of, unannotated
 from viewsphere.formats._upright import shown_size
 from viewsphere.formats.voc.writing import BOX
@@ -118,7 +119,9 @@ def _listed_names(root: Path) -> list[str]:
     if not file.is_file():
         return []
     try:
-        rows = [row.split(":")[0] for row in file.read_text("utf-8").splitlines() if row and not row.startswith("#")]
+        rows = [
+            row.split(":")[0] for row in read_text(file, "MAX_ANNOTATION_BYTES").splitlines() if row and not row.startswith("#")
+        ]
     except (OSError, ValueError) as error:
         raise StoreError(f"{file}: expected a line for each category; found: {error}") from None
     return list(dict.fromkeys(name for name in rows if name and name != "background"))
@@ -176,8 +179,7 @@ def _picture(kit: _Kit, split: str, name: str) -> Listed:
 
 
 def _parsed(xml: Path) -> ElementTree.Element:
-    check_bytes(xml, xml.stat().st_size)
-    data = xml.read_bytes()
+    data = read_bytes(xml, "MAX_ANNOTATION_BYTES")
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise StoreError(f"expected a plain annotation in {xml.name}; found one with entities")
     return ElementTree.fromstring(data)

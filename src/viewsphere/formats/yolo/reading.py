@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 
 from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes, read_text
 from viewsphere.formats._listed import MISTAKES, Listed, listed_dataset, one_line, text_of, unposed
 from viewsphere.formats._upright import shown_size
 from viewsphere.formats.yolo.describing import DARKNET, NAMES, darknet, unsaid
@@ -47,7 +48,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     pictures, most = tuple(_pictures(root, told, file, problems)), 1
     for picture in pictures:
         most = max(most, sum(1 for _ in _rows(picture, kind, len(categories), problems)))
-    also = hashlib.sha256(file.read_bytes()).hexdigest()
+    also = hashlib.sha256(read_bytes(file, "MAX_ANNOTATION_BYTES")).hexdigest()
     found = listed_dataset(file, pictures, categories, most, partial(_shown, categories, kind), problems, keep_going, also=also)
     named = {"keypoints": list(kind.names), "skeleton": list[Any]()}
     return replace(found, said={"categories": {one.name: named for one in categories}}) if kind.names else found
@@ -67,7 +68,7 @@ def _load(file: Path) -> dict[str, Any]:
     if file.name == NAMES:
         return darknet(file)
     try:
-        data = file.read_bytes()
+        data = read_bytes(file, "MAX_ANNOTATION_BYTES")
         told = yaml.safe_load(data) if len(data) <= LARGEST_FILE else None
     except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
         raise StoreError(f"{file}: expected YOLO's YAML; found: {one_line(error)}") from None
@@ -136,7 +137,7 @@ def _listed(root: Path, relative: str, split: str, file: Path, problems: list[st
             yield from (path.relative_to(root).as_posix() for path in found)
             yield from _unpictured(root, relative, problems)
             return
-        lines = place.read_text("utf-8").splitlines()
+        lines = read_text(place, "MAX_ANNOTATION_BYTES").splitlines()
     except (StoreError, OSError, ValueError) as error:
         problems.append(f"{file}: {split}: {one_line(error)}")
         return

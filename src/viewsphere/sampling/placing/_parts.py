@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.cache import keep
 from viewsphere.caches import cache_of
+from viewsphere.files import read_text
 from viewsphere.sampling.physics import needed
 from viewsphere.sampling.placing import Shape
 
@@ -39,7 +40,7 @@ def convex_parts(shape: Shape) -> list[Float]:
     digest = hashlib.sha256(json.dumps(SETTINGS).encode() + vertices.tobytes() + triangles.tobytes()).hexdigest()
     entry = cache_of("parts") / f"{digest}.json"
     with suppress(OSError, ValueError):
-        return [np.array(part) for part in json.loads(entry.read_text("utf-8"))]
+        return [np.array(part) for part in json.loads(read_text(entry))]
     parts = _parted(vertices, triangles)
     keep(entry, json.dumps([part.tolist() for part in parts]))
     return parts

@@ -51,7 +51,7 @@ def _camera_lines(file: Path) -> list[tuple[list[str], str]]:
     found = [(words, f"{file}:{line}") for line, words in read_lines(file)]
     for words, where in found:
         if len(words) < 5 or not words[0].isdigit():
-            raise RecipeError(f"{where}: expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS; found {' '.join(words)!r:.60}")
+            raise RecipeError(f"{where}: expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS; found {len(words)} other words")
     return found
 
 
@@ -101,7 +101,7 @@ def _images(file: Path) -> list[tuple[str, int, Extrinsics]]:
 def _image(words: Sequence[str], where: str) -> tuple[str, int, Extrinsics]:
     """IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME: world to camera."""
     if len(words) < MOST_IN_ONE_LINE or not words[8].isdigit():
-        raise RecipeError(f"{where}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; found {' '.join(words)!r:.60}")
+        raise RecipeError(f"{where}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; found {len(words)} other words")
     number(words[0], where)
     quaternion, t = numbers(words[1:5], where), np.array(numbers(words[5:8], where))
     rotation = from_quaternion(quaternion, where)

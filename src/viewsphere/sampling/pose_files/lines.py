@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from viewsphere import files
 from viewsphere.errors import RecipeError
-from viewsphere.limits import limits
+
+_ALMOST = re.compile(r"[-+.,0-9eE]{0,24}|[A-Za-z]{1,3}")
+"""Words that messages quote: those that are meant as numbers. Others may be of a private file that lists none."""
 
 
 def read_text(path: Path, of: str = "poses", limit: str = "MAX_POSES_BYTES") -> str:
     """The text of a file in UTF-8; raises RecipeError if there is none, or one beyond the named limit."""
     try:
-        size, most = path.stat().st_size, getattr(limits, limit)
-        if size > most:
-            raise RecipeError(
-                f"{path}: expected a file of at most {most:,} bytes (limit {limit}); found {size:,}; set VIEWSPHERE_{limit} "
-                "higher if it is meant so"
-            )
-        return path.read_text("utf-8-sig")
+        return files.read_text(path, limit, "utf-8-sig")
     except OSError as error:
         raise RecipeError(f"{path}: expected a readable file of {of}; found: {error.strerror or error}") from None
     except UnicodeDecodeError:
@@ -46,7 +44,8 @@ def number(word: object, where: str) -> float:
     except (ValueError, OverflowError):
         value = math.nan
     if not math.isfinite(value):
-        raise RecipeError(f"{where}: expected a finite number; found {word!r}")
+        found = "a text" if isinstance(word, str) and not _ALMOST.fullmatch(word) else repr(word)
+        raise RecipeError(f"{where}: expected a finite number; found {found:.60}")
     return value
 
 

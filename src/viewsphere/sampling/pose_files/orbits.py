@@ -9,6 +9,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest
 from viewsphere.sampling.pose_files.entries import Orbit, PoseFile
 from viewsphere.sampling.pose_files.lines import counted, number, read_lines, read_text
+from viewsphere.sampling.tables import known_columns
 
 NEEDED = ("azimuth", "elevation", "distance")
 TILTS = ("tilt", "theta", "in_plane")
@@ -29,7 +30,7 @@ def read_csv(path: Path) -> PoseFile:
         rows.fieldnames = columns
         for name in NEEDED:
             if name not in columns:
-                found = ", ".join(columns) or "nothing"
+                found = known_columns(NEEDED, columns)
                 raise RecipeError(f"{path}:1: expected columns {', '.join(NEEDED)}; found {found}{nearest(name, columns)}")
         tilt = next((name for name in TILTS if name in columns), None)
         names = (*NEEDED, tilt) if tilt else NEEDED

@@ -47,5 +47,5 @@ def _kind(path: Path, document: dict[str, Any]) -> str:
         return "opencv"
     raise RecipeError(
         f"{path}: expected camera_matrix and projection_matrix (ROS' camera_info), cam0 (Kalibr), or K1, D1, K2, D2, R, T "
-        f"(OpenCV); found {', '.join(map(str, list(document)[:6])) or 'nothing'}"
+        f"(OpenCV); found {'none of them' if document else 'nothing'}"
     )

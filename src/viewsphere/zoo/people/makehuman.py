@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from viewsphere.aside import aside
 from viewsphere.caches import cache_of
 from viewsphere.errors import UserError
+from viewsphere.files import open_file, read_bytes, read_text
 from viewsphere.zoo.people.skeleton import JOINTS
 from viewsphere.zoo.shapes.solids import Float
 
@@ -102,12 +103,12 @@ def digest() -> str:
 
 @lru_cache(maxsize=1)
 def _digest(file: Path, _changed: int) -> str:
-    return hashlib.sha256(file.read_bytes()).hexdigest()
+    return hashlib.sha256(read_bytes(file)).hexdigest()
 
 
 @lru_cache(maxsize=1)
 def _read(file: Path, _changed: int) -> Human:
-    with np.load(file) as held:
+    with open_file(file) as stream, np.load(stream) as held:
         arrays = {name: held[name] for name in held.files}
     shapes = {name.removeprefix("shape "): a.astype(np.float64) for name, a in arrays.items() if name.startswith("shape ")}
     faces = {name.removeprefix("faces "): a.astype(np.int64) for name, a in arrays.items() if name.startswith("faces ")}
@@ -129,7 +130,7 @@ def set_up(listener: Callable[[str], None]) -> Path:
             root = place / "package" / FOLDER
             listener(f"distilling it into {folder / FILE}")
             distil(root, place / FILE)
-            (place / LICENCE).write_bytes((root / LICENCE).read_bytes())
+            (place / LICENCE).write_bytes(read_bytes(root / LICENCE))
             for name in (LICENCE, FILE):
                 (place / name).replace(folder / name)
     except OSError as error:
@@ -156,7 +157,7 @@ def distil(root: Path, file: Path) -> None:
     left out. Raises UserError for a folder that lacks something.
     """
     try:
-        if "CC0" not in (root / LICENCE).read_text("utf-8"):
+        if "CC0" not in read_text(root / LICENCE):
             raise UserError(f"{root / LICENCE}: expected CC0, found another licence")
         np.savez_compressed(file, allow_pickle=False, **_distilled(root))
     except (FileNotFoundError, KeyError, ValueError) as error:
@@ -173,7 +174,8 @@ def _distilled(root: Path) -> dict[str, NDArray[Any]]:
     found: dict[str, NDArray[Any]] = {"base": (0.1 * vertices[used]).astype(np.float32)}
     for name in _shape_names():
         shift = np.zeros_like(vertices)
-        with gzip.open(root / "targets" / "macrodetails" / f"{name}.target.gz", "rt", encoding="utf-8") as lines:
+        target = root / "targets" / "macrodetails" / f"{name}.target.gz"
+        with open_file(target) as stream, gzip.open(stream, "rt", encoding="utf-8") as lines:
             for line in lines:
                 if line.strip() and not line.startswith("#"):
                     index, *move = line.split()
@@ -197,7 +199,7 @@ def _shape_names() -> Iterator[str]:
 def _obj(file: Path) -> tuple[Float, dict[str, list[tuple[int, int, int]]]]:
     """The vertices of an OBJ file, and the triangles of its groups."""
     vertices, groups, group = list[list[float]](), dict[str, list[tuple[int, int, int]]](), ""
-    for line in file.read_text("utf-8").splitlines():
+    for line in read_text(file).splitlines():
         kind, *words = line.split() or [""]
         if kind == "v":
             vertices.append([float(word) for word in words[:3]])
@@ -211,7 +213,7 @@ def _obj(file: Path) -> tuple[Float, dict[str, list[tuple[int, int, int]]]]:
 
 
 def _rig(root: Path) -> dict[str, Any]:
-    told = json.loads((root / "rigs" / "standard" / "rig.game_engine.json").read_text("utf-8"))
+    told = json.loads(read_text(root / "rigs" / "standard" / "rig.game_engine.json"))
     return told.get("bones", told)
 
 
@@ -234,7 +236,7 @@ def _marks(root: Path, vertices: Float, groups: Mapping[str, list[tuple[int, int
 def _weights(root: Path, count: int) -> Float:
     """Weights (V, 24) of the rig's bones, those of fingers and toes given to the hand's and the foot's ends."""
     rig = _rig(root)
-    told = json.loads((root / "rigs" / "standard" / "weights.game_engine.json").read_text("utf-8"))
+    told = json.loads(read_text(root / "rigs" / "standard" / "weights.game_engine.json"))
     total = np.zeros((count, len(BONES)))
     for bone, rows in cast("dict[str, list[tuple[int, float]]]", told["weights"]).items():
         owner = _owner(bone, rig)
