@@ -247,7 +247,7 @@ def _marks(told: Sequence[Mapping[str, Any]]) -> tuple[Mark, ...]:
 
 
 def _piece(told: Mapping[str, Any], material: int) -> Primitive:
-    def array(name: str) -> NDArray[Any]:
+    def array(name: str) -> Any:
         return load_array(Path(told[name]))
 
     def loaded(name: str) -> Float | None:
