@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import codecs
 import io
-import re
-import zipfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,9 +11,6 @@ from viewsphere.limits import limits
 
 ENOUGH = 10**12
 """Counting stops here: more digits would be a message of pages."""
-
-_OBJECT = re.compile(rb"<(?:\w+:)?(object|component|item)\b([^>]*)>")
-_ID = re.compile(rb"\b(?:object)?id\s*=\s*[\"']([^\"']+)[\"']")
 
 
 def count_instances(references: Mapping[str, Sequence[str]], root: str) -> tuple[int | None, int]:
@@ -86,26 +80,3 @@ def dae_references(data: bytes) -> dict[str, list[str]]:
         elif tag in {"node", "visual_scene"}:
             open_nodes.pop()
     return {name: [by_url.get(other, other) for other in inner] for name, inner in references.items()}
-
-
-def threemf_references(archive: zipfile.ZipFile) -> dict[str, list[str]]:
-    """For each object of a 3MF file its component objects; the build, which lists the printed objects, is `""`."""
-    references: dict[str, list[str]] = {"": []}
-    for entry in archive.namelist():
-        if not entry.lower().endswith(".model"):
-            continue
-        current = ""
-        data = archive.read(entry)
-        if data[:2] in {codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE}:
-            data = data.decode("utf-16", errors="replace").encode()
-        for kind, attributes in _OBJECT.findall(data):
-            found = _ID.search(attributes)
-            name = found[1].decode(errors="replace") if found else ""
-            if kind == b"object":
-                current = name
-                references.setdefault(name, [])
-            elif kind == b"component":
-                references.setdefault(current, []).append(name)
-            else:
-                references[""].append(name)
-    return references

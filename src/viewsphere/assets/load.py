@@ -147,6 +147,14 @@ def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, Fil
         from viewsphere.assets.readers.dae import read_dae
 
         return read_dae(folder)
+    if suffix == "stl":
+        from viewsphere.assets.readers.stl import read_stl
+
+        return read_stl(folder)
+    if suffix == "3mf":
+        from viewsphere.assets.readers.threemf import read_3mf
+
+        return read_3mf(folder)
     from viewsphere.assets.via_trimesh import read_via_trimesh
 
     return read_via_trimesh(folder)

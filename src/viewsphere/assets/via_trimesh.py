@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import re
 import warnings
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
@@ -18,21 +17,13 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import ModelFolder, image_pixels
-from viewsphere.assets.instances import check_instances, threemf_references
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
 from viewsphere.assets.smoothing import creased, split
 from viewsphere.assets.srgb import linear
 from viewsphere.assets.transform import moved
 from viewsphere.errors import ModelError
-from viewsphere.model.model_spec import Axis
 
-UNITS = {
-    "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0,
-}  # fmt: skip
-"""Units of 3MF, metres."""
-
-STL_HEADER, STL_TRIANGLE = 84, 50
 Rgba = tuple[float, float, float, float]
 
 
@@ -47,7 +38,7 @@ def read_via_trimesh(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     loaded = _parse(folder, kind, data)
     builder = _Builder(folder, [])
     pieces = builder.scene(loaded) if "geometry" in loaded else builder.placed(loaded, "object", np.eye(4))
-    facts = _facts(folder, kind, data, loaded)
+    facts = _facts(folder, kind)
     return assemble(folder, pieces, with_alpha_modes(pieces, builder.materials, folder.images), facts)
 
 
@@ -79,20 +70,6 @@ def _check_promises(folder: ModelFolder, kind: str, data: bytes) -> None:
         counts = []
     if any(count > len(data) for count in counts):
         raise folder.error(f"promises {max(counts):,} elements in {len(data):,} bytes: truncated or damaged")
-    try:
-        if kind == "3mf":
-            _check_archive(folder, data)
-    except (ModelError, MemoryError):
-        raise
-    except Exception as error:  # zipfile and lxml raise errors of many kinds for damaged files
-        raise _unreadable(folder, kind, error) from None
-
-
-def _check_archive(folder: ModelFolder, data: bytes) -> None:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        size = sum(entry.file_size for entry in archive.infolist())
-        folder.check("MAX_ARCHIVE_BYTES", size, "bytes in the unpacked archive")
-        check_instances(folder, threemf_references(archive))
 
 
 def _unreadable(folder: ModelFolder, kind: str, error: Exception) -> ModelError:
@@ -104,11 +81,6 @@ def _parse(folder: ModelFolder, kind: str, data: bytes) -> dict[str, Any]:
     """What trimesh's parser returns: the arguments of one mesh, or of a scene of several."""
     from trimesh.exchange.load import mesh_loaders
 
-    if kind == "stl" and len(data) >= STL_HEADER:
-        # Many writers pad binary files; trimesh wants the exact length.
-        length = STL_HEADER + STL_TRIANGLE * int.from_bytes(data[80:84], "little")
-        if STL_HEADER < length < len(data) and not data.lstrip().startswith(b"solid"):
-            data = data[:length]
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -247,11 +219,5 @@ def _with_face_colors(piece: Primitive, colors: NDArray[Any]) -> Primitive:
     return replace(alone, colors=_vertex_colors(np.repeat(colors, 3, axis=0), len(alone.positions)))
 
 
-def _facts(folder: ModelFolder, kind: str, data: bytes, loaded: Mapping[str, Any]) -> FileFacts:
-    up: Axis = "+z"
-    forward: Axis = "-y"
-    unit = 1.0
-    if kind == "3mf":
-        name = str(loaded.get("metadata", {}).get("units", "millimeter")).rstrip("s")
-        unit = UNITS.get(name, UNITS["millimeter"])
-    return FileFacts(folder.model, kind, up, forward, unit)
+def _facts(folder: ModelFolder, kind: str) -> FileFacts:
+    return FileFacts(folder.model, kind, "+z", "-y", 1.0)
