@@ -1,4 +1,4 @@
-"""PLY, STL, OFF, DAE and 3MF: parsed by trimesh (https://trimesh.org), turned into pieces here.
+"""PLY and OFF: parsed by trimesh (https://trimesh.org), turned into pieces here.
 
 trimesh's parsers are called directly: its Trimesh class would merge and reorder vertices.
 """

@@ -14,6 +14,7 @@ from viewsphere.assets.smoothing import creased
 from viewsphere.assets.srgb import linear
 
 HEADER = 84
+BOM = b"\xef\xbb\xbf"
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 LOOKED_AT = 1024
 """First bytes that must hold no NUL in a text: a binary file has some in its count and in its first numbers."""
@@ -21,9 +22,12 @@ LOOKED_AT = 1024
 OWN_COLOR = 0x8000
 """Bit of a facet's attribute. In files of Materialise Magics, whose header says COLOR=, it means: no colour of its own."""
 
-SOLID = re.compile(rb"(?im)^[ \t]*solid\b[ \t]*([^\r\n]*)")
-VERTEX = re.compile(rb"(?i)\bvertex[ \t]+([^\r\n]*)")
-WORDS = re.compile(rb"(?i)\b(facet|endfacet)\b")
+START = re.compile(rb"(?i)\s*(#[^\r\n]*\s+)*solid\b")
+COMMENT = re.compile(rb"(?m)(^|(?<=[ \t]))#.*$")
+SOLID = re.compile(rb"(?im)^[ \t]*solid\b[ \t]*(.*)$")
+END = re.compile(rb"(?im)^[ \t]*endsolid\b.*$")
+FACETS = re.compile(rb"(?i)\bfacet\b")
+VERTEX = re.compile(rb"(?i)\bvertex[ \t]+([^\n]*)")
 
 
 def read_stl(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
@@ -42,7 +46,8 @@ def _facts(folder: ModelFolder) -> FileFacts:
 
 def _is_text(data: bytes) -> bool:
     """Whether the file is text; many binary files begin with "solid", too."""
-    return data[:LOOKED_AT].lstrip(b"\xef\xbb\xbf \t\r\n")[:5].lower() == b"solid" and b"\0" not in data[:LOOKED_AT]
+    head = data[:LOOKED_AT].removeprefix(BOM)
+    return START.match(head) is not None and b"\0" not in head
 
 
 def _binary(folder: ModelFolder, data: bytes) -> Primitive:
@@ -71,11 +76,12 @@ def _magics_colors(header: bytes, attribute: NDArray[np.uint16]) -> Float | None
 
 
 def _text_solids(folder: ModelFolder, data: bytes) -> list[Primitive]:
-    starts = [match.start() for match in SOLID.finditer(data)]
-    names = [_name(match[1]) for match in SOLID.finditer(data)]
+    text = END.sub(b"", COMMENT.sub(b"", data.removeprefix(BOM).replace(b"\r", b"\n")))
+    solids = list(SOLID.finditer(text))
+    ends = [*(solid.start() for solid in solids[1:]), len(text)]
     pieces = [
-        _piece(name or folder.model.stem, _text_corners(folder, data[start:end]), None)
-        for name, start, end in zip(names, starts, [*starts[1:], len(data)], strict=True)
+        _piece(_name(solid[1]) or folder.model.stem, _text_corners(folder, text[solid.end() : end]), None)
+        for solid, end in zip(solids, ends, strict=True)
     ]
     folder.check("MAX_TRIANGLES", sum(len(piece.triangles) for piece in pieces), "triangles")
     return [piece for piece in pieces if len(piece.triangles)]
@@ -88,7 +94,7 @@ def _name(words: bytes) -> str:
 def _text_corners(folder: ModelFolder, text: bytes) -> Float:
     """Corners (T, 3, 3) of one solid's facets."""
     rows = VERTEX.findall(text)
-    facets = len(WORDS.findall(text)) // 2
+    facets = len(FACETS.findall(text))
     try:
         numbers = np.array(b" ".join(rows).split(), dtype=bytes).astype(np.float64) if rows else np.zeros(0)
     except ValueError as error:

@@ -16,7 +16,6 @@ from viewsphere.assets.smoothing import split
 from viewsphere.assets.srgb import linear
 
 TILES: dict[str, Wrap] = {"wrap": "repeat", "mirror": "mirror", "clamp": "clamp", "none": "clamp"}
-LEFT_OUT = ("compositematerials", "multiproperties")
 
 
 class Resources:
@@ -43,18 +42,22 @@ class Resources:
     def _group(self, group: str, piece: Primitive, properties: Int) -> Iterator[Primitive]:
         element = self.elements.get(group)
         kind = "" if element is None else str(element.tag).rpartition("}")[2]
-        if kind == "basematerials":
+        if element is None:
+            yield self._plain(piece, group, "do not exist")
+        elif kind == "basematerials":
             yield from self._by_base(element, piece, properties[:, 0])
         elif kind == "colorgroup":
-            colors = np.array([_color(child.get("color")) for child in element])
+            colors = np.array([_color(child.get("color")) for child in element.iterchildren("{*}color")])
             yield replace(split(piece), colors=self._picked(colors, properties, group))
         elif kind == "texture2dgroup":
             yield self._textured(element, piece, properties, group)
         else:
-            if group:
-                why = "are not read" if kind in LEFT_OUT else "do not exist"
-                self.folder.warn(f"its properties {group[:40]!r} ({kind or 'unknown'}) {why}; white there")
-            yield piece
+            yield self._plain(piece, group, f"are {kind[:40]}, not read")
+
+    def _plain(self, piece: Primitive, group: str, why: str) -> Primitive:
+        if group:
+            self.folder.warn(f"its properties {group[:40]!r} {why}; white there")
+        return piece
 
     def _by_base(self, element: Any, piece: Primitive, index: Int) -> Iterator[Primitive]:
         bases = list(element)
@@ -78,8 +81,8 @@ class Resources:
             return piece
         uv = np.array([(child.get("u"), child.get("v")) for child in element], dtype=str).astype(np.float64)
         uv[:, 1] = 1 - uv[:, 1]
-        wraps = [TILES.get(str(picture.get(name, "wrap")), "repeat") for name in ("tilestyleu", "tilestylev")]
-        texture = Texture(index, wrap_s=wraps[0], wrap_t=wraps[1], nearest=picture.get("filter") == "nearest")
+        wrap_s, wrap_t = _wrap(picture.get("tilestyleu")), _wrap(picture.get("tilestylev"))
+        texture = Texture(index, wrap_s=wrap_s, wrap_t=wrap_t, nearest=picture.get("filter") == "nearest")
         material = Material(name=str(element.get("texid")), base_color_texture=texture)
         return replace(split(piece), uv0=self._picked(uv, properties, group), material=self._number(material))
 
@@ -97,6 +100,10 @@ class Resources:
 
 def _piece(mesh: Triangles, rows: Int) -> Primitive:
     return compact(Primitive(part="", material=0, positions=mesh.vertices, triangles=mesh.corners[rows]))
+
+
+def _wrap(style: str | None) -> Wrap:
+    return TILES.get(style or "wrap", "repeat")
 
 
 def _color(text: str | None) -> Float:
