@@ -12,6 +12,7 @@ from quick import quick
 from viewsphere.assets.surface import Surface
 from viewsphere.assets.symmetries import find, lacking
 from viewsphere.geometry.rotation import rotation_about
+from viewsphere.geometry.rotation_group import is_group
 from viewsphere.model.symmetries import Continuous, Symmetries
 from viewsphere.zoo import build
 
@@ -249,3 +250,38 @@ def test_distances_equal_those_to_every_triangle():
     np.testing.assert_allclose((normals**2).sum(axis=1), 1)
     far = shape.closest(points, np.eye(4), 0.2)[0]
     np.testing.assert_array_equal(np.isinf(far), squares > 0.04)
+
+
+def near_cube(side, height):
+    return solid.box((side, side, height))
+
+
+def group_of(found):
+    return np.array([np.eye(4), *found.discrete])
+
+
+@pytest.mark.parametrize("height", quick([1.4, 1.41, 1.39, 1.37, 1.43], 1.4))
+def test_the_rotations_of_a_prism_that_is_nearly_a_cube_are_a_group(height):
+    shape = surface(near_cube(1.41421356, height))
+    found = find(shape)
+    assert len(found.discrete) in {7, 23} and found.unlisted() is None and is_group(group_of(found))
+    assert not list(lacking(shape, found))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(24))
+def test_rotations_of_inexact_shapes_are_a_group(seed):
+    """Boxes and prisms of which each corner is a little off, turned anyhow."""
+    rng = np.random.default_rng(seed)
+    make = (
+        lambda: solid.box(1 + 0.03 * rng.random(3)),
+        lambda: solid.cylinder(1, rng.uniform(0.3, 3), sections=int(rng.integers(3, 17))),
+        tetrahedron,
+    )[seed % 3]
+    mesh = make()
+    mesh.vertices = mesh.vertices + rng.normal(size=mesh.vertices.shape) * rng.choice([1e-4, 0.003, 0.008])
+    mesh.apply_transform(rotation_matrix(rng.uniform(0, 3), rng.normal(size=3)) @ at(*rng.normal(size=3)))
+    shape = surface(mesh)
+    found = find(shape)
+    assert found.continuous or (found.unlisted() is None and is_group(group_of(found)))
+    assert not list(lacking(shape, found))

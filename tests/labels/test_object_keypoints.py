@@ -1,5 +1,6 @@
 """keypoints and canonical_pose: where named points are, whether rays reach them, and which pose stands for its like."""
 
+import itertools
 import math
 
 import numpy as np
@@ -158,6 +159,18 @@ BOX = {"discrete": [plain(quarter(axis, 2)) for axis in "xyz"]}
 CONE = {"continuous": [{"axis": [0, 0, 1], "offset": [0.1, -0.2, 0.3]}]}
 CYLINDER = {"discrete": [plain(quarter("x", 2))], "continuous": [{"axis": [0, 0, 1]}]}
 BALL = {"continuous": [{"axis": axis, "offset": [0.1, 0.2, 0.3]} for axis in ([1, 0, 0], [0, 1, 0], [0, 0, 1])]}
+CUBE = [
+    rigid(turn, (0, 0, 0)).tolist()
+    for order in itertools.permutations(range(3))
+    for signs in itertools.product((1, -1), repeat=3)
+    if np.linalg.det(turn := np.eye(3)[list(order)] * signs) > 0 and np.trace(turn) < 3
+]
+HEXAGON = [
+    plain(rotation_about((0, 0, math.pi * k / 3)) @ flip)
+    for flip in (np.eye(3), np.diag([1.0, -1, -1]))
+    for k in range(6)
+    if k or flip[1, 1] < 0
+]
 KINDS = {"square": SQUARE, "box": BOX, "cone": CONE, "cylinder": CYLINDER, "ball": BALL}
 
 
@@ -170,6 +183,29 @@ def test_all_poses_that_look_the_same_have_one_canonical_pose(kind):
         for motion in symmetries.motions(7):
             again = nearest(compose(pose, motion), symmetries)
             close("canonical_pose", "that of every pose that looks the same", again, wanted, "m", atol=2e-6)
+
+
+def grid():
+    """Rotations of the default grid of azimuths, at elevations where many poses are equally near to the identity."""
+    for azimuth, elevation in itertools.product(range(0, 360, 45), (0, 20, 45, 90, -90)):
+        a, e = math.radians(azimuth), math.radians(elevation)
+        (s, c), (f, g) = (math.sin(a), math.cos(a)), (math.sin(e), math.cos(e))
+        yield np.array([[c, s, 0], [f * s, -f * c, -g], [-g * s, g * c, -f]])
+
+
+TIED = {**KINDS, "cube": {"discrete": CUBE}, "hexagonal prism": {"discrete": HEXAGON}}
+
+
+@pytest.mark.parametrize("kind", TIED)
+@pytest.mark.parametrize("noise", [0, 1e-12])
+def test_equally_near_poses_have_one_canonical_pose(kind, noise):
+    symmetries, rng = Symmetries.model_validate(TIED[kind]), np.random.default_rng(6)
+    for rotation in grid():
+        pose = rigid(rotation, (0.1, -0.2, 5.0))
+        wanted = nearest(pose, symmetries)
+        for motion in symmetries.motions(8):
+            other = compose(pose, motion) + noise * rng.normal(size=(4, 4))
+            np.testing.assert_allclose(nearest(other, symmetries), wanted, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", quick(KINDS, "square", "box", "cone"))

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.surface import Surface
 from viewsphere.geometry.rotation import product, rotation_about, transform
+from viewsphere.geometry.rotation_group import largest_group
 from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.symmetries import Continuous, Symmetries
 
@@ -73,7 +74,7 @@ def find(surface: Surface) -> Symmetries:
     """All symmetries of a surface (within `TOLERANCE`), in object axes and metres.
 
     A ball has the three axes of the object as continuous ones; anything else that is round has one, and one half turn if its
-    ends are alike. All else has its rotations, by axes.
+    ends are alike. All else has its rotations, by axes: the largest group of them that holds all its products.
     """
     usual, lines = _usual(surface), list[Line]()
     round_ones = list(_around(surface, usual, [GOLDEN * i for i in (1, 2, 3)], lines, _as_round))
@@ -85,8 +86,22 @@ def find(surface: Surface) -> Symmetries:
                 return _turned(surface, [line])
             lines.append(line)
             if order == line.order == 2 and sum(one.order > 2 for one in lines) == 1:  # a prism, whose others follow
-                return Symmetries(discrete=tuple(_rotations(surface, _whole(lines))))
-    return Symmetries(discrete=tuple(_rotations(surface, _whole(lines))))
+                return _finite(surface, _whole(lines))
+    return _finite(surface, _whole(lines))
+
+
+def _finite(surface: Surface, lines: Iterable[Line]) -> Symmetries:
+    """The largest group of rotations about lines of these orders."""
+    limit = TOLERANCE * surface.diameter
+    motions = np.array([*_turns(lines)]).reshape(-1, 4, 4)
+    group = largest_group(
+        motions,
+        lambda few: surface.are_near(few, limit),
+        lambda few: surface.are_near(few, COARSE * limit),
+        np.eye(3),
+        NICE,
+    )
+    return Symmetries(discrete=tuple(_plain_motion(surface, motion) for motion in group))
 
 
 def lacking(surface: Surface, declared: Symmetries) -> Iterator[str]:
@@ -129,8 +144,9 @@ def _turned(surface: Surface, lines: Sequence[Line]) -> Symmetries:
     axis = _nice(least - line.axis * float((least * line.axis).sum()))
     places = (line.offset, _middle(surface, line))
     across = min((Line(axis, place, 2) for place in places), key=lambda one: _misfit(surface, one, math.pi))
-    flips = _rotations(surface, [across]) if _is_one(surface, across, [math.pi]) else ()
-    return Symmetries(discrete=tuple(flips), continuous=(Continuous(axis=_plain(line.axis), offset=offset),))
+    flips = [*_turns([across])] if _is_one(surface, across, [math.pi]) else []
+    discrete = tuple(_plain_motion(surface, flip) for flip in flips)
+    return Symmetries(discrete=discrete, continuous=(Continuous(axis=_plain(line.axis), offset=offset),))
 
 
 def _middle(surface: Surface, line: Line) -> Float:
@@ -139,13 +155,16 @@ def _middle(surface: Surface, line: Line) -> Float:
     return line.offset + line.axis * ((along.min() + along.max()) / 2 - float((line.offset * line.axis).sum()))
 
 
-def _rotations(surface: Surface, lines: Iterable[Line]) -> Iterator[Matrix4]:
-    """The rotations about lines of these orders, without the identity."""
+def _turns(lines: Iterable[Line]) -> Iterator[Float]:
+    """The rotations (4, 4) about lines of these orders, without the identity."""
     for line in lines:
-        for i in range(1, line.order):
-            motion = _motion(line, 2 * math.pi * i / line.order)
-            places = _metres(surface, motion[:3, 3])
-            yield cast("Matrix4", (*((*_plain(motion[k, :3]), places[k]) for k in range(3)), (0.0, 0.0, 0.0, 1.0)))
+        yield from (_motion(line, 2 * math.pi * i / line.order) for i in range(1, line.order))
+
+
+def _plain_motion(surface: Surface, motion: Float) -> Matrix4:
+    """A motion's rows, in numbers that are equal on all processors."""
+    places = _metres(surface, motion[:3, 3])
+    return cast("Matrix4", (*((*_plain(motion[k, :3]), places[k]) for k in range(3)), (0.0, 0.0, 0.0, 1.0)))
 
 
 def _plain(numbers: ArrayLike, digits: int = 9) -> Vector:
