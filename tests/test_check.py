@@ -88,7 +88,10 @@ def test_a_whole_data_set_passes(whole):
     report = check(whole)
     assert report.ok, report.findings
     assert report.notes == ()
-    names = ["files", "ids", "camera", "shot", *PLAIN, "surface"]
+    assert report.not_run == dict.fromkeys(["plan", "recipe", "sources"], "made by viewsphere 1")
+    held = f"{len(report.checked)} proofs hold, 3 not run: plan, recipe, sources (made by viewsphere 1)"
+    assert report.verdict == f"{held}; 0 of 12 frames painted again"
+    names = ["store", "files", "ids", "camera", "shot", *PLAIN, "surface"]
     assert report.checked.pop("digests") > 12 * len(whole.plan.channels)
     assert report.checked.pop("models") == 3
     assert report.checked == dict.fromkeys(names, 12)
@@ -131,16 +134,17 @@ def test_every_export_that_is_there_is_proved_by_its_format(dataset):
     (dataset.root / "native" / "more.txt").touch()
     assert failures(dataset, rays=False) == {("coco", 2), ("native", None)}
     part = check(Dataset(dataset.root), rays=False, frames=6)
-    assert part.ok and "coco: not checked, that needs all frames" in part.notes
+    assert part.ok and part.not_run["coco"] == "needs all frames"
+    assert "6 of 12 frames read" in part.verdict
 
 
 @pytest.mark.slow
-def test_a_format_without_a_proof_is_a_note(dataset):
+def test_a_format_without_a_proof_is_not_run(dataset):
     (dataset.root / "blend").mkdir()
     (dataset.root / "blend" / "a.blend").write_text("scene")
     write_checksums(dataset.root / "blend")
     report = check(dataset, rays=False)
-    assert report.ok and report.notes == ("blend: only digests are checked, the format has no proof",)
+    assert report.ok and report.not_run["blend"] == "the format has no proof, only digests were compared"
     (dataset.root / "blend" / "a.blend").write_text("scena")
     assert [finding.check for finding in check(dataset, rays=False).findings] == ["blend"]
 
@@ -162,10 +166,10 @@ def test_an_export_s_proof_that_breaks_off(dataset, monkeypatch, error, message)
     assert [(f.check, f.message) for f in check(dataset, rays=False).findings] == [("native", message)]
 
 
-def test_pictures_alone_pass_with_notes(tmp_path):
+def test_pictures_alone_pass_without_the_proof_of_surfaces(tmp_path):
     report = check(make(tmp_path, channels=("rgb",)))
     assert report.ok, report.findings
-    assert any("depth and instances" in note for note in report.notes)
+    assert report.not_run["surface"] == "needs the channels depth and instances"
 
 
 @pytest.mark.slow
@@ -173,7 +177,9 @@ def test_rays_are_cast_on_the_frames_asked_for(whole, monkeypatch):
     assert check(whole, sample=3).checked["surface"] == 3
     assert "surface" not in check(whole, rays=False).checked
     monkeypatch.setattr("viewsphere.check.rays.find_spec", lambda name: None)
-    assert any(note.startswith("surface: not checked") for note in check(whole).notes)
+    report = check(whole)
+    assert report.not_run["surface"] == "install viewsphere[check]"
+    assert "surface (install viewsphere[check])" in report.verdict
     with pytest.raises(MissingExtraError, match=r"viewsphere\[check\]"):
         check(whole, rays=True)
 
@@ -529,10 +535,10 @@ def test_files_that_are_lost_longer_or_strange_are_found(whole, tmp_path, change
     assert len(findings) == 1 and "expected " in findings[0].message
 
 
-def test_frames_without_their_shots_are_a_note(spelled):
+def test_labels_of_frames_without_their_shots_are_not_run(spelled):
     report = check(spelled, rays=False)
     assert report.ok
-    assert report.notes[0].startswith("12 frames came without their shots")
+    assert report.not_run["labels"] == "12 frames came without their shots"
 
 
 # the fields of records, generated from the tables of labels

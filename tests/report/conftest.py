@@ -31,7 +31,11 @@ def page_file(small_dataset) -> Path:
     from viewsphere.report import Proof, write_report
 
     file = small_dataset.root / "report.html"
-    write_report(small_dataset, file, proof=Proof(False, {"boxes": 12}, ("boxes: frame 3: expected <b>this</b>",), ("a note",)))
+    write_report(
+        small_dataset,
+        file,
+        proof=Proof(False, {"boxes": 12}, ("boxes: frame 3: expected <b>this</b>",), ("a note",), "1 finding", {"rays": "why"}),
+    )
     return file
 
 

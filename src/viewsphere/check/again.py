@@ -21,11 +21,12 @@ Findings = Iterator[tuple[str, str]]
 
 
 class Again:
-    """Computes labels of a data set again."""
+    """Computes labels of a data set again; `not_run` has the reason for each that cannot be, by its name."""
 
     def __init__(self, dataset: Dataset, scenery: Scenery, models: Mapping[str, ModelInfo]) -> None:
-        self._dataset, self._scenery = dataset, scenery
+        self._dataset = dataset
         self._sights = Sights(dataset, scenery, models)
+        self.not_run: dict[str, str] = {}
 
     def is_possible(self, sample: Sample) -> bool:
         """Whether it is known what was seen."""
@@ -49,9 +50,7 @@ class Again:
         try:
             return label.compute(sight)
         except RecipeError as error:
-            note = f"{label.name} not checked: {error}"
-            if note not in self._scenery.notes:
-                self._scenery.notes.append(note)
+            self.not_run[label.name] = str(error)
             return None
 
     def _pixels(self, sample: Sample, name: str, again: NDArray[Any] | None) -> Iterator[str]:
@@ -67,7 +66,7 @@ class Again:
                 yield f"expected {len(again):,} rows, found {len(kept):,}"
             return
         step = depth_step(self._dataset.read(sample.files[name])) if name == "depth" else 0.0
-        wrong = _beyond(kept, again, step) if step else _unequal(kept, again)
+        wrong = _beyond(kept, again, step) if step else unequal(kept, again)
         if wrong.any():
             where = tuple(int(i[0]) for i in np.nonzero(wrong))
             what, at = ("pixels", f"pixel {where[::-1]}") if wrong.ndim == 2 else ("rows", f"row {where[0]}")
@@ -77,7 +76,7 @@ class Again:
             )
 
 
-def _unequal(kept: NDArray[Any], again: NDArray[Any]) -> NDArray[np.bool_]:
+def unequal(kept: NDArray[Any], again: NDArray[Any]) -> NDArray[np.bool_]:
     """(H, W): where any component differs; NaN equals itself. Of rows (N,): which differ in any byte."""
     if kept.dtype.names:
         return (_bytes(kept) != _bytes(again)).any(axis=1)

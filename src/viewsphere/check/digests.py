@@ -33,8 +33,9 @@ def _damage(folder: Path) -> tuple[int, list[str]]:
 
 
 def _folders(dataset: Dataset) -> list[Path]:
-    """Those of the finished models, and of the shots that the plan knows."""
+    """Those of the finished models, of what was simulated, and of the shots that the plan names."""
     store = dataset.store
     models = [store.model_folder(key) for key in dataset.plan.models]
     shots = [store.shot_folder(key) for key in store.finished() if dataset.plan.find(key) is not None]
-    return [folder for folder in models if folder.is_dir()] + sorted(shots)
+    simulated = sorted((store.folder / "simulated").glob("*/*"))
+    return [folder for folder in models if folder.is_dir()] + simulated + sorted(shots)

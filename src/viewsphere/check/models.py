@@ -25,6 +25,7 @@ from viewsphere.files import open_text, read_bytes
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.diameter import diameter
 from viewsphere.store import Category, Dataset, ModelInfo
+from viewsphere.store.manifest import MANIFEST
 
 PRECISION = 1e-12
 """Share of a number by which texts may differ: brightness above 1 is kept as a product in a GLB."""
@@ -37,14 +38,21 @@ def differing(dataset: Dataset, notes: list[str]) -> Iterator[Finding]:
     """Models whose files contradict one another; `notes` gets those that were exported elsewhere."""
     is_imported = any(not part.settings for part in dataset.plan.parts)
     categories = {category.id: category for category in dataset.categories}
+    named: dict[str, set[str]] = {}
     for info in dataset.models:
         if is_imported and not info.parts:
             notes.append(f"models: the files of {info.key} are not compared, they were exported elsewhere")
             continue
+        names = named.setdefault(owner(info), {"model.json", MANIFEST, Path(info.glb).name})
         try:
-            yield from ((owner(info), f"model {info.key}: {message}") for message in _problems(dataset, info, categories))
+            problems = list(_problems(dataset, info, categories, names))
         except Exception as error:
-            yield owner(info), f"model {info.key}: {failure('files that can be compared', error)}"
+            problems = [failure("files that can be compared", error)]
+        yield from ((owner(info), f"model {info.key}: {message}") for message in problems)
+    for key, names in named.items():
+        for file in sorted(dataset.store.model_folder(key).iterdir()):
+            if file.name not in names:
+                yield key, f"model {key}: expected no such file, because nothing in the data set names it: delete {file}"
 
 
 def owner(info: ModelInfo) -> str:
@@ -52,7 +60,8 @@ def owner(info: ModelInfo) -> str:
     return info.track or info.key
 
 
-def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]) -> Iterator[str]:
+def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category], names: set[str]) -> Iterator[str]:
+    """Contradictions of a model's files; `names` gets those of the files that belong to it."""
     folder, known = dataset.path(info.obj).parent, categories.get(info.category_id)
     mesh = read_exported(dataset.path(info.glb), info.parts, info.node, whole=True)
     yield from _facts(info, mesh)
@@ -68,6 +77,7 @@ def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]
     with temporary("check") as aside:
         export_obj(mesh, aside, Path(info.obj).stem, library)
         for file in sorted(aside.iterdir()):
+            names.add(file.name)
             yield from _compared(file, folder / file.name)
 
 

@@ -118,12 +118,18 @@ def check(
     against_cycles: Annotated[
         int, typer.Option(min=0, metavar="N", help="Compare N frames with Cycles' own pass of object indices; needs Blender.")
     ] = 0,
+    repaint: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|all", help="Paint N frames again, or all, and compare pictures and passes.", show_default=False
+        ),
+    ] = None,
     durability: Durability = None,
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:
-    """Prove a data set: digests of all files, labels computed again from the exported models, rays, exports. Exit status 1 if
-    it fails.
+    """Prove a data set: digests of all files, plan, models and shots by the stored recipe, labels by the exported models, rays,
+    exports. Exit status 1 if it fails.
     """
     from viewsphere.check import check as prove
     from viewsphere.check.repair import repair
@@ -131,6 +137,7 @@ def check(
 
     crew = cores() if workers is None else workers
     options: dict[str, Any] = {"sample": None if all_ else sample, "against_cycles": against_cycles, "fast": fast}
+    options["repaint"] = _frames_asked(repaint)
     if mend:
         with ProgressBar(quiet=json_) as bar:
             repaired = repair(folder, workers=crew, listener=bar.show, **options)
@@ -216,4 +223,13 @@ def _proof(dataset: Dataset, frames: int) -> Proof:
     from viewsphere.report import Proof
 
     found = prove(dataset, frames=frames)
-    return Proof(found.ok, found.checked, tuple(map(str, found.findings)), found.notes)
+    return Proof(found.ok, found.checked, tuple(map(str, found.findings)), found.notes, found.verdict, found.not_run)
+
+
+def _frames_asked(text: str | None) -> int | None:
+    """The number of frames that `--repaint` asks for, None for all."""
+    if text == "all":
+        return None
+    if text is None or text.isdecimal():
+        return int(text or 0)
+    raise UserError(f"--repaint: expected a number of frames or all; found {text!r}")

@@ -99,19 +99,22 @@ def _size(count: float) -> str:
 
 
 def print_report(report: Report, repaired: Sequence[str] = ()) -> None:
-    """Print what `check` found, and before what it made again."""
+    """Print the outcome of `check`, after a line for everything that was made again."""
     for line in repaired:
         typer.echo(f"repaired: {line}")
     failed = Counter(finding.check for finding in report.findings)
     for name, count in report.checked.items():
-        typer.echo(f"{name:17} {f'{failed[name]:,} findings' if failed[name] else 'ok':14} {count:,} checked")
+        found = f"{failed[name]:,} finding{'' if failed[name] == 1 else 's'}" if failed[name] else "ok"
+        typer.echo(f"{name:17} {found:14} {count:,} checked")
+    for name, reason in report.not_run.items():
+        typer.echo(f"not run: {name}: {reason}")
     for note in report.notes:
         typer.echo(f"note: {note}")
     for finding in report.findings[:MOST_FINDINGS]:
         typer.echo(f"failed: {finding}", err=True)
     if len(report.findings) > MOST_FINDINGS:
         typer.echo(f"and {len(report.findings) - MOST_FINDINGS:,} findings more; --json lists all", err=True)
-    typer.echo("all proofs hold" if report.ok else f"{len(report.findings):,} findings")
+    typer.echo(report.verdict)
 
 
 def _print_warnings(warnings: Warnings) -> None:

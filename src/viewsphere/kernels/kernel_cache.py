@@ -24,6 +24,9 @@ IS_STOCK = os.environ.get("VIEWSPHERE_STOCK_NUMBA", "0") != "0" or ".".join(NUMB
 BUILD = (NUMBA, IS_STOCK, llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
 """The versions that turn sources into machine code, and the processor that the code is for."""
 
+PAINTER = f"{BUILD[2]}, numba {NUMBA}{' stock' if IS_STOCK else ''}"
+"""The processor type and the kernel build: where both are equal, pictures are equal to the last bit."""
+
 
 def kernel_folder() -> Path:
     """Where compiled kernels are kept: `$NUMBA_CACHE_DIR`, `$VIEWSPHERE_CACHE/kernels`, or in the user's cache folder."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -44,12 +44,16 @@ Listener = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Proof:
-    """What `viewsphere check` found, for the page: frames behind each check, findings and notes in words."""
+    """The outcome of `viewsphere check`, for the page: frames behind each proof, findings and notes, the verdict in a line, and
+    the reason for each proof that did not run.
+    """
 
     ok: bool
     checked: dict[str, int]
     findings: tuple[str, ...]
     notes: tuple[str, ...]
+    verdict: str
+    not_run: dict[str, str] = field(default_factory=dict[str, str])
 
 
 def write_report(

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
 from viewsphere.errors import StoreError, UserError, ViewsphereError
-from viewsphere.model.thing import TimeStep
 from viewsphere.run.executors import Job, Listed, hired
 from viewsphere.run.opening import check_whether_same
 from viewsphere.run.progress import Listener, Progress
@@ -37,20 +35,13 @@ class Mender:
         """Make the models of these keys again; gives what could not be done."""
         errors, wanted = _sorted(keys, self._part_of_model)
         for number, found in wanted.items():
-            specs = {spec.key: spec for spec, _ in self._portion(number).models}
+            specs = self._replanned.models(number)
             credit_of = self._portion(number).plan.credits.get
-            tasks = {key: ModelTask("damaged model", specs[key], self._steps(key), credit_of(key)) for key in found}
+            tasks = {
+                key: ModelTask("damaged model", specs[key], self._replanned.steps_of(key), credit_of(key)) for key in found
+            }
             self._run(number, [Job(key, key, task) for key, task in tasks.items()], errors)
         return errors
-
-    def _steps(self, key: str) -> tuple[TimeStep, ...]:
-        """The time steps of a model that all parts asked for whose recipes can be planned."""
-        found: dict[int, TimeStep] = {}
-        for number in range(len(self.record.parts)):
-            with suppress(UserError):
-                models = {spec.key: steps for spec, steps in self._portion(number).models}
-                found |= {step.frame: step for step in models.get(key, ())}
-        return tuple(found.values())
 
     def shots(self, keys: Iterable[str]) -> Errors:
         """Render the shots of these keys again, if their models are what they were; gives what could not be done."""

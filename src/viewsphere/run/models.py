@@ -103,13 +103,22 @@ class Models:
                 "give the recipe's entry a name"
             )
 
+    def made(self, spec: ModelSpec, steps: Iterable[TimeStep], credit: Credit | None) -> tuple[ModelInfo, Export]:
+        """The record of a model at these time steps, made from its source, and what writes its files. Raises ModelError for a
+        file that cannot be used.
+        """
+        return self._made(spec, _with_rest(spec, steps), credit)
+
+    def _made(self, spec: ModelSpec, steps: Steps, credit: Credit | None) -> tuple[ModelInfo, Export]:
+        info, export = self._deforming(spec, steps) if steps else self._still(spec)
+        return replace(info, credit=credit, steps=tuple(replace(one, credit=credit) for one in info.steps)), export
+
     def _write(self, spec: ModelSpec, steps: Steps, credit: Credit | None, place: AbstractContextManager[Path]) -> None:
         """Export a model into a folder, with all its time steps if it deforms."""
-        info, export = self._deforming(spec, steps) if steps else self._still(spec)
-        moments = tuple(replace(one, credit=credit) for one in info.steps)
+        info, export = self._made(spec, steps, credit)
         with place as folder:
             export(folder)
-            self.store.write_model_info(folder, replace(info, credit=credit, steps=moments))
+            self.store.write_model_info(folder, info)
 
     def _still(self, spec: ModelSpec) -> tuple[ModelInfo, Export]:
         """A model that stays as it is."""

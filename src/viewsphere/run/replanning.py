@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from viewsphere.errors import StoreError, UserError
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.extension import Portion, resumed
 from viewsphere.sampling.plan import Plan, plan
@@ -33,25 +36,49 @@ class Replanned:
 
     store: Store
     record: PlanRecord
-    _portions: dict[int, Portion | UserError] = field(default_factory=dict[int, "Portion | UserError"])
+    _plans: dict[int, Plan | UserError] = field(default_factory=dict[int, "Plan | UserError"])
+    _portions: dict[int, Portion] = field(default_factory=dict[int, Portion])
 
-    def portion(self, number: int) -> Portion:
-        """A part, with its recipe's plan, which reads what was simulated for the part and keeps nothing more.
+    def plan(self, number: int) -> Plan:
+        """The plan of a part's recipe.
 
         Raises StoreError for a part that another data set brought, and where files of the recipe are no longer where they were;
         AnotherPlan where they are, and the plan is another.
         """
-        if number not in self._portions:
+        if number not in self._plans:
             try:
-                self._portions[number] = self._planned(number)
+                self._plans[number] = self._planned(number)
             except UserError as error:
-                self._portions[number] = error
-        found = self._portions[number]
+                self._plans[number] = error
+        found = self._plans[number]
         if isinstance(found, UserError):
             raise found
         return found
 
-    def _planned(self, number: int) -> Portion:
+    def portion(self, number: int) -> Portion:
+        """A part, with its recipe's plan, which reads what was simulated for the part and keeps nothing more; errors as for
+        `plan`.
+        """
+        if number not in self._portions:
+            found = resumed(self.plan(number), self.record, number)
+            memory = Simulated(self.store.root, writes=False)
+            self._portions[number] = replace(found, plan=found.plan.changed(memory=memory))
+        return self._portions[number]
+
+    def models(self, number: int) -> dict[str, ModelSpec]:
+        """The models of a part by their keys, with the data set's numbers of their categories; errors as for `portion`."""
+        return {spec.key: spec for spec, _ in self.portion(number).models}
+
+    def steps_of(self, key: str) -> tuple[TimeStep, ...]:
+        """The time steps of a model that all parts ask for whose recipes can be planned."""
+        found: dict[int, TimeStep] = {}
+        for number in range(len(self.record.parts)):
+            with suppress(UserError):
+                models = {spec.key: steps for spec, steps in self.portion(number).models}
+                found |= {step.frame: step for step in models.get(key, ())}
+        return tuple(found.values())
+
+    def _planned(self, number: int) -> Plan:
         part = self.record.parts[number]
         if part.merged or not part.is_sampled:
             raise StoreError(
@@ -66,8 +93,7 @@ class Replanned:
                 problem = problem or error
                 continue
             if planned.digest == part.digest:
-                found = resumed(planned, self.record, number)
-                return replace(found, plan=found.plan.changed(memory=Simulated(self.store.root, writes=False)))
+                return planned
             message = f"recipe {part.name!r}: expected a plan of digest {part.digest[:12]}, found {planned.digest[:12]}"
             problem = AnotherPlan(f"{self.store.root}: {message}", planned)
         raise problem or StoreError(f"{self.store.root}: expected a folder to plan in, found none")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from viewsphere.kernels.kernel_cache import PAINTER
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
@@ -87,7 +88,8 @@ class Worker:
         """
         shot = self._composer.shot(row)
         samples = _counted(self.stages.render(shot), tell)
-        return self.store.write_shot(shot.key, samples, self._composer.scenery(shot), shot.files, shot, again)
+        scenery = self._composer.scenery(shot)
+        return self.store.write_shot(shot.key, samples, scenery, shot.files, shot, again, PAINTER)
 
 
 def _counted(samples: Iterable[Sample], tell: Callable[[int], None]) -> Iterator[Sample]:

@@ -173,9 +173,13 @@ def _at_pose(now: Instant, pose: int) -> Instant:
     return now.model_copy(update={"viewpoint": now.viewpoint and now.viewpoint.model_copy(update={"index": pose})})
 
 
+NOTHING = PlanRecord("", "", "", {}, (), (), (), (), 0, 0, 0)
+"""A data set without parts."""
+
+
 def whole(planned: Plan) -> Portion:
     """A recipe's plan as the only part of a data set."""
-    return extend(planned, PlanRecord("", "", "", {}, (), (), (), (), 0, 0, 0))
+    return extend(planned, NOTHING)
 
 
 def resumed(planned: Plan, there: PlanRecord, number: int) -> Portion:

@@ -18,7 +18,7 @@ from viewsphere.store.channel_files import check_codecs, decode, depth_step, enc
 from viewsphere.store.choice import Choice, frame_ranges
 from viewsphere.store.dataset import Dataset
 from viewsphere.store.exported import Exported
-from viewsphere.store.folder import Store, new_folder
+from viewsphere.store.folder import Store, kept_shot, new_folder
 from viewsphere.store.index import Block, Row
 from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord
 from viewsphere.store.simulated import Simulated
@@ -44,6 +44,7 @@ __all__ = [
     "depth_step",
     "encode",
     "frame_ranges",
+    "kept_shot",
     "located",
     "new_folder",
 ]

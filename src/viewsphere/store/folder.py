@@ -344,18 +344,19 @@ class Store:
         kinds: Files | None = None,
         shot: Shot | None = None,
         again: bool = False,
+        painter: str = "",
     ) -> int:
         """Write all frames of a shot, with the channels their samples hold; gives their number. `again` as for `aside`.
 
         `scenery`, if any, is a text that says what stands there that is no object; `kinds` of files are the default ones.
-        What is known of the `shot` besides is kept for those who make its scene anew.
+        What is known of the `shot` besides is kept for those who make its scene anew; `painter` as for `Manifest`.
         """
         target = self.shot_folder(key)
         prefix = target.relative_to(self.root).as_posix()
         records: list[dict[str, Any]] = []
         kinds, table = kinds or Files(), channels()
         own = {} if shot is None else {sensor.name: sensor.kept(shot.channels) for sensor in shot.rig.sensors}
-        with self.aside(target, again) as folder, ShotFiles(folder, kinds) as put:
+        with self.aside(target, again) as folder, ShotFiles(folder, kinds, painter) as put:
             for sample in samples:
                 files: dict[str, str] = {}
                 for name, array in sample.channels.items():
@@ -370,9 +371,7 @@ class Store:
             if scenery:
                 (folder / "scenery.json").write_text(scenery, "utf-8", newline="\n")
             if shot is not None:
-                # The other things are in scenery.json, and labels are those of the instant, not of what moves around it.
-                labelled = shot.model_copy(update={"things": shot.objects, "shutter": 0.0, "exposures": ()})
-                (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8", newline="\n")
+                (folder / "shot.json").write_text(kept_shot(shot).model_dump_json(), "utf-8", newline="\n")
         return len(records)
 
     def labelled(self, key: str) -> Shot | None:
@@ -429,6 +428,11 @@ class Store:
                 f"{file}: expected what is known of a model, found {type(error).__name__}: {error}: "
                 f"delete {file.parent} and render again"
             ) from None
+
+
+def kept_shot(shot: Shot) -> Shot:
+    """The shot as shot.json holds it: the other things are in scenery.json, and labels are those of the instant."""
+    return shot.model_copy(update={"things": shot.objects, "shutter": 0.0, "exposures": ()})
 
 
 def _no_scene(file: Path, error: Exception) -> StoreError:

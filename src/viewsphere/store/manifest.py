@@ -74,10 +74,14 @@ def seal_of(file: Path) -> Seal:
 
 @dataclass(frozen=True)
 class Manifest:
-    """The files of a folder by their paths in it, and those that lie in its shard, as if they lay in the folder."""
+    """The files of a folder by their paths in it, and those that lie in its shard, as if they lay in the folder.
+
+    `painter` is the processor type and the kernel build that painted the pictures, empty where no engine did.
+    """
 
     files: Mapping[str, Seal]
     spans: Mapping[str, Span] = field(default_factory=dict[str, Span])
+    painter: str = ""
 
     @staticmethod
     def of(folder: Path) -> Manifest:
@@ -98,14 +102,15 @@ class Manifest:
                 raise ValueError(f"a path that leads out of it, {outside!r:.200}")
             if any(at < 0 or size < 0 or at + size > files[SHARD][0] for at, size, _ in spans.values()):
                 raise ValueError(f"files beyond the end of {SHARD}")
-            return Manifest(files, spans)
+            return Manifest(files, spans, str(value.get("painter", "")))
         except (OSError, LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
             problem = (error.strerror if isinstance(error, OSError) else None) or error
             raise StoreError(f"{file}: expected the manifest of a finished folder, found {problem}: {REPAIR}") from None
 
     def write(self, folder: Path) -> None:
         """Write it into its folder, whose other files are whole."""
-        value = {"files": self.files, **({"spans": self.spans} if self.spans else {})}
+        value: dict[str, Any] = {"files": self.files, **({"spans": self.spans} if self.spans else {})}
+        value |= {"painter": self.painter} if self.painter else {}
         (folder / MANIFEST).write_text(sealed(value), "utf-8", newline="\n")
 
     @property

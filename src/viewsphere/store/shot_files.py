@@ -18,11 +18,11 @@ from viewsphere.urls import link_file
 
 class ShotFiles:
     """The folder of a shot that is being made: its channels are put there while the block lasts, and all else; then it gets its
-    manifest, if the block ends well.
+    manifest, if the block ends well, which names the `painter`.
     """
 
-    def __init__(self, folder: Path, kinds: Files) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, kinds: Files, painter: str = "") -> None:
+        self._folder, self._painter = folder, painter
         self._shard = _Shard(folder / SHARD) if kinds.shots == "tar" else None
         self._seals: dict[str, Seal] = {}
 
@@ -64,8 +64,8 @@ class ShotFiles:
     def _manifest(self) -> Manifest:
         texts = {path.name: seal_of(path) for path in sorted(self._folder.glob("*.json"))}
         if self._shard:
-            return Manifest({**texts, SHARD: self._shard.seal}, self._shard.spans)
-        return Manifest(texts | self._seals)
+            return Manifest({**texts, SHARD: self._shard.seal}, self._shard.spans, self._painter)
+        return Manifest(texts | self._seals, painter=self._painter)
 
 
 class _Shard:

@@ -52,6 +52,7 @@ function proofs() {
     failed(name) ? el("span", { class: "bad" }, `✗ ${plural(failed(name), "finding")}`) : el("span", { class: "good" }, "✓ holds"),
     `${count(n)} checked`,
   ]);
+  rows.push(...Object.entries(proof.not_run).map(([name, reason]) => [name, el("span", { class: "note" }, "not run"), reason]));
   figure.append(table(rows));
   if (proof.findings.length) {
     figure.append(el("ul", { class: "findings bad" }, ...proof.findings.slice(0, 40).map((finding) => el("li", {}, finding))));
@@ -71,11 +72,8 @@ function recipe() {
 
 export function verdict() {
   if (!proof) return el("a", { class: "badge none", href: "#provenance" }, "labels not checked for this page");
-  const read = Math.max(0, ...Object.values(proof.checked));
-  const part = read < summary.frames ? ` on ${plural(read, "frame")} of ${count(summary.frames)}` : "";
-  return proof.ok
-    ? el("a", { class: "badge good", href: "#provenance" }, `✓ all proofs hold${part}`)
-    : el("a", { class: "badge bad", href: "#provenance" }, `✗ ${plural(proof.findings.length, "finding")}`);
+  const kind = proof.ok ? "good" : "bad";
+  return el("a", { class: `badge ${kind}`, href: "#provenance" }, `${proof.ok ? "✓" : "✗"} ${proof.verdict}`);
 }
 
 export function showProvenance() {

@@ -1,0 +1,78 @@
+"""The result of `check`: findings, the proofs that ran, and those that did not, with the reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A contradiction or damage; `frame` is the frame's index in the plan, None for the data set as a whole."""
+
+    check: str
+    frame: int | None
+    message: str
+
+    def __str__(self) -> str:
+        where = "" if self.frame is None else f"frame {self.frame}: "
+        return f"{self.check}: {where}{self.message}"
+
+
+@dataclass(frozen=True)
+class Report:
+    """The outcome of all proofs.
+
+    `checked` counts the frames, files or models behind each proof. `not_run` gives the reason why a proof did not run, or only
+    on a part. `coverage` holds (proved, of, words) for proofs that look at some frames only. `notes` are remarks on the data.
+    """
+
+    checked: dict[str, int]
+    findings: tuple[Finding, ...]
+    notes: tuple[str, ...] = ()
+    not_run: dict[str, str] = field(default_factory=dict[str, str])
+    coverage: tuple[tuple[int, int, str], ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no finding."""
+        return not self.findings
+
+    @property
+    def verdict(self) -> str:
+        """One line: the number of findings, or of proofs that hold, with the proofs that did not run and the frames covered."""
+        held = [name for name, count in self.checked.items() if count and name not in self.not_run]
+        text = f"{_count(len(held), 'proof')} hold{'s' if len(held) == 1 else ''}" if self.not_run else "all proofs hold"
+        if not self.ok:
+            text = _count(len(self.findings), "finding")
+        parts = [text, *([f"{len(self.not_run)} not run: {_reasons(self.not_run)}"] if self.not_run else [])]
+        return "; ".join([", ".join(parts), *(f"{done:,} of {of:,} {words}" for done, of, words in self.coverage)])
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as plain data."""
+        return {"ok": self.ok, "verdict": self.verdict, **asdict(self)}
+
+
+def joined(reports: Iterable[Report]) -> Report:
+    """Reports of several parts of one data set as one."""
+    checked, not_run = dict[str, int](), dict[str, str]()
+    findings, notes = list[Finding](), list[str]()
+    for report in reports:
+        checked |= {name: checked.get(name, 0) + count for name, count in report.checked.items()}
+        not_run |= {name: reason for name, reason in report.not_run.items() if name not in not_run}
+        findings += report.findings
+        notes += (note for note in report.notes if note not in notes)
+    return Report(checked, tuple(findings), tuple(notes), not_run)
+
+
+def _reasons(not_run: Mapping[str, str]) -> str:
+    """Names of proofs, those of one reason together, each reason in parentheses."""
+    names_of: dict[str, list[str]] = {}
+    for name, reason in not_run.items():
+        names_of.setdefault(reason, []).append(name)
+    return ", ".join(f"{', '.join(names)} ({reason})" for reason, names in names_of.items())
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
