@@ -84,6 +84,9 @@ SOLID = np.full((32, 32), 255)
 HOLES = np.where(np.add.outer(np.arange(32), np.arange(32)) % 16 < 8, 0, 255)
 GLASS = np.full((32, 32), 90)
 SPECK = np.where(np.arange(1024).reshape(32, 32) == 500, 0, 255)
+DISTANCE = np.hypot(*np.mgrid[-15.5:16, -15.5:16])
+SOFT_LEAF = np.clip((10 - DISTANCE) * 80, 0, 255)  # a disc, its edge three texels wide
+GLOSS = np.linspace(30, 220, 1024).reshape(32, 32)
 SOFT_RIM = np.pad(np.full((30, 30), 255), 1, constant_values=128)
 
 
@@ -95,7 +98,9 @@ SOFT_RIM = np.pad(np.full((30, 30), 255), 1, constant_values=128)
         (SOFT_RIM, 0.25, 0.75, "OPAQUE"),
         (SPECK, 0.25, 0.75, "MASK"),  # more than a thousandth
         (HOLES, 0.25, 0.75, "MASK"),
-        (GLASS, 0.25, 0.75, "BLEND"),
+        (GLASS, 0.25, 0.75, "OPAQUE"),
+        (SOFT_LEAF, 0.25, 0.75, "MASK"),
+        (GLOSS, 0.25, 0.75, "OPAQUE"),
         (SOLID, 0.0, 1.0, "MASK"),  # a card that shows the clear surroundings too
         (SOLID, 1.25, 1.75, "OPAQUE"),  # the next copy of the picture
     ],
@@ -105,6 +110,20 @@ def test_only_what_is_shown_counts(write, island, low, high, mode):
     write("m.mtl", "newmtl m\nmap_Kd t.png\n")
     mesh, _ = load_model(write("a.obj", card(low=low, high=high)))
     assert mesh.materials[0].alpha_mode == mode
+    chosen = {"OPAQUE": "no cut-out, so it is ignored", "MASK": "mostly clear or solid, so it cuts holes"}[mode]
+    warned = [f"a.obj: the file does not state that the alpha of texture 't.png' is opacity; it is {chosen}"]
+    assert list(mesh.warnings) == (warned if mode == "MASK" or any(island is gloss for gloss in (GLASS, GLOSS)) else [])
+
+
+@pytest.mark.parametrize(
+    ("island", "mode"), [("HOLES", "MASK"), ("GLASS", "BLEND"), ("SOFT_LEAF", "BLEND"), ("GLOSS", "BLEND"), ("SOLID", "OPAQUE")]
+)
+@pytest.mark.parametrize("statement", ["map_d t.png", "map_Tr t.png", "map_opacity t.png"])
+def test_stated_opacity_is_taken_as_it_is(write, island, mode, statement):
+    write("t.png", atlas(globals()[island]))
+    write("m.mtl", f"newmtl m\nmap_Kd t.png\n{statement}\n")
+    mesh, _ = load_model(write("a.obj", card(low=0.25, high=0.75)))
+    assert (mesh.materials[0].alpha_mode, mesh.warnings) == (mode, ())
 
 
 def test_a_speck_among_many_texels_is_no_shape(write):

@@ -95,9 +95,32 @@ def test_gentle_edges_are_smooth_without_normals(write):
     np.testing.assert_allclose(np.abs(mesh.normals[~side]), np.tile([0, 0, 1], ((~side).sum(), 1)), atol=1e-6)
 
 
-def test_numbers_are_read_as_c_does(write):
-    mesh, _ = load_model(write("a.obj", "v 1. .5 3.1+e2\nv +1e2 0x 0\nv -0 1E1 7\nf 1 2 3\n"))
+def test_numbers_may_have_comments_signs_and_exponents(write):
+    mesh, _ = load_model(write("a.obj", "v 1. .5 3.1e+0 # first\nv +1e2 0 0 #\nv -0 1E1 \\\n7\nf 1 2 3 # 4\n"))
     np.testing.assert_array_equal(mesh.vertices[mesh.triangles[0]], np.float32([[1, 0.5, 3.1], [100, 0, 0], [0, 10, 7]]))
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        ("v -12,75 0,00 0,00\n", 1, "'-12,75' has a decimal comma; export the model with decimal points"),
+        ("# by hand\n\nv 0 0 0\nv 1,5e3 0 0\n", 4, "'1,5e3' has a decimal comma"),
+        ("v 0 0 0\nv 1 \\\n0 0\nv 3.1+e2 0 0\n", 4, "found '3.1+e2'"),
+        ("v 0 0 0\nv 0x 0 0\n", 2, "found '0x'"),
+        ("v 0 0 0\nv 1_000 0 0\n", 2, "found '1_000'"),
+        ("v 0 0 0\nv 1 2\n", 2, "expected 3 or more numbers behind 'v', found '1 2'"),
+        ("v 0 0 0\nv 1,2,3\n", 2, "expected 3 or more numbers behind 'v', found '1,2,3'"),
+        (SQUARE + "vt 0,5 0\n", 5, "'0,5' has a decimal comma"),
+        (SQUARE + "vn 0 1\n", 5, "expected 3 or more numbers behind 'vn'"),
+        (SQUARE + "f 1 2 x\n", 5, "expected a face corner like 1/2/3, found 'x'"),
+        (SQUARE + "f 1,2,3 2 3\n", 5, "expected a face corner like 1/2/3, found '1,2,3'"),
+    ],
+)
+def test_a_number_is_read_whole_or_refused_with_its_line(write, text, line, message):
+    with pytest.raises(ModelError) as error:
+        load_model(write("bad.obj", text + ("" if "f 1" in text else "f 1 1 2\n")))
+    assert f"bad.obj:{line}: " in str(error.value)
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +131,7 @@ def test_numbers_are_read_as_c_does(write):
         (SQUARE, "no triangles"),
         (SQUARE + "f 1 2 5\n", "vertex 5, expected 1 to 4"),
         (SQUARE + "f 0 1 2\n", "vertex 0"),
-        (SQUARE + "f 1/9 2/9 3/9\n", "texture coordinate 9"),
+        ("vt 0 0\n" + SQUARE + "f 1/9 2/9 3/9\n", "texture coordinate 9"),
         (SQUARE + "f a b c\n", "'a'"),
         (SQUARE + "f 1 1 1\n", "zero area"),
         ("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "NaN"),
@@ -203,11 +226,11 @@ def test_texture_options_move_the_picture_as_obj_says(write):
     ("alpha", "mode"),
     [(255, "OPAQUE"), ([[0, 255]], "MASK"), ([[100, 150]], "BLEND"), (0, "OPAQUE")],
 )
-def test_alpha_of_a_texture(write, alpha, mode):
+def test_alpha_of_an_opacity_map(write, alpha, mode):
     pixels = np.full((1, 2, 4), 255)
     pixels[..., 3] = alpha
     write("t.png", png(pixels))
-    write("m.mtl", "newmtl m\nmap_Kd t.png\n")
+    write("m.mtl", "newmtl m\nmap_Kd t.png\nmap_d t.png\n")
     mesh, _ = load_model(write("a.obj", "mtllib m.mtl\nusemtl m\nvt 0 0\n" + SQUARE + "f 1/1 2/1 3/1\n"))
     assert mesh.materials[0].alpha_mode == mode
 

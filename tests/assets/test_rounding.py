@@ -48,7 +48,7 @@ def digest():
         encoded(numbers),
         angle_of(numbers, numbers[::-1] - 0.5),
         creased(bowl()).normals,
-        polygon._flattened(numbers.reshape(-1, 3), normal),
+        polygon.flattened(numbers.reshape(-1, 3), normal),
     )
     return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
 
@@ -106,7 +106,7 @@ def test_a_quadrilateral_counts_the_same_however_it_is_cut(cut):
 
 def test_a_polygon_lies_flat_with_its_lengths():
     points = np.array([[1, 2, 3], [4, 2, 3], [4, 6, 3], [1, 6, 3.0]])
-    flat = polygon._flattened(points, np.array([0, 0, 5.0]))
+    flat = polygon.flattened(points, np.array([0, 0, 5.0]))
     sides = np.roll(flat, -1, axis=0) - flat
     np.testing.assert_array_equal((sides * sides).sum(axis=1), [9, 16, 9, 16])
     assert sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0] == 12

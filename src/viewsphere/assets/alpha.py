@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.primitive import Float, Primitive
 
@@ -22,34 +22,56 @@ BINARY_SHARE = 0.02
 """A material of whose visible texels at most this share is neither clear nor solid is a cut-out (MASK)."""
 
 
-def with_alpha_modes(pieces: Sequence[Primitive], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
+CUT_OUT_SHARE = 0.25
+"""Where no statement makes alpha opacity, more texels between clear and solid than this make it something else (gloss, height):
+edges of leaves and fences that are drawn soft reach a fifth of their texels.
+"""
+
+
+def with_alpha_modes(
+    folder: ModelFolder, pieces: Sequence[Primitive], materials: Sequence[Material], stated: Container[int] = ()
+) -> list[Material]:
     """The materials; opaque ones get the alpha mode that suits the texels visible on their triangles.
 
     Texels between the islands of an atlas are not visible and do not count. Texels on the rim of an island do not count
     either, unless all lie there: the edges of island and picture seldom agree to the texel. A texture that is clear all over
-    counts as opaque: an exporter's mistake.
+    counts as opaque: an exporter's mistake. Where the file does not state that alpha is opacity (`stated` are the indices of
+    the materials of which it does), only the alpha of a cut-out, mostly clear or solid, is: a warning says which was chosen.
     """
     return [
-        material if material.alpha_mode != "OPAQUE" else replace(material, alpha_mode=_mode(index, material, pieces, images))
+        material if material.alpha_mode != "OPAQUE" else _with_mode(folder, index, material, pieces, stated=index in stated)
         for index, material in enumerate(materials)
     ]
 
 
-def _mode(
+def _with_mode(folder: ModelFolder, index: int, material: Material, pieces: Sequence[Primitive], *, stated: bool) -> Material:
+    shown = _shown_alpha(index, material, pieces, folder.images)
+    if shown is None or np.count_nonzero(shown < SOLID) <= SLIGHT_SHARE * shown.size:
+        return material
+    between = np.count_nonzero((shown > 8) & (shown < 247)) / shown.size
+    if stated:
+        return replace(material, alpha_mode="MASK" if between <= BINARY_SHARE else "BLEND")
+    clear = np.count_nonzero(shown <= 8) / shown.size
+    is_cut_out = between <= CUT_OUT_SHARE and clear >= between
+    texture = material.base_color_texture
+    name = "" if texture is None else folder.images[texture.image].name
+    chosen = "mostly clear or solid, so it cuts holes" if is_cut_out else "no cut-out, so it is ignored"
+    folder.warn(f"the file does not state that the alpha of texture {name!r} is opacity; it is {chosen}")
+    return replace(material, alpha_mode="MASK") if is_cut_out else material
+
+
+def _shown_alpha(
     index: int, material: Material, pieces: Sequence[Primitive], images: Sequence[Image]
-) -> Literal["OPAQUE", "MASK", "BLEND"]:
+) -> NDArray[np.uint8] | None:
+    """Alpha of the texels that triangles of a material show, None where all are solid, or clear."""
     texture = material.base_color_texture
     if texture is None:
-        return "OPAQUE"
+        return None
     alpha = images[texture.image].pixels[..., 3]
     uv = [piece.uv0[piece.triangles] for piece in pieces if piece.material == index and piece.uv0 is not None]
     if alpha.min() >= SOLID or alpha.max() == 0 or not uv:
-        return "OPAQUE"
-    shown = alpha[_without_rim(shown_texels(texture, np.concatenate(uv), alpha.shape))]
-    if np.count_nonzero(shown < SOLID) <= SLIGHT_SHARE * shown.size:
-        return "OPAQUE"
-    between = np.count_nonzero((shown > 8) & (shown < 247))
-    return "MASK" if between <= BINARY_SHARE * shown.size else "BLEND"
+        return None
+    return alpha[_without_rim(shown_texels(texture, np.concatenate(uv), alpha.shape))]
 
 
 def shown_texels(texture: Texture, uv: Float, shape: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -55,13 +55,22 @@ class ModelFolder:
     files: dict[Path, None] = field(default_factory=dict[Path, None])
     warnings: list[str] = field(default_factory=list[str])
     images: list[Image] = field(default_factory=list[Image])
+    left_out: dict[str, int] = field(default_factory=dict[str, int])
     _said: set[str] = field(default_factory=set[str])
     _named: set[str] = field(default_factory=set[str])
     _indices: dict[str, int | None] = field(default_factory=dict[str, "int | None"])
 
     def copy(self) -> ModelFolder:
         """A copy with the files and warnings so far, but without images; both can go on independently."""
-        return replace(self, files={**self.files}, warnings=[*self.warnings], images=[], _said={*self._said}, _indices={})
+        return replace(
+            self,
+            files={**self.files},
+            warnings=[*self.warnings],
+            images=[],
+            left_out={**self.left_out},
+            _said={*self._said},
+            _indices={},
+        )
 
     @cached_property
     def finder(self) -> Finder:
@@ -75,9 +84,27 @@ class ModelFolder:
             self._said.add(line)
             self.warnings.append(line)
 
-    def error(self, message: str) -> ModelError:
-        """A ModelError with this message, which begins with the model's path."""
-        return ModelError(f"{self.model}: {message}")
+    def leave_out(self, count: int, what: str) -> None:
+        """Count things of a kind (`what`, in the singular) that are not read: `assemble` warns of them, or refuses the model
+        if nothing else is in it.
+        """
+        self.left_out[what] = self.left_out.get(what, 0) + count
+
+    @property
+    def left(self) -> str:
+        """The things that are not read, with their numbers; empty without any."""
+        return ", ".join(f"{count:,} {_counted(count, what)}" for what, count in self.left_out.items())
+
+    def nothing_left(self, *also: str) -> ModelError:
+        """A ModelError for a model without triangles that names what it holds instead: `also`, and what is not read."""
+        held = ", ".join([*also, *([self.left] if self.left else [])])
+        if not held:
+            return self.error("no triangles found: the file holds no faces at all; export the model as a mesh of faces")
+        return self.error(f"no triangles found: the file holds {held}, but no faces; export the model as a mesh of faces")
+
+    def error(self, message: str, line: int | None = None) -> ModelError:
+        """A ModelError with this message, which begins with the model's path, and with the line where it is about one."""
+        return ModelError(f"{self.model}: {message}" if line is None else f"{self.model}:{line}: {message}")
 
     def check(self, limit: str, found: int, what: str) -> None:
         """Raise ModelError when `found`, the number of `what`, exceeds the value of the named `limit`."""
@@ -254,6 +281,12 @@ def reduced(pixels: NDArray[np.uint8], sharpest: int) -> NDArray[np.uint8]:
 
     factor = -(-max(pixels.shape[:2]) // sharpest)
     return pixels if factor == 1 else np.array(Pillow.fromarray(pixels).reduce(factor))
+
+
+def _counted(count: int, what: str) -> str:
+    """A noun's plural, whose first word ends in s, for any count but 1: `faces of fewer than three corners`."""
+    noun, of, rest = what.partition(" of ")
+    return what if count == 1 else f"{noun}s{of}{rest}"
 
 
 def _data_uri(uri: str) -> bytes:

@@ -8,17 +8,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.assets.text import statements
+from viewsphere.assets.obj_text import Library
+from viewsphere.assets.text import statements, uncommented
 
 SCALAR_OPTIONS = ("-blendu", "-blendv", "-bm", "-boost", "-cc", "-clamp", "-imfchan", "-texres", "-type")
 OPTION_ARGUMENTS = {"-mm": 2, **dict.fromkeys(SCALAR_OPTIONS, 1)}
 VECTOR_OPTIONS = ("-o", "-s", "-t")
+
+MAPS = ("map_", "bump", "norm", "disp", "decal", "refl")
+"""Beginnings of statements that name pictures."""
+
+READ = {
+    "map_kd", "map_ks", "map_ns", "map_ke", "map_d", "map_opacity", "map_tr", "map_bump", "bump", "norm", "map_kn", "map_pr",
+    "map_pm", "map_aat",
+}  # fmt: skip
+"""Statements of pictures that are read, and `map_aat`, a switch."""
+
+MOST_SHINY = 1000.0
+"""`Ns` of a white texel where only a map is given: the end of the range that the specification names."""
 
 HEIGHT = 0.01
 """Rise of a height map from black to white for `-bm 1`, in widths of its picture."""
@@ -36,6 +50,17 @@ class _Map:
     clamp: bool = False
     strength: float = 1.0
 
+    @classmethod
+    def made(cls, file: str, options: dict[str, list[str]]) -> _Map:
+        """The map of a file with these options."""
+        return cls(
+            file,
+            offset=_pair(options.get("-o", []), 0.0),
+            scale=_pair(options.get("-s", []), 1.0),
+            clamp=options.get("-clamp") == ["on"],
+            strength=_pair(options.get("-bm", []), 1.0)[0],
+        )
+
     def texture(self, image: int) -> Texture:
         """This map in glTF's texture axes (v downwards)."""
         wrap = "clamp" if self.clamp else "repeat"
@@ -43,26 +68,35 @@ class _Map:
         return Texture(image, wrap_s=wrap, wrap_t=wrap, offset=offset, scale=self.scale)
 
 
-def read_materials(folder: ModelFolder, texts: Sequence[str], wanted: set[str]) -> dict[str, Material]:
+@dataclass(frozen=True)
+class LibraryMaterial:
+    """A material of a library, and whether its statements (`d`, `Tr` below 1, `map_d`) make alpha its opacity."""
+
+    material: Material
+    states_opacity: bool
+
+
+def read_materials(folder: ModelFolder, libraries: Sequence[Library], wanted: set[str]) -> dict[str, LibraryMaterial]:
     """The wanted materials of these libraries by name; the first definition of a name counts.
 
-    `Kd` multiplies `map_Kd`, except a black one, which many exporters write beside a texture. `Ns` becomes a
+    `Kd` multiplies `map_Kd`, except a black one, which many exporters write beside a texture. `Ns` (with `map_Ns`) becomes a
     roughness whose square is sqrt(2 / (Ns + 2)), the width of a lobe like Blinn and Phong's (Walter et al. 2007), unless `Pr`
     gives one. A `map_bump` that holds heights becomes a normal map: from black to white it rises by `-bm` hundredths of the
     picture's width. `d < 1` blends, all others are opaque: whether a texture's alpha or `map_d` cuts out or
     blends, `alpha.with_alpha_modes` says. All are double-sided, as OBJ has no other.
     """
-    blocks: dict[str, dict[str, str]] = {}
-    block: dict[str, str] = {}
-    for text in texts:
-        for line in statements(text):
+    blocks: dict[str, tuple[dict[str, str], Path]] = {}
+    for library in libraries:
+        block: dict[str, str] = {}
+        for line in statements(library.text):
             keyword, _, rest = line.partition(" ")
             if keyword.lower() == "newmtl":
                 block = {}
-                blocks.setdefault(rest.strip(), block)
+                for name in (rest.strip(), uncommented(rest.strip())):
+                    blocks.setdefault(name, (block, library.folder))
             elif keyword and not keyword.startswith("#"):
                 block[keyword.lower()] = rest.strip()
-    return {name: _Builder(folder, name, block).material() for name, block in blocks.items() if name in wanted}
+    return {name: _Builder(folder, name, *blocks[name]).entry() for name in blocks if name in wanted}
 
 
 @dataclass(frozen=True)
@@ -70,6 +104,16 @@ class _Builder:
     folder: ModelFolder
     name: str
     block: dict[str, str]
+    library: Path
+
+    def entry(self) -> LibraryMaterial:
+        """The material; a warning names maps that are not read."""
+        material = self.material()
+        color = self.block.get("map_kd")
+        unread = [key for key in self.block if key.startswith(MAPS) and key not in READ and self.block[key] != color]
+        if unread:
+            self.folder.warn(f"material {self.name!r} has maps that are not read: {', '.join(unread)}")
+        return LibraryMaterial(material, material.base_color[3] < 1.0 or self.opacity_map() is not None)
 
     def material(self) -> Material:
         color_map = self.map("map_kd")
@@ -78,7 +122,7 @@ class _Builder:
             color = (1.0, 1.0, 1.0)
         opacity = self.opacity()
         rough_map, metal_map = self.map("map_pr"), self.map("map_pm")
-        emissive_map, normal_map = self.map("map_ke"), self.map("norm")
+        emissive_map, normal_map = self.map("map_ke"), self.map("norm") or self.map("map_kn")
         emissive = self.color("ke", (0.0, 0.0, 0.0))
         emissive_texture = self.plain(emissive_map)
         if emissive_texture is not None and max(emissive) == 0:
@@ -90,7 +134,7 @@ class _Builder:
             base_color_texture=self.base(color_map),
             metallic=self.number("pm", 1.0 if metal_map is not None else 0.0),
             roughness=self.roughness(rough_map),
-            metallic_roughness_texture=self.metallic_roughness(rough_map, metal_map),
+            metallic_roughness_texture=self.metallic_roughness(rough_map, metal_map) or self.shininess_texture(),
             normal_texture=self.plain(normal_map) if normal_map is not None else self.bump(bump),
             normal_scale=normal_map.strength if normal_map is not None else bump.strength if bump is not None else 1.0,
             emissive=emissive,
@@ -99,6 +143,7 @@ class _Builder:
             clearcoat=min(max(self.number("pc", 0.0), 0.0), 1.0),
             clearcoat_roughness=min(max(self.number("pcr", 0.0), 0.0), 1.0),
             specular=self.specular(),
+            specular_texture=self.specular_texture(),
         )
 
     def opacity(self) -> float:
@@ -106,61 +151,86 @@ class _Builder:
         transparency = self.number("tr", 0.0)
         return min(max(self.number("d", 1.0 if transparency >= 1.0 else 1.0 - transparency), 0.0), 1.0)
 
+    def words(self, key: str) -> list[str]:
+        """Words of a statement before a comment."""
+        return uncommented(self.block.get(key, "")).split()
+
     def number(self, key: str, default: float) -> float:
-        words = self.block.get(key, "").replace("-halo", "").split()
-        try:
-            value = float(words[0]) if words else default
-        except ValueError:
-            return default
-        return value if np.isfinite(value) else default
+        """A statement's number; the default, with a warning, where it has none."""
+        words = [word for word in self.words(key) if word != "-halo"]
+        return self.numbers(key, words[:1], default)[0]
 
     def color(self, key: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
-        try:
-            values = [float(word) for word in self.block.get(key, "").split()[:3]]
-        except ValueError:
-            return default
-        if not values or not np.isfinite(values).all() or min(values) < 0:
+        """A statement's colour; the default, with a warning, where it has none."""
+        values = self.numbers(key, self.words(key)[:3], -1.0)
+        if min(values) < 0:
             return default
         red, green, blue = values if len(values) == 3 else values[:1] * 3
         return (red, green, blue)
 
+    def numbers(self, key: str, words: list[str], default: float) -> list[float]:
+        """The words as numbers; one default for no words, and for words that are no numbers, with a warning."""
+        values = [float(word) for word in words if _is_number(word)]
+        if len(values) < len(words):
+            self.folder.warn(f"material {self.name!r}: {key} {' '.join(words)[:40]!r} is no number, not read")
+        return values if values and len(values) == len(words) and np.isfinite(values).all() else [default]
+
     def roughness(self, rough_map: _Map | None) -> float:
         if "pr" in self.block or rough_map is not None:
             return min(max(self.number("pr", 1.0), 0.0), 1.0)
+        if self.shininess_texture() is not None:
+            return 1.0
         if "ns" not in self.block:
             return Material().roughness
         return float((2.0 / (max(self.number("ns", 0.0), 0.0) + 2.0)) ** 0.25)
 
+    def shininess_texture(self) -> Texture | None:
+        """A new texture with the roughness of `Ns` times `map_Ns` in its green channel; None where `Pr` gives one."""
+        source = None if "pr" in self.block else self.map("map_ns")
+        image = self.image(source)
+        if source is None or image is None:
+            return None
+        most = self.number("ns", MOST_SHINY)
+
+        def made() -> Image:
+            shininess = _grey(self.folder.images[image].pixels) / 255.0 * max(most, 0.0)
+            return Image(f"{source.file} as roughness", _in_channel(1, (2.0 / (shininess + 2.0)) ** 0.25))
+
+        return source.texture(self.folder.derived(f"#shininess {image} of {most}", made))
+
     def specular(self) -> float:
-        """A Ks of 0.5 counts as a dielectric's 4 %, because exporters of PBR materials write 0.5."""
-        if "ks" not in self.block or "pr" in self.block or "pm" in self.block:
+        """A Ks of 0.5 counts as a dielectric's 4 %, because exporters of PBR materials write 0.5; 1 beside a `map_Ks`."""
+        if "ks" not in self.block or "pr" in self.block or "pm" in self.block or self.image(self.map("map_ks")) is not None:
             return 1.0
         return min(1.0, 2.0 * max(self.color("ks", (0.5, 0.5, 0.5))))
 
-    def map(self, key: str) -> _Map | None:
-        """The statement `key`, options before its file name, which may hold blanks."""
-        words = self.block.get(key, "").split(" ")
-        values: dict[str, list[str]] = {}
-        while words and (words[0] in OPTION_ARGUMENTS or words[0] in VECTOR_OPTIONS or not words[0]):
-            option = words.pop(0)
-            limit = OPTION_ARGUMENTS.get(option, 3 if option else 0)
-            taken: list[str] = []
-            while len(words) > 1 and len(taken) < limit and (option not in VECTOR_OPTIONS or _is_number(words[0])):
-                taken.append(words.pop(0))
-            values[option] = taken
-        file = " ".join(words).strip().strip('"')
-        if not file:
+    def specular_texture(self) -> Texture | None:
+        """A new texture with `Ks` times `map_Ks` as glTF's specular factor, in its alpha channel."""
+        source = self.map("map_ks")
+        image = self.image(source)
+        if source is None or image is None:
             return None
-        return _Map(
-            file,
-            offset=_pair(values.get("-o", []), 0.0),
-            scale=_pair(values.get("-s", []), 1.0),
-            clamp=values.get("-clamp") == ["on"],
-            strength=_pair(values.get("-bm", []), 1.0)[0],
-        )
+        most = 2.0 * max(self.color("ks", (0.5, 0.5, 0.5)))
+
+        def made() -> Image:
+            share = self.folder.images[image].pixels[..., :3].max(axis=2) / 255.0
+            return Image(f"{source.file} as specular", _in_channel(3, np.minimum(most * share, 1.0)))
+
+        return source.texture(self.folder.derived(f"#specular {image} of {most}", made))
+
+    def map(self, key: str) -> _Map | None:
+        """The statement `key`: options before and behind its file's name, which may hold blanks and what looks like either."""
+        if key not in self.block:
+            return None
+        words, options = _options(self.block[key].split(" "))
+        file = " ".join(words).strip()
+        if not self.folder.finder.holds(file, self.library):
+            file, behind = _without_options(file)
+            options |= behind
+        return _Map.made(file.strip('"'), options) if file.strip('"') else None
 
     def image(self, source: _Map | None) -> int | None:
-        return None if source is None else self.folder.image(source.file, source.file)
+        return None if source is None else self.folder.image(source.file, source.file, base=self.library)
 
     def plain(self, source: _Map | None) -> Texture | None:
         """The map's image as it is."""
@@ -169,10 +239,12 @@ class _Builder:
 
     def base(self, color_map: _Map | None) -> Texture | None:
         """Base colour texture with `map_d` as its alpha."""
-        opacity_map = self.map("map_d") or self.map("map_opacity")
+        opacity_map = self.opacity_map()
         color, opacity = self.image(color_map), self.image(opacity_map)
         if opacity is not None and opacity != color:
-            color = self.folder.derived(f"#{color} with opacity {opacity}", lambda: self.with_opacity(color, opacity))
+            inverse = not {"map_d", "map_opacity"} & self.block.keys()
+            key = f"#{color} with {'transparency' if inverse else 'opacity'} {opacity}"
+            color = self.folder.derived(key, lambda: self.with_opacity(color, opacity, inverse=inverse))
         source = color_map or opacity_map
         if color is None or source is None:
             return None
@@ -187,10 +259,17 @@ class _Builder:
         key = f"#roughness {rough} and metallic {metal}"
         return source.texture(self.folder.derived(key, lambda: self.merged(rough, metal)))
 
-    def with_opacity(self, color: int | None, opacity: int) -> Image:
-        """An image whose alpha is another's grey; white without a colour."""
+    def opacity_map(self) -> _Map | None:
+        """The map of opacity, or that of transparency, as `Tr` is 1 - `d`."""
+        return self.map("map_d") or self.map("map_opacity") or self.map("map_tr")
+
+    def with_opacity(self, color: int | None, opacity: int, *, inverse: bool) -> Image:
+        """An image whose alpha is another's alpha or grey, `inverse` where grey is transparency; white without a colour."""
         images = self.folder.images
-        alpha = _grey(images[opacity].pixels)
+        pixels = images[opacity].pixels
+        alpha = _grey(pixels)
+        if inverse and pixels[..., 3].min() == 255:
+            alpha = 255 - alpha
         pixels = np.full((*alpha.shape, 4), 255, np.uint8) if color is None else images[color].pixels.copy()
         pixels[..., 3] = _resized(alpha, pixels.shape[:2])
         return Image(f"{self.name} colour and opacity", pixels)
@@ -220,6 +299,29 @@ class _Builder:
         return source.texture(image)
 
 
+def _options(words: list[str]) -> tuple[list[str], dict[str, list[str]]]:
+    """The words behind leading options, and these options with their values."""
+    words, options = list(words), dict[str, list[str]]()
+    while words and (words[0] in OPTION_ARGUMENTS or words[0] in VECTOR_OPTIONS or not words[0]):
+        option = words.pop(0)
+        limit = OPTION_ARGUMENTS.get(option, 3 if option else 0)
+        taken: list[str] = []
+        while len(words) > 1 and len(taken) < limit and (option not in VECTOR_OPTIONS or _is_number(words[0])):
+            taken.append(words.pop(0))
+        options[option] = taken
+    return words, options
+
+
+def _without_options(text: str) -> tuple[str, dict[str, list[str]]]:
+    """A file's name without a comment and without the options behind it, and these options."""
+    words = uncommented(text).split(" ")
+    places = [i for i, word in enumerate(words) if i and (word in OPTION_ARGUMENTS or word in VECTOR_OPTIONS)]
+    if not places:
+        return " ".join(words), {}
+    _, options = _options([*words[places[0] :], ""])
+    return " ".join(words[: places[0]]).strip(), options
+
+
 def _is_number(word: str) -> bool:
     try:
         float(word)
@@ -246,6 +348,13 @@ def _normals(heights: Pixels, clamp: bool) -> Pixels:
     normal /= np.sqrt((normal * normal).sum(axis=-1, keepdims=True))
     pixels = np.full((*heights.shape, 4), 255, np.uint8)
     pixels[..., :3] = np.rint(normal * 127.5 + 127.5)
+    return pixels
+
+
+def _in_channel(channel: int, values: NDArray[np.float64]) -> Pixels:
+    """A picture (H, W, 4) whose other channels are full; the channel holds values (H, W) in [0, 1]."""
+    pixels = np.full((*values.shape, 4), 255, np.uint8)
+    pixels[..., channel] = np.rint(values * 255)
     return pixels
 
 

@@ -37,6 +37,6 @@ def read_picture(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
         uv0=np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]),
     )
     texture = Texture(folder.add_image(Image(name, reduced(pixels, SHARPEST))), wrap_s="clamp", wrap_t="clamp")
-    materials = with_alpha_modes([plane], [Material(name=name, base_color_texture=texture)], folder.images)
+    materials = with_alpha_modes(folder, [plane], [Material(name=name, base_color_texture=texture)], stated={0})
     facts = FileFacts(folder.model, folder.model.suffix[1:].lower(), "+z", "-y", 1.0)
     return assemble(folder, [plane], materials, facts)

@@ -109,7 +109,9 @@ def assemble(
     pieces, materials = _without_lost_textures(folder, pieces, materials)
     count = sum(len(piece.triangles) for piece in pieces)
     if count == 0:
-        raise folder.error("no triangles found; export the model as a mesh of faces")
+        raise folder.nothing_left()
+    if folder.left:
+        folder.warn(f"not read: {folder.left}")
     folder.check("MAX_TRIANGLES", count, "triangles")
     folder.check("MAX_VERTICES", sum(len(piece.positions) for piece in pieces), "vertices")
     names = list(dict.fromkeys(piece.part for piece in pieces))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import codecs
+import re
+from collections.abc import Sequence
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -10,33 +12,63 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
 SAMPLE_BYTES = 1 << 16
+COMMENT = re.compile(r"(?:^|(?<=\s))#")
+
+EASTERN = ("gb18030", "shift_jis", "euc_kr", "big5", "cp1251", "cp1252")
+"""Encodings that are tried after the guess: those of systems that write model files in no Unicode."""
 
 
-def decode(data: bytes) -> str:
-    """Text of a file: by its byte-order mark, else UTF-16 if a zero byte leads, else UTF-8, else a guess."""
+def decode(data: bytes, encoding: str | None = None) -> str:
+    """Text of a file: by `own_encoding`, else as `encoding` says, else by the likeliest one; unreadable bytes are replaced."""
+    return data.decode(own_encoding(data) or encoding or likely([data])[0], errors="replace")
+
+
+def own_encoding(data: bytes) -> str | None:
+    """The encoding that the bytes themselves show: by a byte-order mark, else UTF-16 if one byte of two is zero, else UTF-8."""
     for mark, encoding in _MARKS:
         if data.startswith(mark):
-            return data.decode(encoding, errors="replace")
+            return encoding
     if data[:1] == b"\0" and data[1:2] != b"\0":
-        return data.decode("utf-16-be", errors="replace")
+        return "utf-16-be"
     if data[1:2] == b"\0" and data[:1] != b"\0":
-        return data.decode("utf-16-le", errors="replace")
+        return "utf-16-le"
     try:
-        return data.decode("utf-8")
+        data.decode("utf-8")
     except UnicodeDecodeError:
-        return data.decode(_guess(data), errors="replace")
+        return None
+    return "utf-8"
 
 
-def _guess(data: bytes) -> str:
-    """A guess at the encoding, made from the lines that are not ASCII."""
+def likely(texts: Sequence[bytes]) -> tuple[str, ...]:
+    """Encodings of files that show none, the likeliest first, by the lines that are not ASCII."""
     from charset_normalizer import from_bytes
 
-    foreign = b"\n".join(line for line in data[: 1 << 24].splitlines() if not line.isascii())[:SAMPLE_BYTES]
+    lines = (line for data in texts for line in data[: 1 << 24].splitlines() if not line.isascii())
+    foreign = b"\n".join(lines)[:SAMPLE_BYTES]
     best = from_bytes(foreign).best() if foreign else None
-    return best.encoding if best is not None else "latin-1"
+    return tuple(dict.fromkeys((best.encoding if best is not None else "latin-1", *EASTERN)))
 
 
 def statements(text: str) -> list[str]:
-    """Statements of an OBJ or MTL file: continued lines joined, tabs replaced by blanks, surrounding blanks removed."""
-    plain = text.replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ").replace("\t", " ")
-    return [line.strip() for line in plain.split("\n")]
+    """Statements of an OBJ or MTL file, each at the place of its first line in the file: continued lines are joined and
+    followed by empty statements, tabs replaced by blanks, surrounding blanks removed.
+    """
+    plain = text.replace("\r\n", "\n").replace("\r", "\n").replace("\t", " ")
+    lines = [line.strip() for line in plain.split("\n")]
+    return _joined(lines) if "\\\n" in plain else lines
+
+
+def _joined(lines: list[str]) -> list[str]:
+    joined: list[str] = []
+    start: int | None = None
+    for line in lines:
+        joined.append("" if start is not None else line.removesuffix("\\"))
+        if start is not None:
+            joined[start] += " " + line.removesuffix("\\")
+        start = (len(joined) - 1 if start is None else start) if line.endswith("\\") else None
+    return joined
+
+
+def uncommented(text: str) -> str:
+    """The text before a comment: a `#` that begins a word, because names and Microsoft's NaN (`1.#QNAN`) hold one."""
+    return COMMENT.split(text, maxsplit=1)[0].rstrip()

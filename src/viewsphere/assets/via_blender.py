@@ -215,7 +215,7 @@ def _built(folder: ModelFolder, told: Mapping[str, Any], facts: FileFacts) -> tu
         why = f" ({folder.warnings[0].partition(': ')[2]})" if folder.warnings else ""
         raise folder.error(f"no triangles found that a render would show{why}; export the model as a mesh of faces")
     facts = replace(facts, keypoints=_points(folder, told["points"]), marks=_marks(told["marks"]))
-    return assemble(folder, pieces, _with_modes(pieces, materials, folder.images), facts)
+    return assemble(folder, pieces, _with_modes(folder, pieces, materials), facts)
 
 
 def _points(folder: ModelFolder, told: Sequence[Mapping[str, Any]]) -> Keypoints | None:
@@ -289,12 +289,12 @@ def _picture(folder: ModelFolder, told: Mapping[str, Any], number: int) -> Pictu
     return Picture(index, told["is_srgb"])
 
 
-def _with_modes(pieces: Sequence[Primitive], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
+def _with_modes(folder: ModelFolder, pieces: Sequence[Primitive], materials: Sequence[Material]) -> list[Material]:
     """The materials with alpha modes that suit their textures' alpha (`alpha`); a rotated texture's alpha always blends."""
-    found = with_alpha_modes(pieces, materials, images)
+    found = with_alpha_modes(folder, pieces, materials, stated=range(len(materials)))  # its links say what alpha is
     for i, material in enumerate(materials):
         texture = material.base_color_texture
         if texture is not None and (texture.rotation or min(texture.scale) < 0) and material.alpha_mode == "OPAQUE":
-            clear = images[texture.image].pixels[..., 3].min() < SOLID
+            clear = folder.images[texture.image].pixels[..., 3].min() < SOLID
             found[i] = replace(material, alpha_mode="BLEND" if clear else "OPAQUE")
     return found

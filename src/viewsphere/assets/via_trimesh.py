@@ -39,7 +39,7 @@ def read_via_trimesh(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     builder = _Builder(folder, [])
     pieces = builder.scene(loaded) if "geometry" in loaded else builder.placed(loaded, "object", np.eye(4))
     facts = _facts(folder, kind)
-    return assemble(folder, pieces, with_alpha_modes(pieces, builder.materials, folder.images), facts)
+    return assemble(folder, pieces, with_alpha_modes(folder, pieces, builder.materials), facts)
 
 
 class _Resolver:

@@ -34,9 +34,8 @@ def read_dae(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     check_instances(folder, dae_references(data))
     materials = DaeMaterials(folder, root)
     pieces = list(_Scene(folder, root, materials).pieces())
-    return assemble(
-        folder, pieces, with_alpha_modes(pieces, materials.kept or [Material()], folder.images), _facts(folder, root)
-    )
+    kept = with_alpha_modes(folder, pieces, materials.kept or [Material()], materials.stated)
+    return assemble(folder, pieces, kept, _facts(folder, root))
 
 
 def _parse(folder: ModelFolder, data: bytes) -> Any:

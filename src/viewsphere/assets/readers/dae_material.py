@@ -20,11 +20,14 @@ LUMINANCE = (0.212671, 0.715160, 0.072169)
 
 @dataclass(eq=False)
 class DaeMaterials:
-    """The materials that pieces use so far, `kept`; `root` is the file's tree, its tags without namespace."""
+    """The materials that pieces use so far, `kept`; `stated` are the indices of those whose `<transparent>` holds a texture, so
+    that alpha is opacity. `root` is the file's tree, its tags without namespace.
+    """
 
     folder: ModelFolder
     root: Any
     kept: list[Material] = field(default_factory=list[Material])
+    stated: set[int] = field(default_factory=set[int])
     _elements: dict[tuple[str, str], Any] = field(default_factory=dict[tuple[str, str], Any])
 
     def __post_init__(self) -> None:
@@ -41,10 +44,13 @@ class DaeMaterials:
         material = Material(name="default") if element is None else self._material(element, _Coordinates(faces, instance, sets))
         if material not in self.kept:
             self.kept.append(material)
+        index = self.kept.index(material)
+        if element is not None and self._states_opacity(element):
+            self.stated.add(index)
         uvs = [faces.uvs[number] for number in (sets or list(faces.uvs))[:2]]
         return Primitive(
             part=part,
-            material=self.kept.index(material),
+            material=index,
             positions=faces.positions,
             triangles=faces.triangles,
             normals=faces.normals,
@@ -53,9 +59,17 @@ class DaeMaterials:
             colors=faces.colors,
         )
 
-    def _material(self, element: Any, texcoord: Callable[[Any], int]) -> Material:
+    def _effect(self, element: Any) -> Any:
+        """The effect of a material, None if it has none."""
         link = element.find("instance_effect")
-        effect = self._elements.get(("effect", "" if link is None else str(link.get("url", "")).removeprefix("#")))
+        return self._elements.get(("effect", "" if link is None else str(link.get("url", "")).removeprefix("#")))
+
+    def _states_opacity(self, element: Any) -> bool:
+        effect = self._effect(element)
+        return effect is not None and effect.find(".//transparent/texture") is not None
+
+    def _material(self, element: Any, texcoord: Callable[[Any], int]) -> Material:
+        effect = self._effect(element)
         name = str(element.get("name") or element.get("id") or "default")
         if effect is None:
             self.folder.warn(f"material {name[:80]!r} has no effect; it is plain white")
