@@ -24,6 +24,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from viewsphere.errors import UserError
+
 LOCK = "lock"
 """Name of the file in such a folder."""
 
@@ -107,6 +109,34 @@ def temporary(what: str) -> Generator[Path]:
         folder = own / "new"
         folder.mkdir()
         yield folder
+
+
+def write_whole(file: Path, data: bytes) -> None:
+    """Write a file of these bytes, and the folders it needs. An old file stays as it was until the new one is whole.
+
+    Raises UserError where the file cannot be written.
+    """
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        target = file.resolve()
+        if not isinstance(file, Path) or (target.exists() and not target.is_file()):  # at a URL, or a device
+            file.write_bytes(data)
+        else:
+            _replace(target, data)
+    except OSError as error:
+        raise UserError(f"{file}: expected a place to write, found: {error.strerror or error}") from None
+
+
+def _replace(target: Path, data: bytes) -> None:
+    half = target.with_name(f".unfinished-{os.getpid()}")
+    try:
+        half.write_bytes(data)
+        if target.exists():
+            shutil.copymode(target, half)
+        half.replace(target)
+    except BaseException:
+        half.unlink(missing_ok=True)
+        raise
 
 
 def sweep(place: Path, prefix: str = "") -> None:

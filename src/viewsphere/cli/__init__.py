@@ -22,7 +22,7 @@ def main() -> None:
     from viewsphere.cli import completion
     from viewsphere.cli.commands import app
     from viewsphere.cli.options import UsageError, explain
-    from viewsphere.cli.terminal import complain
+    from viewsphere.cli.terminal import complain, say
     from viewsphere.run.allocator import keep_freed_memory
 
     _print_anything()
@@ -35,7 +35,7 @@ def main() -> None:
     except UsageError as error:
         explain(error)
     except (typer.Abort, KeyboardInterrupt):
-        typer.echo("stopped; what is finished is kept: run the same command to go on", err=True)
+        say("stopped; what is finished is kept: run the same command to go on", err=True)
         sys.exit(130)
     except CheckFailedError as error:
         complain(error, 1)

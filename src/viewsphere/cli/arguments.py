@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
+from viewsphere.cli.terminal import say
 from viewsphere.errors import UserError
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def _tell_version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
 
-        typer.echo(f"viewsphere {version('viewsphere')}")
+        say(f"viewsphere {version('viewsphere')}")
         raise typer.Exit
 
 

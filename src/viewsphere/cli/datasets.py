@@ -21,7 +21,7 @@ from viewsphere.cli.arguments import (
     split,
     with_options,
 )
-from viewsphere.cli.terminal import ProgressBar, print_formats, print_json, print_report, print_status
+from viewsphere.cli.terminal import ProgressBar, print_formats, print_json, print_report, print_status, say
 from viewsphere.errors import UserError
 
 if TYPE_CHECKING:
@@ -73,9 +73,9 @@ def export(
         print_json({"formats": list(names), "frames": len(dataset), "of": dataset.plan.frames, "notes": list(notes)})
         return
     for note in notes:
-        typer.echo(note)
+        say(note)
     for name in names:
-        typer.echo(f"wrote {(output or folder) / name}")
+        say(f"wrote {(output or folder) / name}")
 
 
 def formats(json_: AsJson = False) -> None:
@@ -171,14 +171,14 @@ def report(
 
     def tell(phase: str, done: int, total: int) -> None:
         if not json_ and done == total:
-            typer.echo(f"{phase}: {total:,}", err=True)
+            say(f"{phase}: {total:,}", err=True)
 
     proof = _proof(dataset, check_frames) if proofs and len(dataset) else None
     size = write_report(dataset, page, frames=frames, proof=proof, workers=cores(), listener=tell)
     if json_:
         print_json({"page": str(page), "bytes": size, "frames": len(dataset), "ok": None if proof is None else proof.ok})
         return
-    typer.echo(f"wrote {page} ({size / 1e6:.1f} MB): open it in a browser")
+    say(f"wrote {page} ({size / 1e6:.1f} MB): open it in a browser")
 
 
 def view(
@@ -205,13 +205,13 @@ def view(
     live = Live(folder, workers=cores())
     with Server(live, address) as server:
         live.start()
-        typer.echo(f"{server.url} shows {folder}; Ctrl-C ends it")
+        say(f"{server.url} shows {folder}; Ctrl-C ends it")
         if open_:
             webbrowser.open(server.url)
         try:
             server.serve_forever()
         except KeyboardInterrupt:
-            typer.echo("ended", err=True)
+            say("ended", err=True)
             raise typer.Exit(130) from None
         finally:
             live.stop()

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from viewsphere.cli.arguments import AsJson, cores
-from viewsphere.cli.terminal import print_json
+from viewsphere.cli.terminal import print_json, say
 from viewsphere.errors import UserError
 
 LEFT = 12
@@ -40,13 +40,13 @@ def doctor(
     if setup_people:
         from viewsphere.zoo.people import makehuman
 
-        makehuman.set_up(lambda line: typer.echo(line, err=True))
+        makehuman.set_up(lambda line: say(line, err=True))
     found = examine()
     if json_:
         print_json(found)
         return
     for name, value in _lines(found):
-        typer.echo(f"{name:{LEFT}} {value}")
+        say(f"{name:{LEFT}} {value}")
 
 
 def examine() -> dict[str, Any]:
@@ -72,9 +72,9 @@ def _set_up_blender() -> None:
 
     made = interpreter_of(home())
     if made.is_file() and probe(made).problem is None:
-        typer.echo(f"{home()} has a Blender that works", err=True)
+        say(f"{home()} has a Blender that works", err=True)
         return
-    make_environment(lambda line: typer.echo(line, err=True))
+    make_environment(lambda line: say(line, err=True))
 
 
 def _processor() -> dict[str, Any]:

@@ -10,7 +10,7 @@ import typer
 
 from viewsphere.cli import completion
 from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, Workers, asked_formats, at, cores, with_options
-from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json
+from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json, say
 from viewsphere.errors import UserError
 
 if TYPE_CHECKING:
@@ -43,9 +43,9 @@ def merge(
         print_json({**counts, "categories": [c.name for c in dataset.categories], "notes": notes})
         return
     for note in notes:
-        typer.echo(note)
+        say(note)
     names = ", ".join(c.name for c in dataset.categories)
-    typer.echo(f"{target}: {len(dataset):,} frames, {len(dataset.plan.models):,} models; {names}")
+    say(f"{target}: {len(dataset):,} frames, {len(dataset.plan.models):,} models; {names}")
 
 
 def import_(
@@ -78,8 +78,8 @@ def import_(
         return
     _tell_left_out(foreign.left_out)
     for note in notes:
-        typer.echo(note)
-    typer.echo(f"{target}: {foreign.count:,} frames; {', '.join(c.name for c in foreign.categories)}")
+        say(note)
+    say(f"{target}: {foreign.count:,} frames; {', '.join(c.name for c in foreign.categories)}")
 
 
 def convert(
@@ -132,7 +132,7 @@ def convert(
                 listener=bar.show,
             )
     except KeyboardInterrupt:
-        typer.echo("stopped; nothing was written", err=True)
+        say("stopped; nothing was written", err=True)
         raise typer.Exit(130) from None
     if json_:
         told = {"left_out": list(made.left_out), "notes": list(made.notes)}
@@ -140,16 +140,16 @@ def convert(
         return
     _tell_left_out(made.left_out)
     for note in made.notes:
-        typer.echo(note)
+        say(note)
     for name in dict.fromkeys(names):
-        typer.echo(f"wrote {target / name}")
+        say(f"wrote {target / name}")
 
 
 def _tell_left_out(problems: Sequence[str]) -> None:
     for problem in problems[:MOST_FINDINGS]:
-        typer.echo(f"left out {problem}", err=True)
+        say(f"left out {problem}", err=True)
     if len(problems) > MOST_FINDINGS:
-        typer.echo(f"and {len(problems) - MOST_FINDINGS:,} more; --json lists all", err=True)
+        say(f"and {len(problems) - MOST_FINDINGS:,} more; --json lists all", err=True)
 
 
 def _needed(output: Path | None, what: str = "the new data set") -> Path:

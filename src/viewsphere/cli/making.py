@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-from contextlib import nullcontext, redirect_stdout
+from contextlib import ExitStack, nullcontext, redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from viewsphere.aside import write_whole
 from viewsphere.cli import completion
 from viewsphere.cli.arguments import (
     AllowScripts,
@@ -26,7 +27,15 @@ from viewsphere.cli.arguments import (
     with_options,
 )
 from viewsphere.cli.next_step import for_command, for_render
-from viewsphere.cli.terminal import ProgressBar, print_estimate, print_json, print_plan, print_summary, write, write_picture
+from viewsphere.cli.terminal import (
+    ProgressBar,
+    print_estimate,
+    print_json,
+    print_plan,
+    print_summary,
+    say,
+    write_picture,
+)
 from viewsphere.errors import StoreError, UserError
 from viewsphere.recipe.starts import FIRST, kinds, start
 
@@ -78,9 +87,9 @@ def _new_again(format_: str, source: Path, folder: Path | None) -> None:
     _announce_compilation()
     made = make_again(format_, source, folder or Path(f"{source.resolve().stem}-again"))
     for note in made.notes:
-        typer.echo(f"note: {note}", err=True)
+        say(f"note: {note}", err=True)
     what = f"{made.models:,} models" if made.models else "a model of the zoo's, as the data set has none"
-    typer.echo(f"wrote {made.recipe}: {made.shots:,} shots, {what}; next: viewsphere preview {made.recipe}")
+    say(f"wrote {made.recipe}: {made.shots:,} shots, {what}; next: viewsphere preview {made.recipe}")
 
 
 def _new_start(folder: Path, kind: str) -> None:
@@ -93,19 +102,21 @@ def _new_start(folder: Path, kind: str) -> None:
     for path in found:
         if path.exists():
             raise UserError(f"{path}: expected a new file, found one that exists: choose another folder")
-    for path, text in found.items():
-        write(path, text.encode())
-    typer.echo(f"wrote {' and '.join(map(str, found))}; next: viewsphere preview {file}")
+    with ExitStack() as undo:
+        for path, text in found.items():
+            write_whole(path, text.encode())
+            undo.callback(path.unlink)
+        undo.pop_all()
+    say(f"wrote {' and '.join(map(str, found))}; next: viewsphere preview {file}")
 
 
 def schema() -> None:
     """Print the recipe's JSON schema, for editors."""
-    import json
 
     from viewsphere.labels import channels, on_request
     from viewsphere.recipe.file import schema as recipe_schema
 
-    typer.echo(json.dumps(recipe_schema(channels=tuple(channels()), annotations=tuple(on_request())), indent=2))
+    print_json(recipe_schema(channels=tuple(channels()), annotations=tuple(on_request())))
 
 
 def inspect(
@@ -158,9 +169,9 @@ def inspect(
         print_json({**asdict(report), "picture": str(picture)})
         return
     for line in report_lines(report):
-        typer.echo(line)
+        say(line)
     hint = "the first view must show the front; if another does, give --forward as written below that one"
-    typer.echo(f"picture from four sides: {picture} ({hint})")
+    say(f"picture from four sides: {picture} ({hint})")
 
 
 def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, json_: bool) -> None:
@@ -174,7 +185,7 @@ def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, j
     _announce_compilation()
     picture = output or Path(f"{recipe.stem}-rig.png")
     frusta = picture.with_suffix(".glb")
-    write(frusta, glb_bytes(rig_mesh(shown)))
+    write_whole(frusta, glb_bytes(rig_mesh(shown)))
     write_picture(picture, four_sides(model_spec(str(frusta))))
     if json_:
         sensors = [asdict(facts) for facts in sensor_facts(shown)]
@@ -182,8 +193,8 @@ def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, j
         print_json({"sensors": sensors, "rectified": pairs, "model": str(frusta), "picture": str(picture)})
         return
     for line in rig_lines(shown):
-        typer.echo(line)
-    typer.echo(f"frusta: {frusta} (front: ahead of the first sensor); from four sides: {picture}")
+        say(line)
+    say(f"frusta: {frusta} (front: ahead of the first sensor); from four sides: {picture}")
 
 
 def plan(
@@ -210,7 +221,7 @@ def plan(
     if not json_:
         print_plan(planned)
         for note in planned.notes:
-            typer.echo(f"note: {note}")
+            say(f"note: {note}")
     cost = _estimate(loaded, workers) if estimate else None
     counts = {
         "name": planned.recipe.name,
@@ -283,9 +294,9 @@ def preview(
     if not samples:
         raise StoreError(f"{source}: expected finished frames, found none: render first")
     for warning in small_objects(samples, recipe):
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}", err=True)
     write_picture(output, contact_sheet(samples, names, columns, before=before))
-    typer.echo(f"wrote {output} ({len(samples)} frames)")
+    say(f"wrote {output} ({len(samples)} frames)")
 
 
 def _write_video(source: Path, file: Path, draw: list[str], sequence: str | None) -> None:
@@ -302,7 +313,7 @@ def _write_video(source: Path, file: Path, draw: list[str], sequence: str | None
 
         made = write_video(Dataset(source), file, draw, sequence, tell)
     many = f"{made.sequences} sequences" if made.sequences > 1 else "1 sequence"
-    typer.echo(f"wrote {file} ({many}, {made.pictures} pictures, {made.seconds:g} s)")
+    say(f"wrote {file} ({many}, {made.pictures} pictures, {made.seconds:g} s)")
 
 
 def render(
@@ -362,7 +373,7 @@ def render(
     if not json_:
         print_plan(planned)
         if addition is not None and any(Store(output).gaps(addition.record)):
-            typer.echo(f"{output}: {addition}")
+            say(f"{output}: {addition}")
     everybody = cores() if ray is None else 0
     aside = redirect_stdout(sys.stderr) if json_ else nullcontext()  # what libraries print is no JSON
     with ProgressBar(quiet=json_) as bar, aside:
@@ -380,7 +391,7 @@ def render(
             )
         except KeyboardInterrupt:
             bar.stop()
-            typer.echo(f"stopped; {bar.kept}. Run the same command to go on", err=True)
+            say(f"stopped; {bar.kept}. Run the same command to go on", err=True)
             raise typer.Exit(130) from None
     print_summary(summary, json_)
 
@@ -397,4 +408,4 @@ def _announce_compilation() -> None:
     from viewsphere.kernels.kernel_cache import kernel_folder
 
     if not any(kernel_folder().rglob("*.nbi")):  # imports alone make its folders
-        typer.echo("compiling kernels, once on this machine: about 20 seconds", err=True)
+        say("compiling kernels, once on this machine: about 20 seconds", err=True)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from viewsphere.aside import write_whole
 from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.printable import printable
 
 if TYPE_CHECKING:
     from viewsphere.check import Report
@@ -26,21 +30,31 @@ if TYPE_CHECKING:
 
 MOST_FINDINGS = 20
 
+CLOSED = 141
+"""Exit status of a command whose output is not read any more: that of SIGPIPE in a shell."""
+
+
+def say(line: str, *, err: bool = False) -> None:
+    """Print a line, its control characters escaped; the only way in which commands print.
+
+    Raises UserError where the output takes no more, as on a full disk, and ends quietly where its reader has ended.
+    """
+    try:
+        typer.echo(printable(line), err=err)
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2 if err else 1)  # Python writes the rest of its buffer at its end
+        if isinstance(error, BrokenPipeError):
+            sys.exit(CLOSED)
+        stream = "standard error" if err else "standard output"
+        raise UserError(f"{stream}: expected a place to write, found: {error.strerror or error}. Free some space") from None
+
 
 def complain(error: ViewsphereError, status: int) -> None:
     """Print an error, one line for each problem, and exit with this status."""
-    for line in str(error).splitlines():
-        typer.echo(f"viewsphere: {line}", err=True)
+    with suppress(UserError):  # a standard error that takes nothing
+        for line in str(error).split("\n"):
+            say(f"viewsphere: {line}", err=True)
     sys.exit(status)
-
-
-def write(file: Path, data: bytes) -> None:
-    """Write a file and the folders it needs; UserError if that is not possible."""
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(data)
-    except OSError as error:
-        raise UserError(f"{file}: expected a place to write, found: {error.strerror or error}") from None
 
 
 def write_picture(file: Path, picture: Any) -> None:
@@ -48,7 +62,7 @@ def write_picture(file: Path, picture: Any) -> None:
     check_picture(file)
     from viewsphere.codecs.png_tiff import encode_png
 
-    write(file, encode_png(picture))
+    write_whole(file, encode_png(picture))
 
 
 def check_picture(file: Path) -> None:
@@ -61,23 +75,24 @@ def print_json(value: object) -> None:
     """Print a value as JSON, for scripts."""
     import json
 
-    typer.echo(json.dumps(value, indent=2))
+    for line in json.dumps(value, indent=2).replace("\x7f", "\\u007f").split("\n"):
+        say(line)
 
 
 def print_plan(planned: Plan) -> None:
     """Print the counts of a plan, and its warnings."""
     splits = ", ".join(f"{name} {count:,}" for name, count in planned.split_counts.items())
-    typer.echo(f"{planned.recipe.name}: {planned.factors} = {planned.frames:,} frames ({splits})")
+    say(f"{planned.recipe.name}: {planned.factors} = {planned.frames:,} frames ({splits})")
     for warning in planned.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}", err=True)
 
 
 def print_estimate(cost: Estimate) -> None:
     """Print the estimated time and size of a whole data set."""
     crew = f"{cost.workers} worker{'s' if cost.workers > 1 else ''}"
-    typer.echo(f"about {_duration(cost.seconds)} with {crew}, {_size(cost.bytes)} on disk")
+    say(f"about {_duration(cost.seconds)} with {crew}, {_size(cost.bytes)} on disk")
     if cost.unused:
-        typer.echo(f"note: {cost.unused}")
+        say(f"note: {cost.unused}")
 
 
 def _duration(seconds: float) -> str:
@@ -101,29 +116,29 @@ def _size(count: float) -> str:
 def print_report(report: Report, repaired: Sequence[str] = ()) -> None:
     """Print the outcome of `check`, after a line for everything that was made again."""
     for line in repaired:
-        typer.echo(f"repaired: {line}")
+        say(f"repaired: {line}")
     failed = Counter(finding.check for finding in report.findings)
     for name, count in report.checked.items():
         found = f"{failed[name]:,} finding{'' if failed[name] == 1 else 's'}" if failed[name] else "ok"
-        typer.echo(f"{name:17} {found:14} {count:,} checked")
+        say(f"{name:17} {found:14} {count:,} checked")
     for name, reason in report.not_run.items():
-        typer.echo(f"not run: {name}: {reason}")
+        say(f"not run: {name}: {reason}")
     for note in report.notes:
-        typer.echo(f"note: {note}")
+        say(f"note: {note}")
     for finding in report.findings[:MOST_FINDINGS]:
-        typer.echo(f"failed: {finding}", err=True)
+        say(f"failed: {finding}", err=True)
     if len(report.findings) > MOST_FINDINGS:
-        typer.echo(f"and {len(report.findings) - MOST_FINDINGS:,} findings more; --json lists all", err=True)
-    typer.echo(report.verdict)
+        say(f"and {len(report.findings) - MOST_FINDINGS:,} findings more; --json lists all", err=True)
+    say(report.verdict)
 
 
 def _print_warnings(warnings: Warnings) -> None:
     """Print warnings; one that several models or files share is printed once."""
     lines = [*_shared("file", warnings.files), *_shared("model", warnings.models)]
     for line in lines[:MOST_FINDINGS]:
-        typer.echo(f"warning: {line}", err=True)
+        say(f"warning: {line}", err=True)
     if len(lines) > MOST_FINDINGS:
-        typer.echo(f"and {len(lines) - MOST_FINDINGS:,} warnings more; --json lists all", err=True)
+        say(f"and {len(lines) - MOST_FINDINGS:,} warnings more; --json lists all", err=True)
 
 
 def _shared(what: str, warnings: Mapping[str, Sequence[str]]) -> Iterator[str]:
@@ -143,34 +158,34 @@ def print_summary(summary: Summary, as_json: bool) -> None:
         print_json({**asdict(summary), "root": str(summary.root)})
         return
     for key, why in summary.skipped.items():
-        typer.echo(f"left out {key}: {why}", err=True)
+        say(f"left out {key}: {why}", err=True)
     _print_warnings(summary.warnings)
     for note in summary.notes:
-        typer.echo(note)
+        say(note)
     rate = f", {_rate(summary.rendered, summary.seconds)}" if summary.rendered else ""
     formats = ", ".join(summary.formats) or "no format asked for"
-    typer.echo(f"{summary.root}: {summary.frames:,} frames ({summary.rendered:,} new{rate}); {formats}")
+    say(f"{summary.root}: {summary.frames:,} frames ({summary.rendered:,} new{rate}); {formats}")
 
 
 def print_formats(found: Sequence[Listed]) -> None:
     """Print a paragraph for each format."""
     for one in found:
         does = " and ".join(word for word, can in (("written", one.writes), ("imported", one.reads)) if can)
-        typer.echo(f"{one.name} ({does}): {one.summary}")
+        say(f"{one.name} ({does}): {one.summary}")
         options = tuple(f"{one.name}.{name}" for name in one.options)
         parts = (("holds", one.holds), ("needs", one.needs), ("read by", one.read_by), ("options", options))
         for what, names in parts:
             if names:
-                typer.echo(f"    {what}: {', '.join(names)}")
+                say(f"    {what}: {', '.join(names)}")
 
 
 def print_status(found: Status) -> None:
     """Print how far a data set is, and the runs at work on it."""
     counts = f"{found.finished:,} finished, {found.under_way:,} under way, {found.left_out:,} left out"
     waiting = found.missing - found.under_way
-    typer.echo(f"{found.root}: {found.frames:,} frames: {counts}, {waiting:,} missing{_share_done(found)}")
+    say(f"{found.root}: {found.frames:,} frames: {counts}, {waiting:,} missing{_share_done(found)}")
     if found.models:
-        typer.echo(f"models to be made: {_some(found.models)}")
+        say(f"models to be made: {_some(found.models)}")
     for run in found.runs:
         what = run.told.phase
         if run.told.total:
@@ -179,11 +194,11 @@ def print_status(found: Status) -> None:
         shots = f"; {_some(run.told.working_on)}" if run.told.working_on else ""
         gone = "" if run.state == "running" or found.complete else ": run it again"
         heard = f"heard of {_duration(run.seconds_ago)} ago"
-        typer.echo(f"{run.state}: {_who(run.told)}: {what}{rate}, {heard}{shots}{gone}")
+        say(f"{run.state}: {_who(run.told)}: {what}{rate}, {heard}{shots}{gone}")
     for told in found.failed:
-        typer.echo(f"failed: {_who(told)}: {told.error}")
+        say(f"failed: {_who(told)}: {told.error}")
     if found.seconds_left is not None:
-        typer.echo(f"{_rate(1, 1 / found.rate)}, about {_duration(found.seconds_left)} left")
+        say(f"{_rate(1, 1 / found.rate)}, about {_duration(found.seconds_left)} left")
 
 
 def _some(names: Sequence[str]) -> str:

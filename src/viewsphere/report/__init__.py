@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from viewsphere.errors import StoreError, UserError, ViewsphereError
+from viewsphere.aside import write_whole
+from viewsphere.errors import StoreError, ViewsphereError
 from viewsphere.geometry.box import EDGES, FACES, VERTEX_SIGNS
 from viewsphere.labels import drawings, is_shown
 from viewsphere.report.choice import chosen_frames
@@ -87,11 +88,7 @@ def write_report(
     pictures = layers_within(dataset, positions, room, lambda done: tell("pictures", done, len(positions)), within)
     data["shown"] = [{**frame, "layers": found} for frame, found in zip(data["shown"], pictures, strict=True)]
     text = page(dataset.name, data).encode()
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(text)
-    except OSError as error:
-        raise UserError(f"{file}: expected a place to write, found: {error.strerror or error}") from None
+    write_whole(file, text)
     return len(text)
 
 

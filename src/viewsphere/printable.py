@@ -1,0 +1,19 @@
+"""Text from files on its way to a terminal, which would obey control characters in it."""
+
+from __future__ import annotations
+
+from unicodedata import category
+
+CONTROL = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+"""Unicode's categories of control and format characters, halves of characters, and separators of lines."""
+
+
+def printable(text: str) -> str:
+    """The text in one line: control and format characters, such as those that begin a terminal's commands, as `\\x1b`."""
+    if text.isprintable():
+        return text
+    return "".join(_escaped(letter) if category(letter) in CONTROL else letter for letter in text)
+
+
+def _escaped(letter: str) -> str:
+    return letter.encode("unicode_escape", "surrogatepass").decode("ascii")
