@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from deadline import DEADLINE, until
-from viewsphere.aside import LOCK, STALE_S, Aside, aside, left_by_dead, of_this_process, sweep, temporary
+from viewsphere.aside import LOCK, STALE_S, Aside, aside, left_by_dead, of_this_process, sweep, temporary, write_whole
+from viewsphere.errors import UserError
 
 MAKER = """
 import sys, time
@@ -247,3 +248,34 @@ def test_nobody_loses_a_folder_to_those_who_sweep(tmp_path):
         for done in sweeps:
             done.result(DEADLINE)
     assert until(lambda: sweep(tmp_path) or not list(tmp_path.iterdir()))
+
+
+def test_an_old_file_stays_until_the_new_one_is_whole(tmp_path, monkeypatch):
+    file, good = tmp_path / "a" / "r.html", b"good" * 1000
+    write_whole(file, good)
+    file.chmod(0o640)
+    write_bytes = Path.write_bytes
+
+    def full(path, data):
+        write_bytes(path, data[:10])
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched, pytest.raises(UserError, match=r"r\.html: .*No space left"):
+        patched.setattr(Path, "write_bytes", full)
+        write_whole(file, b"new")
+    assert file.read_bytes() == good
+    assert [path.name for path in file.parent.iterdir()] == ["r.html"]
+    write_whole(file, b"new")
+    assert (file.read_bytes(), file.stat().st_mode & 0o777) == (b"new", 0o640)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX files")
+def test_a_link_and_a_device_stay_what_they_are(tmp_path):
+    file, link = tmp_path / "file", tmp_path / "link"
+    file.write_bytes(b"old")
+    link.symlink_to(file)
+    write_whole(link, b"new")
+    assert link.is_symlink()
+    assert file.read_bytes() == b"new"
+    write_whole(Path(os.devnull), b"new")
+    assert not Path(os.devnull).is_file()

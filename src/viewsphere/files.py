@@ -87,7 +87,7 @@ class _Bounded(io.FileIO):
     """A regular file on a disk of which at most limit + 1 bytes are read."""
 
     def __init__(self, file: Path, limit: str) -> None:
-        super().__init__(file, "rb", opener=_descriptor)
+        super().__init__(str(file), "rb", opener=_descriptor)  # libraries take a stream's name for a text
         self._file, self._limit, self._most = str(file), limit, int(getattr(limits, limit))
         try:
             _refuse_larger(self._file, os.fstat(self.fileno()).st_size, limit)

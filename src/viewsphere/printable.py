@@ -15,5 +15,14 @@ def printable(text: str) -> str:
     return "".join(_escaped(letter) if category(letter) in CONTROL else letter for letter in text)
 
 
+def is_utf8(text: str) -> bool:
+    """Whether a name is text. The names of files may be any bytes, of which Python makes halves of characters."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def _escaped(letter: str) -> str:
     return letter.encode("unicode_escape", "surrogatepass").decode("ascii")

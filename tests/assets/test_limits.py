@@ -31,6 +31,7 @@ TESTED = {
     "MAX_REMOTE_TRIES": "test_places",
     "MAX_FETCHED_BYTES": "test_fetched",
     "MAX_MODELS": "test_models",
+    "MAX_ENTRIES": "test_entries_walked",
     "MAX_VOXELS": "test_voxels",
     "MAX_LISTED_OBJECTS": "test_listed_sampler",
     "MAX_ANNOTATION_BYTES": "test_kitti_reading",

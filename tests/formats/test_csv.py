@@ -1,13 +1,14 @@
 """The format `csv`, read by Python's csv module: values are those of the samples, to the last bit."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from cube_dataset import make
-from viewsphere.formats.csv import HEAD, verify
+from viewsphere.formats.csv import HEAD, Options, _rows, verify
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import write
 
@@ -51,13 +52,26 @@ def test_rows_are_the_objects(exported):
 
 def test_its_proof_names_the_frame(exported):
     dataset, folder, rows = exported
-    assert list(verify(dataset, folder, ())) == []
+    assert list(verify(dataset, folder, (), Options())) == []
     table = folder / "objects.csv"
     text = table.read_text("utf-8")
     head, last = text.rstrip().rsplit("\n", 1)
     table.write_text(f"{head}\n{last.replace(rows[-1]['area'], '1234567')}\n", "utf-8", newline="\n")
-    (frame, line), *more = verify(dataset, folder, ())
+    (frame, line), *more = verify(dataset, folder, (), Options())
     assert more == []
     assert frame == int(rows[-1]["index"])
     assert "objects.csv: row" in line
     table.write_text(text, "utf-8", newline="\n")
+
+
+@pytest.mark.parametrize("text", ["=cmd|'/c calc'!A1", "+1+1", "-2+3", "@SUM(1)", "\tx", "\r=1"])
+def test_no_text_is_a_formula_unless_asked_for(exported, text):
+    dataset, _, _ = exported
+    sample = dataset[0]
+    evil = replace(sample, split=text, objects=tuple(replace(o, category=text) for o in sample.objects))
+    (row, *_), (plain, *_) = _rows(evil, Options()), _rows(evil, Options(safe=False))
+    at = HEAD.index("split"), HEAD.index("category")
+    assert [row[i] for i in at] == [f"'{text}"] * 2
+    assert [plain[i] for i in at] == [text] * 2
+    for name in ("translation_x", "azimuth_deg", "id"):  # numbers, also negative ones, stay numbers
+        assert row[HEAD.index(name)] == plain[HEAD.index(name)]

@@ -4,6 +4,9 @@
     <split>/<index>.png, ...     the pictures that the rows name
 
 Empty cells say that nothing is known, or that there is none. Frames without objects have a row with their picture alone.
+
+Spreadsheets run texts that begin with =, +, -, @, a tab or a carriage return as formulas: such texts have a ' in front. `safe:
+false` writes them as they are.
 """
 
 from __future__ import annotations
@@ -16,10 +19,13 @@ from itertools import zip_longest
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from pydantic import Field
+
 from viewsphere.aside import temporary
 from viewsphere.files import open_file
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, put
+from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 
@@ -49,39 +55,51 @@ LISTS = {
     "translation": ("x", "y", "z"),
     "size": ("width", "height", "length"),
 }
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""Beginnings of texts that spreadsheets run as formulas (https://owasp.org/www-community/attacks/CSV_Injection)."""
+
 HEAD = (*OF_SAMPLE, *OF_OBJECT, *OF_VIEW, *(f"{name}_{part}" for name, parts in LISTS.items() for part in parts))
 
 
-def preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[list[Any]]]:
+class Options(Frozen):
+    """How texts are written."""
+
+    safe: bool = Field(default=True, description="`true`: a ' in front of texts that spreadsheets would run as formulas")
+
+
+def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], list[list[Any]]]:
     """Puts a sample's picture in place, and makes its rows."""
 
     def prepare(sample: Sample) -> list[list[Any]]:
         for _, name, content in _picture(sample):
             put(dataset, content, folder / name)
-        return list(_rows(sample))
+        return list(_rows(sample, options))
 
     return prepare
 
 
 @contextmanager
-def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[list[list[Any]]], None]]:
+def writer(
+    dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
+) -> Generator[Callable[[list[list[Any]]], None]]:
     """Write the table."""
     with _table(folder / TABLE) as append:
         yield append
 
 
-def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
+def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
     """All that is not as it would be exported now."""
     with temporary("csv") as aside:
         with _table(aside / TABLE) as append:
-            yield from check_files(dataset, folder, _expected(dataset, append), _expected(dataset, lambda rows: None), [TABLE])
+            ours, others = _expected(dataset, options, append), _expected(dataset, options, lambda rows: None)
+            yield from check_files(dataset, folder, ours, others, [TABLE])
         if (folder / TABLE).is_file():
             yield from _rows_that_differ(aside / TABLE, folder / TABLE)
 
 
-def _expected(dataset: Dataset, append: Callable[[list[list[Any]]], None]) -> Iterator[Expected]:
+def _expected(dataset: Dataset, options: Options, append: Callable[[list[list[Any]]], None]) -> Iterator[Expected]:
     for sample in dataset:
-        append(list(_rows(sample)))
+        append(list(_rows(sample, options)))
         yield from _picture(sample)
 
 
@@ -106,10 +124,11 @@ def _table(file: Path) -> Generator[Callable[[list[list[Any]]], None]]:
         yield rows.writerows
 
 
-def _rows(sample: Sample) -> Iterator[list[Any]]:
-    own = [_name(sample), *(getattr(sample, name) for name in OF_SAMPLE[1:])]
+def _rows(sample: Sample, options: Options) -> Iterator[list[Any]]:
+    cell = _safe if options.safe else _cell
+    own = [cell(value) for value in (_name(sample), *(getattr(sample, name) for name in OF_SAMPLE[1:]))]
     for o in sample.objects:
-        yield [*own, *map(_cell, _values(o))]
+        yield [*own, *map(cell, _values(o))]
     if not sample.objects:
         yield [*own, *[""] * (len(HEAD) - len(own))]
 
@@ -125,6 +144,11 @@ def _values(o: ObjectAnnotation) -> Iterator[Any]:
 def _cell(value: Any) -> Any:
     """Numbers in as many digits as they need to be read back equal; NaN and None are empty."""
     return "" if value is None or (isinstance(value, float) and math.isnan(value)) else value
+
+
+def _safe(value: Any) -> Any:
+    """The cell, which no spreadsheet takes for a formula."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else _cell(value)
 
 
 def _rows_that_differ(wanted: Path, found: Path) -> Iterator[Remark]:

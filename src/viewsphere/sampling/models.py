@@ -10,7 +10,7 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cache
-from glob import glob, has_magic
+from glob import has_magic
 from itertools import chain
 from pathlib import Path
 from typing import Literal
@@ -26,6 +26,7 @@ from viewsphere.plugins import families
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.entries_walked import below, matching, named
 from viewsphere.sampling.seeds import generator, share
 from viewsphere.sampling.tables import Cells, table_rows
 from viewsphere.store import Category
@@ -249,7 +250,7 @@ def _matching(folder: Path, source: str, where: str) -> list[Path]:
         endings, unread = ", ".join(sorted(MODEL_SUFFIXES)), _unread(folder, source, where)
         hint = f"; {_naming(folder, unread)}" if unread else ""
         raise RecipeError(f"{where}.source: expected model files ({endings}); {source!r} gives none in {folder}{hint}")
-    return [Path(os.path.normpath(f)) for f in matches]
+    return [named(Path(os.path.normpath(f)), f"{where}.source") for f in matches]
 
 
 def _unread(folder: Path, source: str, where: str) -> set[Path]:
@@ -280,9 +281,9 @@ def _candidates(folder: Path, source: str, where: str) -> list[Path]:
     if split_source(path)[0].is_file():
         return [path]
     if path.is_dir():
-        return [f for f in path.rglob("*") if not any(map(_is_hidden, f.relative_to(path).parts))]
+        return [f for f in below(path, where) if not any(map(_is_hidden, f.relative_to(path).parts))]
     if has_magic(source):
-        return [folder / f for f in glob(source, root_dir=folder, recursive=True)]  # noqa: PTH207 (Path.glob takes no absolute pattern)
+        return matching(folder, source, where)
     kinds = "a file, folder, pattern or zoo:<family>"
     meant = f"; did you mean {ZOO + source!r}?" if source in families() else ""
     raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}{meant}")

@@ -22,6 +22,7 @@ from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.light import SKY_SUFFIXES
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.entries_walked import named
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -87,7 +88,7 @@ def _files(recipe: Recipe, field: str, kind: Kind, written: str) -> tuple[str, .
     if kind == "image":
         raise RecipeError(f"{field}: expected an image file; found none at {path}")
     suffixes = SKY_SUFFIXES if kind == "hdri" else IMAGE_SUFFIXES
-    found = files_in(path, suffixes)
+    found = tuple(named(Path(file), field).as_posix() for file in files_in(path, suffixes))
     if kind == "textures":
         _check_folder(path, found, field)
     hint = nearest(written, ("daylight",)) if kind == "hdri" else ""

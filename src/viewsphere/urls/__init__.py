@@ -20,7 +20,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from viewsphere.aside import temporary
+from viewsphere.errors import UserError
 from viewsphere.files import check_file, open_file
+from viewsphere.printable import is_utf8, printable
 from viewsphere.urls.remote_path import BLOCK
 from viewsphere.urls.remote_path import RemotePath as RemotePath
 
@@ -35,6 +37,8 @@ def located(root: str | os.PathLike[str]) -> Path:
     if isinstance(root, RemotePath):
         return root
     text = os.fspath(root)
+    if not is_utf8(text):
+        raise UserError(f"the name {printable(text)} is not UTF-8. Choose another name for the folder")
     if not _URL.match(text):
         return Path(root)
     if text.startswith("file:"):

@@ -23,6 +23,7 @@ from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.printable import printable
 from viewsphere.report.paths import without_folders
 from viewsphere.view.answers import Answer, Answers
 from viewsphere.view.live import Live
@@ -135,7 +136,7 @@ class Server(ThreadingMixIn, TCPServer):
 
     def complain(self, error: BaseException | None) -> None:
         """Tell the one who runs the server of a mistake of ours."""
-        print(f"viewsphere: view: {type(error).__name__}: {error}", file=sys.stderr)  # noqa: T201
+        print(printable(f"viewsphere: view: {type(error).__name__}: {error}"), file=sys.stderr)  # noqa: T201
 
 
 def _parted(host: str) -> tuple[str, int | None]:
