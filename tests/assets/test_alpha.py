@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
-from viewsphere.assets.alpha import shown_texels
 from viewsphere.assets.load import load_model
 from viewsphere.assets.mesh import Texture
+from viewsphere.assets.shown import shown_texels
 
 
 def png(pixels):

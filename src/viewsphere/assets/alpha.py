@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder
-from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.assets.primitive import Float, Primitive
+from viewsphere.assets.mesh import Image, Material
+from viewsphere.assets.primitive import Primitive
+from viewsphere.assets.shown import shown_texels
 
 SOLID = 250
 """Texels with at least this alpha are taken as opaque."""
@@ -72,35 +73,6 @@ def _shown_alpha(
     if alpha.min() >= SOLID or alpha.max() == 0 or not uv:
         return None
     return alpha[_without_rim(shown_texels(texture, np.concatenate(uv), alpha.shape))]
-
-
-def shown_texels(texture: Texture, uv: Float, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Texels (H, W) of a picture of this shape that triangles with corners `uv` (T, 3, 2) show: those whose
-    centre lies in a triangle, and each triangle's own centre.
-
-    Of a triangle wider than the picture, or beyond the edge of a clamped picture, the whole bounding box counts. The
-    texture's offset and scale apply; the texture must not be rotated or mirrored.
-    """
-    from viewsphere.assets.kernels_coverage import add_triangles
-
-    uv = uv * texture.scale + texture.offset
-    uv = uv[np.isfinite(uv).all(axis=(1, 2))]
-    clamped = np.array([texture.wrap_s == "clamp", texture.wrap_t == "clamp"])
-    low, high = uv.min(axis=1), uv.max(axis=1)
-    outside = np.where(clamped, (low < 0) | (high > 1), high - low > 1).any(axis=1)
-    period = np.where(clamped, 0.0, np.floor(low))
-    last = np.nextafter(1.0, 0.0)
-    uv, low, high = (
-        np.where(clamped, np.clip(corner - start, 0.0, last), corner - start)
-        for corner, start in ((uv, period[:, None]), (low, period), (high, period))
-    )
-    high = np.minimum(high, low + 1.0)
-    box = np.stack([low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])], axis=1)
-    box = box[outside]
-    steps = np.zeros((shape[0], shape[1] + 1), np.int32)
-    size = np.array([shape[1], shape[0]], np.float64)
-    add_triangles(steps, np.concatenate([uv[~outside], box[:, [0, 1, 2]], box[:, [0, 2, 3]]]) * size)
-    return np.cumsum(steps, axis=1, out=steps)[:, :-1] > 0
 
 
 def _without_rim(texels: NDArray[np.bool_]) -> NDArray[np.bool_]:

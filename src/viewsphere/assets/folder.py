@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.finder import Finder, NotFoundError
+from viewsphere.assets.impostor import impostor, wrong_kind
 from viewsphere.assets.mesh import Image
 from viewsphere.errors import ModelError
 from viewsphere.files import read_bytes
@@ -126,6 +127,9 @@ class ModelFolder:
             raise self.error(f"cannot be read: {error.strerror or error}") from None
         if not data:
             raise self.error("the file is empty; export the model again")
+        instead = impostor(data) or wrong_kind(data, self.model.suffix[1:].lower())
+        if instead is not None:
+            raise self.error(f"expected a model, found {instead}")
         return data
 
     def read(self, reference: str, what: str = "file", base: Path | None = None) -> bytes:
@@ -138,9 +142,12 @@ class ModelFolder:
             return _data_uri(reference)
         path = self.path_of(reference, what, base)
         try:
-            return read_bytes(path)
+            data = read_bytes(path)
         except OSError as error:
             raise UnreadableError(f"{what} {reference!r} cannot be read: {error.strerror or error}") from None
+        if (instead := impostor(data)) is not None:
+            raise UnreadableError(f"{what} {_short(reference)} is {instead}")
+        return data
 
     def path_of(self, reference: str, what: str = "file", base: Path | None = None) -> Path:
         """The path of a file that the model names; raises UnreadableError as `read` does."""

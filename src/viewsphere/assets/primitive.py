@@ -13,6 +13,7 @@ from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.marks import Mark
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.skin import joined
+from viewsphere.assets.unseen import is_unseen
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.scene import IDENTITY, Matrix4
@@ -153,6 +154,9 @@ def assemble(
         triangle_body_part=None if body_part is None else body_part[taken],
         body_parts=body_parts,
     )
+    if is_unseen(mesh):
+        folder.warn("nothing of the model can be seen: all of it is clear (opacity 0); set the opacity of its materials")
+        mesh = replace(mesh, warnings=tuple(folder.warnings))
     return mesh, replace(facts, origin=(origin[0], origin[1], origin[2]), size=extents(mesh), files=tuple(folder.files))
 
 

@@ -76,7 +76,8 @@ def read(job: Job) -> dict[str, Any]:
         return {"error": f"{spec.source}: expected at most {depth:,} things within one another (recursion), found more"}
     except Exception as error:
         said = " ".join(str(error).split())[:200]
-        return {"error": f"{spec.source}: its reader failed ({type(error).__name__}: {said}): damaged?"}
+        problem = f"its reader failed ({type(error).__name__}: {said})"
+        return {"error": f"{spec.source}: {problem}; export the model again, or report the file as a bug"}
     return {"files": [str(file) for file in files]}
 
 
