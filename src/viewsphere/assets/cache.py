@@ -216,7 +216,7 @@ def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec, frame: i
 def readers_digest() -> str:
     """Digest of this package's and Blender's worker's sources, and the versions of the libraries that parse for it."""
     digest = hashlib.sha256()
-    for library in ("numpy", "trimesh", "lxml", "pillow"):
+    for library in ("numpy", "lxml", "pillow"):
         try:
             digest.update(f"{library} {version(library)};".encode())
         except PackageNotFoundError:

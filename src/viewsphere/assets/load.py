@@ -155,6 +155,10 @@ def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, Fil
         from viewsphere.assets.readers.threemf import read_3mf
 
         return read_3mf(folder)
-    from viewsphere.assets.via_trimesh import read_via_trimesh
+    if suffix == "ply":
+        from viewsphere.assets.readers.ply import read_ply
 
-    return read_via_trimesh(folder)
+        return read_ply(folder)
+    from viewsphere.assets.readers.off import read_off
+
+    return read_off(folder)

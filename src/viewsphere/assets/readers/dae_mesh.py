@@ -181,7 +181,7 @@ def _corners(folder: ModelFolder, element: Any, width: int, position: _Input) ->
         runs = [run[_fan(len(run))] for run in runs if len(run) > 2]
         return _split(folder, runs, np.full(sum(map(len, runs)) // 3, 3))
     elif element.tag == "tristrips":
-        runs = [run[strip(len(run))] for run in runs if len(run) > 2]
+        runs = [run[_strip(len(run))] for run in runs if len(run) > 2]
         return _split(folder, runs, np.full(sum(map(len, runs)) // 3, 3))
     return _split(folder, runs, np.array([len(run) for run in runs], np.int64))
 
@@ -209,7 +209,7 @@ def _fan(count: int) -> Int:
     return np.column_stack([np.zeros_like(step), step + 1, step + 2]).reshape(-1)
 
 
-def strip(count: int) -> Int:
+def _strip(count: int) -> Int:
     """Places of the corners (3 (count - 2),) of a strip's triangles, every other one turned."""
     step = np.arange(count - 2)
     odd = step % 2
