@@ -11,7 +11,7 @@ def star(rng, corners, least=0.3):
 
 
 def comb(teeth):
-    """A comb (4 teeth + 2, 2): no star, its fan from any corner folds. Its area is 3 teeth - 1."""
+    """A comb (4 teeth + 2, 2): no star, its fan from any corner folds. Its area is 4 teeth - 1."""
     top = [(x, y) for i in range(teeth) for x, y in ((2 * i, 0), (2 * i, 2), (2 * i + 1, 2), (2 * i + 1, 0))]
     return np.array([(0.0, -1.0), *top, (2 * teeth - 1, -1.0)])[::-1]
 

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.primitive import FileFacts, Float, Int, assemble
 from viewsphere.assets.readers.numbers import numbers_in
-from viewsphere.assets.readers.polygon_pieces import Polygons, brightest_of, linear_colors, pieces_of, upright
+from viewsphere.assets.readers.polygon_pieces import Polygons, brightest_of, linear_colors, pieces_of, upright, with_alpha
 
 PREFIXES = ("ST", "C", "N", "4", "n")
 HEADER = re.compile(rb"\s*(ST)?(C)?(N)?(4)?(n)?(?:OFF|off)(?![A-Za-z])")
@@ -26,9 +25,9 @@ def read_off(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     Colours, of vertices or of faces, are taken as sRGB. Without normals, edges are smooth up to a crease. Raises ModelError.
     """
     polygons = _Off.parsed(folder, folder.read_model()).polygons()
-    pieces = pieces_of(folder, polygons)
+    pieces, materials = with_alpha(folder, pieces_of(folder, polygons), [Material(name="default")])
     facts = FileFacts(folder.model, "off", "+z", "-y", 1.0)
-    return assemble(folder, pieces, with_alpha_modes(pieces, [Material(name="default")], folder.images), facts)
+    return assemble(folder, pieces, materials, facts)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.assets.primitive import FileFacts, Float, Int, Primitive, assemble
 from viewsphere.assets.readers.ply_data import Columns, Lists, PlyFile, read_elements
-from viewsphere.assets.readers.polygon_pieces import Polygons, brightest_of, linear_colors, pieces_of, upright
+from viewsphere.assets.readers.polygon_pieces import Polygons, brightest_of, linear_colors, pieces_of, upright, with_alpha
 from viewsphere.errors import ModelError
 
 COLORS = (
@@ -52,8 +52,9 @@ def read_ply(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     file = _Ply(folder, read_elements(folder, folder.read_model()))
     polygons, materials = file.polygons()
     pieces = _coloured_once(folder, pieces_of(folder, polygons), materials)
+    pieces, materials = with_alpha(folder, pieces, materials)
     facts = FileFacts(folder.model, "ply", "+z", "-y", 1.0)
-    return assemble(folder, pieces, with_alpha_modes(pieces, materials, folder.images), facts)
+    return assemble(folder, pieces, with_alpha_modes(folder, pieces, materials), facts)
 
 
 @dataclass(frozen=True, eq=False)

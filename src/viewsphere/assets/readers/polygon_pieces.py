@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.mesh import Material
 from viewsphere.assets.polygon_proof import cut_polygons
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
 from viewsphere.assets.smoothing import creased
@@ -53,6 +54,26 @@ def pieces_of(folder: ModelFolder, polygons: Polygons) -> list[Primitive]:
     if len(used) == 1:
         return [replace(whole, material=used[0])]
     return [compact(replace(whole, material=m, triangles=whole.triangles[material == m])) for m in used]
+
+
+def with_alpha(
+    folder: ModelFolder, pieces: Sequence[Primitive], materials: Sequence[Material]
+) -> tuple[list[Primitive], list[Material]]:
+    """The pieces, and materials that blend where colours are clear; colours that are clear all over count as opaque."""
+    alphas = [piece.colors[:, 3] for piece in pieces if piece.colors is not None and len(piece.colors)]
+    if alphas and max(float(alpha.max()) for alpha in alphas) == 0.0:
+        folder.warn("all its colours have alpha 0; they are taken as opaque")
+        return [_opaque(piece) for piece in pieces], list(materials)
+    clear = {piece.material for piece in pieces if piece.colors is not None and (piece.colors[:, 3] < 1.0).any()}
+    return list(pieces), [replace(m, alpha_mode="BLEND") if i in clear else m for i, m in enumerate(materials)]
+
+
+def _opaque(piece: Primitive) -> Primitive:
+    return (
+        piece
+        if piece.colors is None
+        else replace(piece, colors=np.column_stack([piece.colors[:, :3], np.ones(len(piece.colors))]))
+    )
 
 
 def _piece(polygons: Polygons, cut: Int) -> Primitive:

@@ -1,4 +1,4 @@
-"""PLY, STL, OFF, DAE and 3MF: what a file holds arrives in the mesh."""
+"""PLY, STL, OFF, DAE and 3MF: what a file holds arrives in the mesh; broken files are one clear error."""
 
 import io
 import struct
