@@ -297,7 +297,7 @@ def test_empty_pictures_are_the_same_without_their_models(tmp_path):
         formats=["coco"],
         empty=0.4,
         engine={"name": "raster", "bounces": "off"},
-        viewpoints={**LOW, "count": 4, "elevation": [10, 20]},
+        viewpoints={**LOW, "count": 4, "elevation": [10, 20], "shared": True},
     )
     with built_once():
         vs.generate(recipe, tmp_path / "out")

@@ -1,5 +1,6 @@
 """Variations render the same shots under other light: labels are the same bytes, and nothing that is there changes."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,12 @@ from small import small_recipe, still_channels
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.box import box_vertices
 from viewsphere.model.channel import PICTURES
 from viewsphere.model.sample import Sample
 from viewsphere.sampling.plan import plan
 
+BOX = box_vertices((-0.1, -0.1, 0), (0.1, 0.1, 0.3))
 DARK = {"sun": {"elevation_deg": 12, "strength": 1.0}, "effects": {"read_noise": 0.3}}
 BOTH = {"day": {"effects": {"read_noise": 0.3}}, "dark": DARK}
 LABELS = [name for name in still_channels() if name not in PICTURES]
@@ -74,6 +77,43 @@ def test_noise_of_one_shot_differs_between_variations() -> None:
     twice = recipe(variations={"one": BOTH["day"], "other": BOTH["day"]}, models=[{**MODEL, "count": 1}])
     one, other = (s.rgb.astype(int) for s in vs.render(twice) if s.known_pose.index == 0)
     assert 0.3 < np.abs(one - other).mean() < 10
+
+
+SUN = {"sun": {"azimuth_deg": {"uniform": [0, 360]}, "elevation_deg": 40}}
+RAIN = {"rain": {"rate": {"uniform": [10, 50]}}}
+
+
+def drawn_scenes(variations: dict[str, object], name: str) -> list[object]:
+    """A field of the scene of each variation's shot."""
+    one = recipe(variations=variations, models=[{**MODEL, "count": 1}], viewpoints={"azimuth": 0, "distance": 2})
+    planned = plan(one)
+    return [getattr(shot.scene, name) for shot in planned.shots(lambda spec, step=None: BOX)]
+
+
+@pytest.mark.parametrize(("change", "field"), [(SUN, "sun"), (RAIN, "rain")])
+def test_each_variation_draws_what_it_sets_unless_they_are_paired(change: dict[str, object], field: str) -> None:
+    ten = {f"light{i}": change for i in range(10)}
+    assert len({repr(one) for one in drawn_scenes(ten, field)}) == 10
+    assert len({repr(one) for one in drawn_scenes(ten | {"paired": True}, field)}) == 1
+
+
+def test_what_variations_take_from_the_scene_has_the_same_draws() -> None:
+    suns = drawn_scenes({"clear": {}, "noisy": {"effects": {"read_noise": 0.3}}}, "sun")
+    assert suns[0] == suns[1]
+
+
+def test_a_variation_more_changes_no_draw_of_the_others() -> None:
+    few, more = (drawn_scenes({name: SUN for name in names}, "sun") for names in ("ab", "cab"))
+    assert more[1:] == few
+
+
+def test_paired_is_kept_in_what_is_written_and_is_no_variation() -> None:
+    paired = recipe(variations={"paired": True, **BOTH})
+    again = vs.Recipe.model_validate_json(paired.model_dump_json())
+    assert again.variations is not None and again.variations.paired and list(again.variations) == list(BOTH)
+    assert "paired" not in json.loads(recipe().model_dump_json())["variations"]
+    with pytest.raises(RecipeError, match=r"variations\.paired: expected true or false"):
+        recipe(variations={"paired": {"sun": "off"}, **BOTH})
 
 
 @pytest.mark.slow

@@ -197,6 +197,23 @@ def test_what_cannot_be_is_said(changes, message):
         vs.plan(recipe(**changes))
 
 
+ONE_MODEL = [{"source": "zoo:mug", "category": "mug"}]
+
+
+@pytest.mark.parametrize(
+    ("repeat", "remedies"),
+    [
+        (True, r"which has 0 of 1 model\. Set `splits: \{by: scene\}`, or add models\."),
+        (False, r"which has \d of 1 model\. Set `splits: \{by: scene\}`, (set `scenes\.repeat: true`, ask for fewer, )?or add"),
+    ],
+)
+def test_the_remedy_for_one_model_is_another_split_not_repeating_it(repeat, remedies):
+    said = {"viewpoints": {"distance": 2}, "models": ONE_MODEL, "scenes": {"count": 4, "objects": 5, "repeat": repeat}}
+    with pytest.raises(RecipeError, match=remedies):
+        vs.plan(vs.Recipe(**said))
+    assert vs.plan(vs.Recipe(**said | {"splits": {"by": "scene"}, "scenes": {**said["scenes"], "repeat": True}})).frames == 32
+
+
 def test_repeated_models_are_instances():
     planned = vs.plan(recipe(10, 1, scenes={"repeat": True}, splits={"by": "scene", "train": 0.5, "val": 0.5}))
     assert all(len({t.model.key for t in shot.things}) == 1 < len(shot.things) for shot in planned.shots(box_of))

@@ -15,6 +15,8 @@ from viewsphere.model.instant import Viewpoint
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.viewpoints import Range, axis_count, axis_value
 from viewsphere.sampling.camera import distance_problem
+from viewsphere.sampling.plan import plan
+from viewsphere.sampling.pose_numbers import pose_names
 from viewsphere.sampling.viewpoints import poses
 
 
@@ -219,3 +221,52 @@ def test_a_camera_inside_the_model_is_a_problem():
     assert problem(elevation_deg=90, distance=0.51) is None
     assert problem(target=(0, 3, 0), distance=1.5) is not None
     assert distance_problem(Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=0.1), box * [1, 1, 0]) is None
+
+
+RANDOM = {
+    "sphere": {"kind": "sphere", "count": 2, "elevation": [5, 40], "distance": {"fill": 0.6}},
+    "normal": {"kind": "normal", "count": 2, "distance": 2, "sd": {"azimuth": 20}},
+    "jitter": {"kind": "jitter", "azimuth": [0, 90], "distance": 2, "plus_minus": {"azimuth": 20}},
+}
+
+
+def views_of(names, viewpoints, **changes):
+    """Of each model its viewpoints."""
+    models = [{"source": "zoo:mug", "name": name, "category": "mug"} for name in names]
+    planned = plan(Recipe(models=models, viewpoints=viewpoints, **changes))
+    boxes = lambda spec, step=None: box_vertices((-0.05, -0.05, 0), (0.05, 0.05, 0.1))  # noqa: E731
+    shots = {row.subject.removesuffix("_000"): planned.shot(row, boxes) for row in planned.rows}
+    return {key: [now.viewpoint for now in shot.instants] for key, shot in shots.items()}
+
+
+@pytest.mark.parametrize("kind", RANDOM)
+def test_random_viewpoints_are_drawn_for_each_model(kind):
+    names = [f"mug_{i}" for i in range(20)]
+    own, shared = (views_of(names, RANDOM[kind] | more) for more in ({}, {"shared": True}))
+    assert len({view.azimuth_deg for views in own.values() for view in views}) == 40
+    assert len({view.azimuth_deg for views in shared.values() for view in views}) == 2
+    assert [view.index for view in own["mug_7"]] == [0, 1]
+
+
+def test_a_model_more_and_another_order_change_no_model_s_viewpoints():
+    few, more = views_of(["a", "b"], RANDOM["sphere"]), views_of(["c", "b", "a"], RANDOM["sphere"])
+    assert all(more[name] == few[name] for name in few)
+    other = views_of(["a", "b"], RANDOM["sphere"], seed=1)
+    assert all(other[name] != few[name] for name in few)
+
+
+def test_viewpoints_of_a_grid_are_those_of_all_models():
+    views = views_of(["a", "b"], {"azimuth": [0, 90], "distance": 2})
+    assert views["a"] == views["b"]
+
+
+def test_shared_viewpoints_and_own_ones_are_different_poses_of_a_data_set():
+    own, shared = (make(**RANDOM["sphere"], **more) for more in ({}, {"shared": True}))
+    assert not set(pose_names(own).tolist()) & set(pose_names(shared).tolist())
+
+
+def test_sequences_of_each_model_have_viewpoints_of_their_own():
+    still = {**RANDOM["normal"], "count": 1}
+    for more, count in (({}, 3), ({"shared": True}, 1)):
+        views = views_of(["a", "b", "c"], still | more, time={"frames": 2, "fps": 10})
+        assert len({view.azimuth_deg for of in views.values() for view in of}) == count

@@ -78,7 +78,7 @@ class Sights:
         placed = tuple(self._placement(by_id.get(i + 1), sample, shot) for i in range(geometry.object_count))
         visibility = rasterize(geometry, camera, keeps_exact=True)
         annotations = tuple(dict.fromkeys((*shot.annotations, *asked)))
-        views = self._compared(sample, shot, around, (*needs, *(labels()[name].needs for name in shot.annotations)))
+        views = self._compared(key, sample, shot, around, (*needs, *(labels()[name].needs for name in shot.annotations)))
         return Sight(geometry, camera, visibility, placed, views, annotations, shot.labels)
 
     def _made(self, key: str) -> _Made | None:
@@ -134,7 +134,9 @@ class Sights:
             self._geometry = now, built
         return self._geometry[1]
 
-    def _compared(self, sample: Sample, shot: Shot, around: SceneryRecord, needs: Sequence[Needs]) -> SampleViews | None:
+    def _compared(
+        self, key: str, sample: Sample, shot: Shot, around: SceneryRecord, needs: Sequence[Needs]
+    ) -> SampleViews | None:
         """What labels of motion and stereo compare a sample with; None without one, and where scenery is not what it was.
 
         Points are picked here, before any label asks for triangles, which would be written over.
@@ -142,7 +144,7 @@ class Sights:
         if not any(need.is_some for need in needs):
             return None
         keys = {o.id: o.track or o.key for o in sample.objects}
-        known = shot.key, len(shot.instants)  # with neighbours or without
+        known = key, len(shot.instants)  # with neighbours or without; shots of merged data sets may share the key they had
         if self._views[0] != known:
             self._keys = keys  # before the views are made, which ask for meshes
             self._views = known, self._shot_views(shot, around)
