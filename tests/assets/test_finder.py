@@ -78,6 +78,7 @@ def test_a_known_folder_that_is_a_link_leads_nowhere(find, write, tmp_path):
     [
         (["wood_01.png", "stone.png"], "wood_1.png", "wood_01.png"),
         (["wood.jpg", "wool.png", "wood.mtl"], "wood.png", "wood.jpg"),
+        (["capsule.png"], "surface.png", None),
         (["maps/deep.png"], "old/Deep.tga", "maps/deep.png"),
         (["../images/texture0.png"], "../images/texture_0.png", "../images/texture0.png"),
         (["../private/wood.png"], "wood.png", None),

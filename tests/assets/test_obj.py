@@ -96,7 +96,7 @@ def test_gentle_edges_are_smooth_without_normals(write):
 
 
 def test_numbers_may_have_comments_signs_and_exponents(write):
-    mesh, _ = load_model(write("a.obj", "v 1. .5 3.1e+0 # first\nv +1e2 0 0 #\nv -0 1E1 \\\n7\nf 1 2 3 # 4\n"))
+    mesh, _ = load_model(write("a.obj", "v 1. .5 3.1e+0 # first\nv +1e2 0 0#x y\nv -0 1E1 \\\n7\nf 1 2 3 # 4\n"))
     np.testing.assert_array_equal(mesh.vertices[mesh.triangles[0]], np.float32([[1, 0.5, 3.1], [100, 0, 0], [0, 10, 7]]))
 
 

@@ -152,12 +152,11 @@ class Finder:
         """The file below these folders whose name resembles this one most, from the model's folder."""
         wanted = PurePosixPath(last.lower())
         kinds = PICTURES if wanted.suffix in PICTURES else {wanted.suffix}
-        files = {file: file.name.lower() for file in islice(self._files(folders), NEAREST_AMONG)}
-        files = {file: name for file, name in files.items() if PurePosixPath(name).suffix in kinds}
-        same = [file for file, name in files.items() if PurePosixPath(name).stem == wanted.stem]
+        files = {file: PurePosixPath(file.name.lower()) for file in islice(self._files(folders), NEAREST_AMONG)}
+        stems = {file: name.stem for file, name in files.items() if name.suffix in kinds}
         # 0.6, difflib's own threshold, is where names of one series (wood_1, wood_2) still count and others do not.
-        close = difflib.get_close_matches(wanted.name, list(files.values()), 1, 0.6)
-        best = [*same, *(file for file, name in files.items() if [name] == close)]
+        close = difflib.get_close_matches(wanted.stem, list(stems.values()), 1, 0.6)
+        best = [file for file, stem in stems.items() if [stem] == close]
         return os.path.relpath(best[0], _real(self.model.parent)).replace(os.sep, "/") if best else None
 
     def _files(self, folders: Iterable[Path]) -> Iterator[Path]:

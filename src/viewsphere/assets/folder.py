@@ -96,12 +96,10 @@ class ModelFolder:
         """The things that are not read, with their numbers; empty without any."""
         return ", ".join(f"{count:,} {_counted(count, what)}" for what, count in self.left_out.items())
 
-    def nothing_left(self, *also: str) -> ModelError:
-        """A ModelError for a model without triangles that names what it holds instead: `also`, and what is not read."""
-        held = ", ".join([*also, *([self.left] if self.left else [])])
-        if not held:
-            return self.error("no triangles found: the file holds no faces at all; export the model as a mesh of faces")
-        return self.error(f"no triangles found: the file holds {held}, but no faces; export the model as a mesh of faces")
+    def nothing_left(self) -> ModelError:
+        """A ModelError for a model without triangles that names what it holds instead."""
+        held = f"the file holds {self.left}, but no faces" if self.left else "the file holds no faces at all"
+        return self.error(f"no triangles found: {held}; export the model as a mesh of faces")
 
     def error(self, message: str, line: int | None = None) -> ModelError:
         """A ModelError with this message, which begins with the model's path, and with the line where it is about one."""
@@ -293,7 +291,7 @@ def reduced(pixels: NDArray[np.uint8], sharpest: int) -> NDArray[np.uint8]:
 def _counted(count: int, what: str) -> str:
     """A noun's plural, whose first word ends in s, for any count but 1: `faces of fewer than three corners`."""
     noun, of, rest = what.partition(" of ")
-    return what if count == 1 else f"{noun}s{of}{rest}"
+    return what if count == 1 else f"{'vertice' if noun == 'vertex' else noun}s{of}{rest}"
 
 
 def _data_uri(uri: str) -> bytes:

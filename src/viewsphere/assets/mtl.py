@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.obj_text import Library
-from viewsphere.assets.text import statements, uncommented
+from viewsphere.assets.text import number_of, numeric_words, statements, uncommented
 
 SCALAR_OPTIONS = ("-blendu", "-blendv", "-bm", "-boost", "-cc", "-clamp", "-imfchan", "-texres", "-type")
 OPTION_ARGUMENTS = {"-mm": 2, **dict.fromkeys(SCALAR_OPTIONS, 1)}
@@ -153,7 +153,7 @@ class _Builder:
 
     def words(self, key: str) -> list[str]:
         """Words of a statement before a comment."""
-        return uncommented(self.block.get(key, "")).split()
+        return numeric_words(self.block.get(key, ""))
 
     def number(self, key: str, default: float) -> float:
         """A statement's number; the default, with a warning, where it has none."""
@@ -170,7 +170,7 @@ class _Builder:
 
     def numbers(self, key: str, words: list[str], default: float) -> list[float]:
         """The words as numbers; one default for no words, and for words that are no numbers, with a warning."""
-        values = [float(word) for word in words if _is_number(word)]
+        values = [value for word in words if (value := number_of(word)) is not None]
         if len(values) < len(words):
             self.folder.warn(f"material {self.name!r}: {key} {' '.join(words)[:40]!r} is no number, not read")
         return values if values and len(values) == len(words) and np.isfinite(values).all() else [default]
@@ -306,7 +306,7 @@ def _options(words: list[str]) -> tuple[list[str], dict[str, list[str]]]:
         option = words.pop(0)
         limit = OPTION_ARGUMENTS.get(option, 3 if option else 0)
         taken: list[str] = []
-        while len(words) > 1 and len(taken) < limit and (option not in VECTOR_OPTIONS or _is_number(words[0])):
+        while len(words) > 1 and len(taken) < limit and (option not in VECTOR_OPTIONS or number_of(words[0]) is not None):
             taken.append(words.pop(0))
         options[option] = taken
     return words, options
@@ -322,17 +322,9 @@ def _without_options(text: str) -> tuple[str, dict[str, list[str]]]:
     return " ".join(words[: places[0]]).strip(), options
 
 
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
 def _pair(words: Sequence[str], default: float) -> tuple[float, float]:
-    values = [float(word) if _is_number(word) else default for word in words]
-    padded = [*values, default, default]
+    values = [number_of(word) for word in words]
+    padded = [*(default if value is None else value for value in values), default, default]
     return padded[0], padded[1]
 
 

@@ -20,11 +20,8 @@ from viewsphere.assets.polygon_proof import cut_polygons
 from viewsphere.assets.primitive import FileFacts, Float, Int, Primitive, assemble, compact
 from viewsphere.assets.smoothing import creased
 from viewsphere.assets.srgb import linear
-from viewsphere.assets.text import statements, uncommented
+from viewsphere.assets.text import number_of, numeric_words, statements, uncommented
 from viewsphere.errors import ModelError
-
-NO_NUMBER = re.compile(r"[+-]?1\.#\w+|-?nan\(\w+\)")
-"""NaN and infinity as Microsoft's C library writes them."""
 
 LEFT_OUT = {"l": "line", "p": "point", "curv": "curve", "curv2": "curve", "surf": "surface"}
 """Elements that are not read, by keyword."""
@@ -207,7 +204,8 @@ def _without_faces(folder: ModelFolder, source: _Source) -> ModelError:
     """Why a file without faces is no model."""
     if not source.v:
         return folder.error("no triangles found: no line begins with 'v', so this is no OBJ file; name a model file")
-    return folder.nothing_left(f"{len(source.v)} vertices")
+    folder.leave_out(len(source.v), "vertex")
+    return folder.nothing_left()
 
 
 def _vertices(folder: ModelFolder, source: _Source) -> tuple[Float, Float | None]:
@@ -228,7 +226,6 @@ def _rows(folder: ModelFolder, source: _Source, keyword: str, least: int, width:
     lines: list[str] = getattr(source, keyword)
     rows = [line.split()[:width] for line in lines]
     most = max(map(len, rows), default=0)
-    # Python's own underscores (1_000) are no numbers of a file.
     if all(len(row) == most for row in rows) and most >= least and not any("_" in line for line in lines):
         try:
             return np.fromiter((float(token) for row in rows for token in row), np.float64).reshape(-1, max(most, 1))
@@ -236,8 +233,8 @@ def _rows(folder: ModelFolder, source: _Source, keyword: str, least: int, width:
             pass  # a comment behind numbers, or a word that is no number
     values = np.full((len(rows), width), np.nan)
     for row, line in enumerate(lines):
-        tokens = uncommented(line).split()[:width]
-        numbers = [_number(token) for token in tokens]
+        tokens = numeric_words(line)[:width]
+        numbers = [number_of(token) for token in tokens]
         if None in numbers or len(numbers) < least:
             wrong = tokens[numbers.index(None)] if None in numbers else line
             raise folder.error(_no_number(wrong, keyword, least), source.where(keyword, row))
@@ -256,16 +253,6 @@ def _padded(values: Float, width: int, empty: float) -> Float:
     """The first `width` columns; missing columns are filled with `empty`."""
     missing = max(width - values.shape[1], 0)
     return np.pad(values[:, :width], ((0, 0), (0, missing)), constant_values=empty)
-
-
-def _number(token: str) -> float | None:
-    """The number that is the whole token, None for any other word."""
-    if NO_NUMBER.fullmatch(token):
-        return float("nan")
-    try:
-        return None if "_" in token else float(token)
-    except ValueError:
-        return None
 
 
 def _materials(

@@ -13,6 +13,9 @@ _MARKS = (
 )
 SAMPLE_BYTES = 1 << 16
 COMMENT = re.compile(r"(?:^|(?<=\s))#")
+COMMENT_BEHIND_NUMBERS = re.compile(r"(?<!1\.)#")
+NO_NUMBER = re.compile(r"[+-]?1\.#\w+|-?nan\(\w+\)")
+"""NaN and infinity as Microsoft's C library writes them."""
 
 EASTERN = ("gb18030", "shift_jis", "euc_kr", "big5", "cp1251", "cp1252")
 """Encodings that are tried after the guess: those of systems that write model files in no Unicode."""
@@ -72,3 +75,18 @@ def _joined(lines: list[str]) -> list[str]:
 def uncommented(text: str) -> str:
     """The text before a comment: a `#` that begins a word, because names and Microsoft's NaN (`1.#QNAN`) hold one."""
     return COMMENT.split(text, maxsplit=1)[0].rstrip()
+
+
+def numeric_words(text: str) -> list[str]:
+    """The words of a statement of numbers, before a comment, which may follow without a blank."""
+    return COMMENT_BEHIND_NUMBERS.split(text, maxsplit=1)[0].split()
+
+
+def number_of(word: str) -> float | None:
+    """The number that is the whole word, None for any other word; Python's own underscores (1_000) are none."""
+    if NO_NUMBER.fullmatch(word):
+        return float("nan")
+    try:
+        return None if "_" in word else float(word)
+    except ValueError:
+        return None
