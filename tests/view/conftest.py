@@ -45,7 +45,10 @@ def open_view(browser, settle):
             page = context.new_page()
             page.on("console", lambda m: troubles.append(m.text) if m.type == "error" else None)
             page.on("pageerror", lambda e: troubles.append(str(e)))
-            page.on("request", lambda r: None if r.url.startswith((url, "data:", "blob:")) else troubles.append(r.url))
+            page.on(
+                "request",
+                lambda r: None if r.url.startswith((url.partition("?")[0], "data:", "blob:")) else troubles.append(r.url),
+            )
             page.set_default_timeout(1000 * DEADLINE)
             page.goto(url)
             page.wait_for_selector("html[data-ready=true]")

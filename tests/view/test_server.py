@@ -1,16 +1,20 @@
 """What the server answers to strangers, byte by byte: nothing that lies beside the data set, nothing without its name."""
 
+import errno
 import json
 import re
 import shutil
 import socket
+import time
 from contextlib import suppress
+from socketserver import TCPServer
 
 import pytest
 
 from deadline import DEADLINE, until
 from viewsphere.errors import UserError
 from viewsphere.view import Address, Live, Server
+from viewsphere.view import server as server_module
 
 TOKEN = "a-token_of-32-letters-and-digits"
 SECRET = "the-secret-of-another-folder"
@@ -28,8 +32,10 @@ def tell(server, request, host="127.0.0.1"):
     return found
 
 
-def get(server, target, *, host=None, method="GET", **headers):
+def get(server, target, *, host=None, method="GET", with_token=True, **headers):
     """Status, headers in lower case, and body of an answer."""
+    if with_token:
+        headers = {"Authorization": f"Bearer {server.token}", **headers}
     lines = [f"{method} {target} HTTP/1.1", f"Host: {host or f'127.0.0.1:{server.port}'}"]
     lines += [f"{name.replace('_', '-')}: {value}" for name, value in headers.items()]
     return parted(tell(server, "\r\n".join([*lines, "Connection: close", "", ""])))
@@ -230,7 +236,7 @@ def test_this_host_is_answered(server, host):
 
 
 def test_requests_that_are_none(server):
-    host = f"Host: 127.0.0.1:{server.port}"
+    host = f"Host: 127.0.0.1:{server.port}\r\nAuthorization: Bearer {server.token}"
     for request in (
         "GET /state HTTP/1.1\r\n\r\n",
         f"GET /state HTTP/1.1\r\n{host}\r\n{host}\r\n\r\n",
@@ -293,7 +299,7 @@ def guarded(serve, small_run):
 )
 def test_without_the_token_nothing_is_told(guarded, target, headers):
     told = {name: value.format(port=guarded.port) for name, value in headers.items()}
-    status, _, body = get(guarded, target, **told)
+    status, _, body = get(guarded, target, with_token=False, **told)
     assert status == 403
     assert body == b"expected the address that viewsphere view printed, with its token\n"
 
@@ -302,21 +308,27 @@ def test_the_token_becomes_a_cookie(guarded):
     status, headers, body = get(guarded, f"/?token={TOKEN}")
     assert (status, headers["location"], body) == (303, "/", b"")
     assert headers["set-cookie"] == f"viewsphere-{guarded.port}={TOKEN}; Path=/; HttpOnly; SameSite=Strict"
-    assert get(guarded, "/state", Cookie=f"viewsphere-{guarded.port}={TOKEN}")[0] == 200
+    assert get(guarded, "/state", Cookie=f"viewsphere-{guarded.port}={TOKEN}", with_token=False)[0] == 200
     assert get(guarded, "/state", Authorization=f"Bearer {TOKEN}")[0] == 200
     assert get(guarded, "/state", Authorization=f"Bearer {TOKEN}", host="evil.example")[0] == 421
 
 
 def test_beyond_this_machine_a_token_is_needed(serve, small_run):
-    with pytest.raises(UserError, match="expected a token where others reach the page"):
-        Server(Live(small_run), Address("0.0.0.0", 0))
     server = serve(small_run, host="0.0.0.0", token=TOKEN)
     own = f"{socket.gethostname()}:{server.port}"
     for host in (f"127.0.0.1:{server.port}", f"192.0.2.7:{server.port}", own):
-        assert get(server, "/state", host=host)[0] == 403
+        assert get(server, "/state", host=host, with_token=False)[0] == 403
         assert get(server, "/state", host=host, Authorization=f"Bearer {TOKEN}")[0] == 200
     assert get(server, "/state", host=f"evil.example:{server.port}", Authorization=f"Bearer {TOKEN}")[0] == 421
     assert server.url == f"http://{own}/?token={TOKEN}"
+
+
+def test_every_server_has_a_token(serve, small_run):
+    one, other = serve(small_run), serve(small_run)
+    assert one.token != other.token
+    assert one.url.endswith(f"?token={one.token}")
+    assert get(one, "/", with_token=False)[0] == 403
+    assert get(one, "/", Authorization=f"Bearer {other.token}")[0] == 403
 
 
 @pytest.mark.parametrize("token", ["short", "with spaces in it, and more", "x" * 300, "line\r\nSet-Cookie: a=b-------"])
@@ -349,3 +361,100 @@ def test_a_mistake_of_ours_is_one_line(server, capfd, monkeypatch):
     monkeypatch.setattr(server.answers, "of", broken)
     assert get(server, "/state")[0] == 500
     assert capfd.readouterr().err == "viewsphere: view: KeyError: 'mistake'\n"
+
+
+def dripping(server, count):
+    """So many connections that have begun a request, and that close when the test ends."""
+    lines = [socket.create_connection(("127.0.0.1", server.port), DEADLINE) for _ in range(count)]
+    for line in lines:
+        line.sendall(b"GET /state HTTP/1.1\r\nX-a: ")
+    return lines
+
+
+def drip(lines):
+    """Send a byte more on each connection; returns how many are open."""
+    return sum(drips(line) for line in lines)
+
+
+def drips(line):
+    try:
+        line.sendall(b"b")
+        line.setblocking(False)
+        return line.recv(1) != b""
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize(
+    ("count", "most"), [(60, 16), pytest.param(900, server_module.MOST_CONNECTIONS, marks=pytest.mark.slow)]
+)
+def test_dripping_clients_keep_nobody_waiting(serve, small_run, monkeypatch, count, most):
+    monkeypatch.setattr(server_module, "MOST_CONNECTIONS", most)
+    allow_files(2 * count + 200)
+    server = serve(small_run)
+    lines = dripping(server, count)
+    try:
+        longest = 0.0
+        for _ in range(10):
+            drip(lines)
+            begun = time.monotonic()
+            assert get(server, "/state")[0] == 200
+            longest = max(longest, time.monotonic() - begun)
+        assert longest < 2.0
+        assert until(lambda: drip(lines) <= most)
+    finally:
+        for line in lines:
+            line.close()
+
+
+def allow_files(count):
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard < count:
+        pytest.skip("the system allows too few open files")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, count), hard))
+
+
+def test_a_request_has_a_deadline(serve, small_run, monkeypatch):
+    monkeypatch.setattr(server_module, "QUIET", 0.3)
+    (line,) = dripping(serve(small_run), 1)
+    with line:
+        assert until(lambda: not drip([line]))
+
+
+def test_a_system_without_more_connections_does_not_make_it_spin(server, monkeypatch):
+    calls = []
+
+    def none_left(self):
+        calls.append(time.monotonic())
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    with monkeypatch.context() as patched, socket.create_connection(("127.0.0.1", server.port), DEADLINE):
+        patched.setattr(TCPServer, "get_request", none_left)
+        time.sleep(0.4)
+    assert len(calls) < 12
+    assert get(server, "/state")[0] == 200
+
+
+def test_long_heads_are_refused(server):
+    head = "".join(f"X-{i}: {'a' * 1000}\r\n" for i in range(60))
+    answer = tell(server, f"GET /state HTTP/1.1\r\nAuthorization: Bearer {server.token}\r\n{head}\r\n")
+    assert b"planned" not in answer
+
+
+def test_headers_are_parsed_only_behind_the_token(server, monkeypatch):
+    def parse(*_, **__):
+        raise AssertionError("headers were parsed")
+
+    monkeypatch.setattr("http.client.parse_headers", parse)
+    assert get(server, "/state", with_token=False)[0] == 403
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("within", ["1e308,", ",1e308", "-1e308,1e308", "1e308,-1e308", "inf,", "-10,20"])
+@pytest.mark.parametrize("measure", ["azimuth", "distance", "visibility", "camera_azimuth"])
+def test_large_bounds_warn_of_nothing(server, within, measure, capfd):
+    assert get(server, f"/rows?first=0&count=1&{measure}={within}")[0] == 200
+    assert capfd.readouterr().err == ""

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from viewsphere.check.differences import Difference, differences, in_words
 from viewsphere.check.failure import failure
 from viewsphere.errors import UserError
+from viewsphere.files import read_bytes, read_text
 from viewsphere.run.composing import Composer
 from viewsphere.run.replanning import AnotherPlan, Replanned
 from viewsphere.run.stages import Stages, StoredBoxes
@@ -73,7 +74,7 @@ class Recomputed:
 
     def of_plan(self) -> Iterator[str]:
         """Differences of plan.json from the plan that its recipes give together, and contradictions inside of it."""
-        yield from _inside(self._dataset.store.plan_file.read_text("utf-8"), self._record)
+        yield from _inside(read_text(self._dataset.store.plan_file, "MAX_RECORD_BYTES"), self._record)
         portions = [self._portion(number) for number in range(len(self._record.parts))]
         yield from (message for messages in self.refused.values() for message in messages)
         if all(portions):
@@ -167,4 +168,4 @@ def _inside(text: str, record: PlanRecord) -> Iterator[str]:
 
 def _read(file: Path) -> Any:
     """The value of a JSON file, None where there is no such file."""
-    return parsed(file.read_bytes()) if file.is_file() else None
+    return parsed(read_bytes(file, "MAX_RECORD_BYTES")) if file.is_file() else None

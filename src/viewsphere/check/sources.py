@@ -10,6 +10,7 @@ from viewsphere.aside import temporary
 from viewsphere.check.differences import differences, in_words
 from viewsphere.check.recomputed import Recomputed
 from viewsphere.errors import UserError
+from viewsphere.files import read_bytes
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.models import Export, Models
 from viewsphere.store import Dataset, ModelInfo
@@ -82,4 +83,4 @@ class Sources:
         """Whether a source still gives the GLB of the data set."""
         with temporary("check") as aside:
             export(aside)
-            return (aside / Path(info.glb).name).read_bytes() == self._dataset.path(info.glb).read_bytes()
+            return read_bytes(aside / Path(info.glb).name) == read_bytes(self._dataset.path(info.glb))

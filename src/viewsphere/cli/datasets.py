@@ -184,26 +184,20 @@ def report(
 def view(
     folder: DataFolder,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0: any that is free.")] = 8642,
-    host: Annotated[
-        str, typer.Option(help="Address to listen at; any but this machine's own needs the token that is printed.")
-    ] = "127.0.0.1",
+    host: Annotated[str, typer.Option(help="Address to listen at; only this machine reaches the default.")] = "127.0.0.1",
     token: Annotated[
         str | None,
-        typer.Option(help="Token that a browser has to bring; default: a new one with --host.", envvar="VIEWSPHERE_TOKEN"),
+        typer.Option(help="Token that a browser has to bring; default: a new one.", envvar="VIEWSPHERE_TOKEN"),
     ] = None,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
     """Show a data set of any size in a browser, also while it is rendered, until Ctrl-C."""
-    import secrets
     import webbrowser
 
     from viewsphere.view import Address, Live, Server
 
-    address = Address(host, port, token)
-    if token is None and not address.is_loopback:
-        address = Address(host, port, secrets.token_urlsafe(24))
     live = Live(folder, workers=cores())
-    with Server(live, address) as server:
+    with Server(live, Address(host, port, token)) as server:
         live.start()
         say(f"{server.url} shows {folder}; Ctrl-C ends it")
         if open_:

@@ -146,10 +146,10 @@ class Query:
 
 
 def _is_within(rows: NDArray[Any], one: Within) -> NDArray[np.bool_]:
-    values = rows[MEASURES[one.measure].column]
+    values = rows[MEASURES[one.measure].column].astype(np.float64)  # as wide as what is asked for
     if MEASURES[one.measure].column == "azimuth":
         low, high = (free if math.isinf(end) else end for end, free in ((one.low, 0.0), (one.high, 360.0)))
-        return (values - low) % 360 < high - low
+        return (values - math.fmod(low, 360.0)) % 360 < high - low
     return (values >= one.low) & (values <= one.high)
 
 

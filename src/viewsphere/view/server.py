@@ -1,4 +1,7 @@
-"""The server: one's own browser is answered, on this machine without a token, elsewhere with one. Others are not.
+"""The server: it answers browsers that bring its token.
+
+Slow clients keep nobody waiting: a request has a deadline, and the number of connections a limit. Beyond the limit a new
+connection takes the place of the one whose request is awaited for longest.
 
 A page of a stranger that is open in the same browser is kept out, too: its requests name another host (DNS rebinding) or say
 that they come from elsewhere (Sec-Fetch-Site), no header allows it to read an answer (CORS), and what it embeds of this server
@@ -9,15 +12,21 @@ from __future__ import annotations
 
 import errno
 import hmac
+import io
 import ipaddress
 import re
+import secrets
 import socket
 import sys
+import threading
+import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from http.server import BaseHTTPRequestHandler
+from itertools import islice
 from socketserver import TCPServer, ThreadingMixIn
 from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
@@ -32,10 +41,24 @@ PORT = 8642
 LOOPBACK = "127.0.0.1"
 
 QUIET = 30.0
-"""Seconds after which somebody who says nothing is hung up on."""
+"""Seconds from an answer (or the begin) until the next request is whole: browsers keep idle connections for as long."""
+
+MOST_CONNECTIONS = 256
+"""Connections at once, each a thread. A browser opens 6; half of a usual limit of 1,024 open files stays free for pictures."""
+
+MOST_HEAD = 32_768
+"""Bytes of a request's line and headers; those of a browser with a large cookie jar are half as many."""
+
+CROWDED = 0.05
+"""Seconds to wait where the system gives no more connections, so that the server does not spin."""
 
 TOKEN = re.compile(r"[A-Za-z0-9_-]{16,256}")
 """What a token may be: it stands in an address and in a cookie."""
+
+WORD = re.compile(rb"[A-Za-z0-9_-]{16,}")
+"""Parts of a request that may be a token."""
+
+WITHOUT_TOKEN = "expected the address that viewsphere view printed, with its token"
 
 TEXT = "text/plain; charset=utf-8"
 
@@ -60,7 +83,7 @@ OWN_SITES = ("same-origin", "none")
 
 @dataclass(frozen=True)
 class Address:
-    """Where to listen; `port` 0 is any that is free. The token is asked of everybody, if there is one."""
+    """Where to listen; `port` 0 is any that is free. Without a token the server makes one."""
 
     host: str = LOOPBACK
     port: int = PORT
@@ -88,9 +111,8 @@ class Server(ThreadingMixIn, TCPServer):
     def __init__(self, live: Live, address: Address) -> None:
         if address.token is not None and not TOKEN.fullmatch(address.token):
             raise UserError("--token: expected 16 to 256 letters, digits, - and _, found others: leave it out, and one is made")
-        if not (address.is_loopback or address.token):
-            raise UserError(f"--host {address.host}: expected a token where others reach the page, found none")
-        self.answers, self.address = Answers(live), address
+        self.token = address.token or secrets.token_urlsafe(24)
+        self.answers, self.address, self.lines = Answers(live), address, Lines()
         try:
             info = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
             self.address_family = info[0]
@@ -110,8 +132,7 @@ class Server(ThreadingMixIn, TCPServer):
         """What to open in a browser, with the token."""
         host = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(self.address.host, self.address.host)
         host = f"[{host}]" if ":" in host else host
-        token = f"?{urlencode({'token': self.address.token})}" if self.address.token else ""
-        return f"http://{host}:{self.port}/{token}"
+        return f"http://{host}:{self.port}/?{urlencode({'token': self.token})}"
 
     @property
     def cookie(self) -> str:
@@ -128,6 +149,30 @@ class Server(ThreadingMixIn, TCPServer):
         # An address is no name that a stranger could own; whoever comes by one has a token besides.
         return _address(name) is not None or name in {"localhost", self.address.host.lower(), socket.gethostname().lower()}
 
+    def get_request(self) -> tuple[socket.socket, Any]:
+        """The next connection; where the system gives no more, the longest silent one ends, and OSError is raised."""
+        try:
+            return super().get_request()
+        except OSError as error:
+            if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM):
+                self.lines.end_oldest()
+                time.sleep(CROWDED)
+            raise
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer a connection in a thread of its own."""
+        self.lines.add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection."""
+        self.lines.remove(request)
+        super().shutdown_request(request)
+
+    def service_actions(self) -> None:
+        """End connections whose request is not whole by its deadline."""
+        self.lines.end_late()
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Somebody hung up, or a mistake of ours: in a line, for the page's other requests go on."""
         error = sys.exc_info()[1]
@@ -137,6 +182,60 @@ class Server(ThreadingMixIn, TCPServer):
     def complain(self, error: BaseException | None) -> None:
         """Tell the one who runs the server of a mistake of ours."""
         print(printable(f"viewsphere: view: {type(error).__name__}: {error}"), file=sys.stderr)  # noqa: T201
+
+
+class Lines:
+    """The open connections, each with the time since when the server has been waiting for its request."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[socket.socket, float] = {}
+        self._answered: dict[socket.socket, None] = {}
+        self._lock = threading.Lock()
+
+    def add(self, line: socket.socket) -> None:
+        """Count a new connection; where there are too many the longest silent one ends."""
+        with self._lock:
+            is_crowded = len(self._waiting) + len(self._answered) >= MOST_CONNECTIONS
+        if is_crowded:
+            self.end_oldest()
+        self.wait(line)
+
+    def wait(self, line: socket.socket) -> None:
+        """From now on the server waits for a request of a connection."""
+        with self._lock:
+            self._answered.pop(line, None)
+            self._waiting[line] = time.monotonic()
+
+    def hear(self, line: socket.socket) -> None:
+        """A connection's request is whole."""
+        with self._lock:
+            self._waiting.pop(line, None)
+            self._answered[line] = None
+
+    def remove(self, line: socket.socket) -> None:
+        """A connection is closed."""
+        with self._lock:
+            self._waiting.pop(line, None)
+            self._answered.pop(line, None)
+
+    def end_oldest(self) -> None:
+        """End the connection whose request is awaited for longest, else the one that takes longest to read its answer."""
+        with self._lock:
+            for line in (*islice(self._waiting, 1), *islice(self._answered, 1))[:1]:
+                self._end(line)
+
+    def end_late(self) -> None:
+        """End the connections whose request is awaited for longer than `QUIET`."""
+        with self._lock:
+            past = time.monotonic() - QUIET
+            for line in [line for line, since in self._waiting.items() if since < past]:
+                self._end(line)
+
+    def _end(self, line: socket.socket) -> None:
+        self._waiting.pop(line, None)
+        self._answered.pop(line, None)
+        with suppress(OSError):  # it may have ended by now
+            line.shutdown(socket.SHUT_RDWR)  # its thread reads the end, and closes it
 
 
 def _parted(host: str) -> tuple[str, int | None]:
@@ -175,6 +274,7 @@ class _Handler(BaseHTTPRequestHandler):
     server_version = "viewsphere"
     sys_version = ""
     timeout = QUIET
+    raw_requestline: bytes
 
     def do_GET(self) -> None:
         self._answer()
@@ -190,6 +290,45 @@ class _Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         self._send(HTTPStatus(code), Answer(f"{message or HTTPStatus(code).phrase}\n".encode("utf-8", "replace"), TEXT))
 
+    def handle_one_request(self) -> None:
+        """Wait for a request, and answer it."""
+        self.server.lines.wait(self.connection)
+        super().handle_one_request()
+
+    def parse_request(self) -> bool:
+        """Whether there is a request to be answered. Headers are parsed only of requests that hold the token."""
+        self.request_version, self.requestline = self.protocol_version, ""
+        self.command = "HEAD" if self.raw_requestline.startswith(b"HEAD ") else "GET"
+        head = self._head()
+        if head is None:
+            self.send_error(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE)
+            return False
+        self.server.lines.hear(self.connection)
+        if not self._holds_token(self.raw_requestline + head):
+            self.send_error(HTTPStatus.FORBIDDEN, WITHOUT_TOKEN)
+            return False
+        stream, self.rfile = self.rfile, io.BufferedReader(io.BytesIO(head))  # pyright: ignore[reportArgumentType]
+        try:
+            return super().parse_request()
+        finally:
+            self.rfile = stream
+
+    def _head(self) -> bytes | None:
+        """The lines of the headers up to the empty one; None where they are too long."""
+        head, line = b"", self.raw_requestline
+        while line not in (b"\r\n", b"\n", b""):
+            left = MOST_HEAD - len(self.raw_requestline) - len(head)
+            if left <= 0:
+                return None
+            line = self.rfile.readline(left)
+            head += line
+        return head
+
+    def _holds_token(self, head: bytes) -> bool:
+        """Whether a word of the head is the token, compared in constant time; `_has_token` looks where it stands."""
+        token = self.server.token.encode()
+        return any([hmac.compare_digest(word, token) for word in WORD.findall(head)])
+
     def _answer(self) -> None:
         if refusal := self._refusal():
             self.send_error(*refusal)
@@ -200,8 +339,8 @@ class _Handler(BaseHTTPRequestHandler):
         except ValueError:
             self.send_error(HTTPStatus.BAD_REQUEST)
             return
-        if self.server.address.token is not None and not self._has_token(asked):
-            self.send_error(HTTPStatus.FORBIDDEN, "expected the address that viewsphere view printed, with its token")
+        if not self._has_token(asked):
+            self.send_error(HTTPStatus.FORBIDDEN, WITHOUT_TOKEN)
             return
         if asked.pop("token", None) is not None:
             self._to_page()
@@ -242,14 +381,13 @@ class _Handler(BaseHTTPRequestHandler):
             cookie = None
         bearer = self.headers.get("Authorization", "").removeprefix("Bearer ")
         given = (asked.get("token", ""), cookie.value if cookie else "", bearer)
-        token = (self.server.address.token or "").encode()
+        token = self.server.token.encode()
         return any([hmac.compare_digest(one.encode("utf-8", "replace"), token) for one in given])
 
     def _to_page(self) -> None:
         """Keep the token in a cookie, so that it stands in no address that is shown, kept or sent on."""
-        cookie = f"{self.server.cookie}={self.server.address.token}; Path=/; HttpOnly; SameSite=Strict"
-        extra = {"Location": "/", **({"Set-Cookie": cookie} if self.server.address.token else {})}
-        self._send(HTTPStatus.SEE_OTHER, Answer(b"", TEXT), extra)
+        cookie = f"{self.server.cookie}={self.server.token}; Path=/; HttpOnly; SameSite=Strict"
+        self._send(HTTPStatus.SEE_OTHER, Answer(b"", TEXT), {"Location": "/", "Set-Cookie": cookie})
 
     def _send(self, status: HTTPStatus, answer: Answer, extra: Mapping[str, str] | None = None) -> None:
         self.send_response(status)
