@@ -192,6 +192,24 @@ def test_a_body_may_begin_with_any_byte(write, newline):
     assert triangle_areas(mesh).sum() == pytest.approx(4)
 
 
+def test_lines_that_hold_more_than_the_header_promises(write):
+    """As MeshLab once wrote them: colours of corners as a list for the promised colour of the face."""
+    faces = ("face", [*FACES, "uchar red", "uchar green", "uchar blue"], [([0, 1, 2], 9, 1, 1), ([0, 2, 3], 9, 1, 1)])
+    data = ply([("vertex", XYZ, SQUARE), faces]).replace(b" 9 1 1", b" 9 1 1 1 1 1 1 1 1 1")
+    mesh, _ = load_model(write("a.ply", data))
+    assert triangle_areas(mesh).sum() == pytest.approx(4)
+    assert mesh.colors is None
+    assert "holds 14 numbers for 7 in the header; the last columns of element 'face'" in mesh.warnings[0]
+
+
+def test_remarks_between_rows_and_in_the_header(write):
+    data = ply([("vertex", XYZ, SQUARE), QUAD], comments=["by hand"])
+    data = data.replace(b"comment by", b"Made by").replace(b"1 0 1", b"comment, and another 3 1\n\n1 0 1", 1)
+    mesh, _ = load_model(write("a.ply", data))
+    assert triangle_areas(mesh).sum() == pytest.approx(4)
+    assert "line 3 of its PLY header is ignored: 'Made by hand'" in mesh.warnings[0]
+
+
 KINDS = {"char": (-128, 127), "uchar": (0, 255), "short": (-(2**15), 2**15 - 1), "ushort": (0, 2**16 - 1)}
 KINDS |= {"int": (-(2**31), 2**31 - 1), "uint": (0, 2**32 - 1)}
 NUMBERS = {kind: st.integers(*ends) for kind, ends in KINDS.items()}
@@ -236,7 +254,8 @@ def test_whatever_is_written_is_read_back(tmp_path_factory, made, encoding):
         (ply([("vertex", XYZ, SQUARE), ("face", FACES, [([0, 1, 4],)])]), "names vertex 4, expected 0 to 3"),
         (ply([("vertex", XYZ, SQUARE), ("face", FACES, [([0, 1, -2],)])]), "names vertex -2, expected 0 to 3"),
         (ply([("vertex", XYZ, SQUARE), QUAD]).replace(b"-1 0 -1", b"-1 0 -1,5"), "line 10: .*'-1,5': decimals need a point"),
-        (ply([("vertex", XYZ, SQUARE), QUAD]).replace(b"-1 0 -1", b"-1 0 -1 7"), "numbers more than its header promises"),
+        (ply([("vertex", XYZ, SQUARE), QUAD]) + b"7", "holds 6 lines of numbers, its header promises 5"),
+        (ply([("vertex", XYZ, []), ("face", FACES, [])]), "holds no vertices"),
         (ply([("vertex", XYZ, SQUARE), QUAD])[:-4], "promises 1 rows of element 'face'"),
         (ply([("vertex", XYZ, SQUARE), QUAD], "binary_big_endian")[:-4], "promises 1 rows of element 'face'"),
         (ply([("vertex", XYZ, SQUARE), QUAD]).replace(b"vertex 4", b"vertex 4000"), "promises 4,000 rows of element 'vertex'"),

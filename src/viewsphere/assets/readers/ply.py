@@ -66,6 +66,8 @@ class _Ply:
         """The faces and strips of the file, and the materials that they name."""
         vertex, face = (self.file.columns.get(name, {}) for name in ("vertex", "face"))
         positions = self._rows(vertex, ("x", "y", "z"))
+        if positions is None and "vertex" in self.file.elements and not self.file.elements["vertex"].rows:
+            raise self.folder.error("holds no vertices; export the model again")
         if positions is None:
             raise self.folder.error("has no element vertex with x, y and z; export the model as a mesh")
         self.folder.check("MAX_VERTICES", len(positions), "vertices")

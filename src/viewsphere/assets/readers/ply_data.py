@@ -25,6 +25,9 @@ ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 STRUCT_CODES = {
     "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f4": "f", "f8": "d",
 }  # fmt: skip
+COMMENT = re.compile(rb"(?m)^[ \t]*(?:comment|obj_info)\b[^\r\n]*")
+"""Some programs write comments between rows, too."""
+
 MAX_HEADER = 1 << 20
 """Bytes in which a header ends: the longest known have a few thousand."""
 
@@ -71,18 +74,72 @@ def read_elements(folder: ModelFolder, data: bytes) -> PlyFile:
     """All elements of a PLY file; of two with one name the first. Raises ModelError for files that are none, or damaged."""
     head, body = _split(folder, data)
     order, elements, comments = _header(folder, head)
-    if not order:
-        data, body, order = numbers_in(folder, data[body:], data.count(b"\n", 0, body)).tobytes(), 0, "<"
-        stored = [replace(e, properties=tuple(_as_double(p) for p in e.properties)) for e in elements]
-    else:
-        stored = elements
+    if order:
+        columns, _ = _columns(folder, data, elements, order, body)
+        return PlyFile(_by_name(elements), columns, comments)
+    text, before = COMMENT.sub(b"", data[body:]), data.count(b"\n", 0, body)
+    columns, rest = _text_columns(folder, text, elements, before)
+    if rest:
+        text, elements = _fitting(folder, text, elements, before)
+        columns, _ = _text_columns(folder, text, elements, before)
+    return PlyFile(_by_name(elements), columns, comments)
+
+
+def _by_name(elements: Sequence[Element]) -> dict[str, Element]:
+    return {element.name: element for element in reversed(elements)}
+
+
+def _columns(
+    folder: ModelFolder, data: bytes, elements: Sequence[Element], order: str, at: int
+) -> tuple[dict[str, Columns], int]:
+    """Columns of all elements, and how many bytes are left."""
     columns: dict[str, Columns] = {}
-    for element in stored:
-        table, body = _Table(folder, data, element, order).read(body)
-        columns.setdefault(element.name, table)
-    if data and stored is not elements and body < len(data):
-        raise folder.error(f"holds {(len(data) - body) // 8:,} numbers more than its header promises; export the model again")
-    return PlyFile({e.name: e for e in reversed(elements)}, columns, comments)
+    for element in elements:
+        found, at = _Table(folder, data, element, order).read(at)
+        columns.setdefault(element.name, found)
+    return columns, len(data) - at
+
+
+def _text_columns(folder: ModelFolder, text: bytes, elements: Sequence[Element], before: int) -> tuple[dict[str, Columns], int]:
+    """As `_columns`, of a text, whose numbers are laid out as a binary file of doubles."""
+    doubles = [replace(e, properties=tuple(_as_double(p) for p in e.properties)) for e in elements]
+    return _columns(folder, numbers_in(folder, text, before).tobytes(), doubles, "<", 0)
+
+
+def _fitting(folder: ModelFolder, text: bytes, elements: Sequence[Element], before: int) -> tuple[bytes, list[Element]]:
+    """A text and its elements without the last numbers of lines that hold more than the header promises.
+
+    MeshLab once wrote such lines. Columns behind the last list of such an element may be any others, and are left out, too.
+    """
+    lines = [(number, words) for number, line in enumerate(text.splitlines(), before + 1) if (words := line.split())]
+    if len(lines) != (promised := sum(element.rows for element in elements)):
+        raise folder.error(f"holds {len(lines):,} lines of numbers, its header promises {promised:,}; export the model again")
+    kept: list[Element] = []
+    rows: list[bytes] = []
+    for element in elements:
+        part = lines[len(rows) : len(rows) + element.rows]
+        kept.append(_trusted(folder, element, part))
+        rows += [b" ".join(words[: _width(kept[-1], words)]) for _, words in part]
+    return b"\n".join(rows), kept
+
+
+def _trusted(folder: ModelFolder, element: Element, lines: Sequence[tuple[int, list[bytes]]]) -> Element:
+    """The element with the columns that its lines hold for sure."""
+    wrong = next(((number, words) for number, words in lines if _width(element, words) != len(words)), None)
+    if wrong is None:
+        return element
+    found = f"line {wrong[0]:,} holds {len(wrong[1])} numbers for {_width(element, wrong[1])} in the header"
+    folder.warn(f"{found}; the last columns of element {element.name!r} are not read")
+    last = max((i for i, column in enumerate(element.properties) if column.count), default=len(element.properties))
+    return replace(element, properties=element.properties[: last + 1])
+
+
+def _width(element: Element, words: Sequence[bytes]) -> int:
+    """How many numbers a row has whose lists are as long as these words say."""
+    at = 0
+    for column in element.properties:
+        at += 1 + (int(float(words[at])) if column.count and at < len(words) else 0)
+    return at
 
 
 def _as_double(column: Property) -> Property:
@@ -116,8 +173,10 @@ def _header(folder: ModelFolder, text: str) -> tuple[str, list[Element], tuple[s
                 elements.append(Element(words[1], int(words[2]), ()))
             elif words[0] == "property":
                 elements[-1] = replace(elements[-1], properties=(*elements[-1].properties, _property(words)))
-            else:
+            elif elements:
                 raise ValueError
+            else:  # before any element it can only be a remark
+                folder.warn(f"line {number} of its PLY header is ignored: {line.strip()[:80]!r}")
         except (KeyError, IndexError, ValueError):
             raise folder.error(f"line {number} of its PLY header cannot be read: {line.strip()[:80]!r}") from None
     if order is None or any(element.rows < 0 for element in elements):
