@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from fake_blender import ABORTING, LACKING, fake_blender, interpreter, with_modu
 from viewsphere.blender import environment
 from viewsphere.blender.interpreter import VARIABLE, Device, Library, find_blender, missing_libraries, probe
 from viewsphere.errors import MissingExtraError, UserError
+from viewsphere.zoo.people import makehuman
 
 LDD = """\
 \tlinux-vdso.so.1 (0x00007eff2b926000)
@@ -168,3 +170,14 @@ def test_another_python_looks_for_a_311(tmp_path, monkeypatch):
     interpreter(tmp_path, "echo 3.12").rename(tmp_path / "python3")
     right = interpreter(tmp_path, "echo 3.11").rename(tmp_path / "python3.11")
     assert environment._python311() == str(right)
+
+
+@pytest.mark.parametrize("file", [environment.REQUIREMENTS, makehuman.REQUIREMENTS], ids=["blender", "people"])
+def test_what_doctor_installs_is_pinned_by_digests(file):
+    entries = re.sub(r"#.*\n|\\\n", "", file.read_text("utf-8")).strip().splitlines()
+    assert len(entries) == (9 if file == environment.REQUIREMENTS else 1)
+    for entry in entries:
+        assert re.fullmatch(r"[\w-]+==[\w.]+\s+(--hash=sha256:[0-9a-f]{64}\s*)+", entry), entry[:60]
+    assert "--require-hashes" in environment.PINNED
+    assert makehuman.PACKAGE in makehuman.REQUIREMENTS.read_text("utf-8")
+    assert not re.search(r"^numpy==[2-9]", file.read_text("utf-8"), re.MULTILINE)  # which Blender cannot load

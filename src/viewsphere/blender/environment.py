@@ -15,7 +15,12 @@ import platformdirs
 from viewsphere.aside import Aside, sweep
 from viewsphere.errors import UserError
 
-PACKAGES = ("bpy==5.0.*", "numpy<2")
+REQUIREMENTS = Path(__file__).with_name("requirements.txt")
+"""The packages and the digests of their files. Pip refuses other files, so that a changed index does no harm."""
+
+PINNED = ("--disable-pip-version-check", "--require-hashes", "--only-binary", ":all:")
+"""Options of pip: only files of known digests, and only wheels, which run no program of their own while they are installed."""
+
 PREFIX = "blender-making-"
 INSTALL_S = 3600.0
 
@@ -50,7 +55,7 @@ def make_environment(listener: Listener) -> Path:
         listener(f"making {place} with {base}: about 1 GB")
         _run([base, "-m", "venv", aside.folder / "new"], listener)
         made = interpreter_of(aside.folder / "new")
-        _run([made, "-m", "pip", "install", "--disable-pip-version-check", *PACKAGES], listener)
+        _run([made, "-m", "pip", "install", *PINNED, "-r", REQUIREMENTS], listener)
         with suppress(FileNotFoundError):
             place.rename(aside.folder / "old")
         (aside.folder / "new").rename(place)

