@@ -223,6 +223,13 @@ def test_the_canonical_pose_is_a_symmetry_away_and_the_nearest_to_the_identity(k
             assert min(gaps) < 0.02
 
 
+def test_dir_lists_all_attributes(made):
+    o = made[0].objects[0]
+    names = {"box2d", "camera_from_object", "quaternion", "area", "canonical_pose", "diameter", "keypoints"}
+    assert names <= {*dir(o)} and "velocity" not in dir(o)
+    assert all(hasattr(o, name) for name in dir(o))
+
+
 def test_a_model_without_symmetries_keeps_its_pose(made):
     for sample in made:
         for o in sample.objects:

@@ -8,7 +8,7 @@ import pytest
 from proven import close, equal
 from shots import still_shot
 from viewsphere.assets.mesh import Mesh
-from viewsphere.geometry.box import FACES, box_vertices
+from viewsphere.geometry.box import FACES, box_vertices, clip_to_image
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
 from viewsphere.labels import annotated, sight_of
@@ -205,6 +205,36 @@ def test_a_model_that_crosses_the_camera_plane():
     large = rasterize(geometry, camera, object_id=1, window=(-160, -120, 320, 240)).triangle >= 0
     assert corridor.visibility == corridor.area / large.sum()
     assert corridor.truncation == 1 - large[120:240, 160:320].sum() / large.sum()
+
+
+def cut_hull(vertices, faces, camera, near=1e-6):
+    """The bounds of faces cut at the plane z = near, clipped to the image, by Sutherland and Hodgman's method."""
+    found = []
+    for face in faces:
+        corners = vertices[list(face)] @ camera.R.T + camera.t
+        for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            if a[2] >= near:
+                found.append(a)
+            if (a[2] < near) != (b[2] < near):
+                found.append(a + (near - a[2]) / (b[2] - a[2]) * (b - a))
+    if not found:
+        return None
+    u, v = (np.array(found) @ camera.K.T / np.array(found)[:, 2:]).T[:2]
+    return clip_to_image((u.min(), v.min(), u.max(), v.max()), camera.width, camera.height)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_boxes_of_what_crosses_the_camera_plane_are_exact(seed):
+    rng = np.random.default_rng(seed)
+    low = np.array([rng.uniform(-2, 1), -rng.uniform(4.1, 9), rng.uniform(-2, 1)])
+    model = block(low, (low[0] + rng.uniform(0.2, 1), rng.uniform(-3, 3), low[2] + rng.uniform(0.2, 1)))
+    pose = Viewpoint(index=0, azimuth_deg=rng.uniform(-25, 25), elevation_deg=rng.uniform(-25, 25), distance=4)
+    (found,), camera, geometry, *_ = scene([model], [at()], pose)
+    expected = cut_hull(geometry.vertices, [FACES[name] for name in FACES], camera)
+    assert found.box2d_unclipped is None or expected == pytest.approx(found.box2d_projected)
+    assert (expected is None) == (found.box2d_projected is None)
+    if expected:
+        close("box2d_projected", "cut at the camera's plane by hand", found.box2d_projected, expected, "px", atol=1e-6)
 
 
 @pytest.mark.parametrize("elevation", [30, 5, -5])

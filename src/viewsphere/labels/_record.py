@@ -157,6 +157,11 @@ class _Restored(ObjectAnnotation):
         self.__dict__["more"] = {field: getattr(self, field) for field in beyond}
         return self.__dict__["more"]
 
+    def __dir__(self) -> list[str]:
+        """All attributes, also those that are not restored yet."""
+        makers: Makers = self.__dict__["_makers"]
+        return sorted({*object.__dir__(self), *_OWN, *filter(makers.has, makers.of)})
+
     def __getstate__(self) -> dict[str, Any]:
         """All fields, so that an object travels to other processes without its shot."""
         return {name: getattr(self, name) for name in _OWN}

@@ -19,11 +19,14 @@ if TYPE_CHECKING:
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:
-    """Both boxes, clipped and unclipped; where the lens shows only a part of the model, the box includes its visible pixels."""
+    """Both boxes, clipped and unclipped. Where the lens shows only a part of the model, the box includes the centres of its
+    visible pixels, which lie on the model: surface nearer than projected boxes begin is in no other box.
+    """
     bounds, whole = sight.projected[i]
     projected = _clipped(bounds, sight.camera)
     if not whole and sight.instances.area[i + 1]:
         x0, y0, x1, y1 = map(float, sight.instances.box[i + 1].tolist())
+        x0, y0, x1, y1 = x0 + 0.5, y0 + 0.5, x1 - 0.5, y1 - 0.5
         a = projected or (x0, y0, x1, y1)
         projected = min(a[0], x0), min(a[1], y0), max(a[2], x1), max(a[3], y1)
     return {"box2d_projected": projected, "box2d_unclipped": bounds if whole else None}

@@ -28,6 +28,9 @@ FIELDS = ("velocity", "angular_velocity", "acceleration")
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:
     """Differences of the poses at the instants next to this one, of the middle of the object's box: central ones; at a
     sequence's ends, and where the object comes or goes, one-sided ones without an acceleration.
+
+    Of a model that deforms the point is the middle of the box at this instant and moves with the pose: its own motion counts,
+    that of its surface does not.
     """
     placement, now = sight.placement(i), sight.moment()
     middle = (placement.box[2] + placement.box[4]) / 2
@@ -84,7 +87,16 @@ LABEL = ObjectLabel(
     on_request=True,
     needs=Needs(poses=(-1, 1)),
     fields=(
-        Field("velocity", "of the middle of its box; None where only one instant has it", float, (3,), "m/s", "", True, True),
+        Field(
+            "velocity",
+            "of the middle of its box, moved by the pose alone; None where only one instant has it",
+            float,
+            (3,),
+            "m/s",
+            "",
+            True,
+            True,
+        ),
         Field("angular_velocity", "along the axis about which it turns", float, (3,), "rad/s", "", True, True),
         Field("acceleration", "None at a sequence's ends, too", float, (3,), "m/s^2", "", True, True),
     ),
