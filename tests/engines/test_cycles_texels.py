@@ -63,7 +63,7 @@ def view(distance: float, focal=100.0, size=2, placed=PLACED) -> Camera:
 
 
 def level(mesh: Mesh, camera: Camera, name="base_color_texture", things=(PLACED,), repaints=()) -> int:
-    (row,) = Kind(mesh, repaints, things).levels([camera])
+    (row,) = Kind(mesh, repaints, True, things).levels([camera])
     return row[list(CONTENTS).index(name)]
 
 
@@ -156,7 +156,7 @@ def test_normals_are_halved_only_where_roughness_takes_what_they_lose():
     surface = picture(128, 128)
     aligned = square(BUMPY, surface, bumps)
     assert level(aligned, view(30.0), "normal_texture") == level(aligned, view(30.0), "metallic_roughness_texture") > 0
-    kind = Kind(aligned, (), (PLACED,))
+    kind = Kind(aligned, (), True, (PLACED,))
     (material,), images = kind.pictured(kind.levels([view(30.0)]))
     rough = images[material.metallic_roughness_texture.image].pixels
     k = 128 // len(rough)
@@ -180,7 +180,7 @@ def test_normals_are_halved_only_where_roughness_takes_what_they_lose():
 
 def test_pictures_are_shared_and_others_are_left_out():
     two = square(COLORED, picture(), picture(), materials=(COLORED, replace(COLORED, emissive_texture=Texture(0))))
-    kind = Kind(two, (), (PLACED,))
+    kind = Kind(two, (), True, (PLACED,))
     (level,) = {row[0] for row in kind.levels([view(9.0)])[:1]}
     materials, images = kind.pictured(((level,) * len(CONTENTS),) * 2)
     assert len(images) == 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import MissingExtraError
-from viewsphere.files import open_file
+from viewsphere.files import read_bytes
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import Sample
@@ -35,16 +36,30 @@ TOLERANCE = 1e-4
 LEVEL = 1e-5
 """Slope of a ray, and metres above the ground, up to which rounding decides whether they meet."""
 
+BEYOND = 1e-6
+"""Share of the distance, and of a metre, by which a ray goes on behind a back: some roundings of Embree's float32."""
+
 OUTLIERS = 0.01
 """Share of the pixels that may differ: where a ray passes within rounding of a triangle's edge, or meets it at a glance."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Soup:
-    """Triangles (T, 3, 3) of one thing, and which of them cannot be seen through (T,) bool."""
+    """Triangles (T, 3, 3) of one thing, which of them cannot be seen through (T,) bool, and which a camera sees from their
+    fronts alone (T,) bool.
+    """
 
     corners: Float
     opaque: NDArray[np.bool_]
+    single: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """A scene of Embree, and of its triangles the normals (T, 3) of single-sided ones, else 0."""
+
+    scene: Any
+    fronts: Float
 
 
 class RayCaster:
@@ -57,7 +72,7 @@ class RayCaster:
         if find_spec("embreex") is None:
             raise MissingExtraError("expected embreex, found none: pip install 'viewsphere[check]'")
         self._dataset, self._scenery = dataset, scenery
-        self._files = {info.key: (dataset.path(info.glb), info.node) for info in dataset.models}
+        self._files = {info.key: (dataset.path(info.glb), info.node, info.faces is not None) for info in dataset.models}
         self._known: dict[str, _Soup] = {}
         self._around: dict[str, _Soup | None] = {}
         self._key: object = None
@@ -157,11 +172,12 @@ class RayCaster:
         nothing = np.zeros((0, 3, 3))
         corners = np.concatenate([nothing, *(transform(world, soup.corners) - self._middle for _, world, soup in placed)])
         opaque = np.concatenate([np.zeros(0, np.bool_), *(soup.opaque for _, _, soup in placed)])
+        single = np.concatenate([np.zeros(0, np.bool_), *(soup.single for _, _, soup in placed)])
         owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
         lowest = float(corners[..., 2].min(initial=np.inf))
         self._lowest = lowest if floor is None else floor.under(lowest + self._middle[2]) - self._middle[2]
         # A surface is in one of two scenes: one of all, beside that of what hides others, would take twice as long to make.
-        self._solid, self._clear = _scene(corners[opaque]), _scene(corners[~opaque])
+        self._solid, self._clear = _target(corners, single, opaque), _target(corners, single, ~opaque)
         self._owners = owner[opaque], owner[~opaque]
         self._key = key
 
@@ -181,37 +197,52 @@ class RayCaster:
 
 def _soup_of(mesh: Mesh) -> _Soup:
     solid = np.array([m.alpha_mode == "OPAQUE" for m in mesh.materials])
-    return _Soup(mesh.vertices[mesh.triangles].astype(np.float64), solid[mesh.triangle_material])
+    corners = mesh.vertices[mesh.triangles].astype(np.float64)
+    return _Soup(corners, solid[mesh.triangle_material], np.zeros(len(corners), np.bool_))
 
 
-def _scene(corners: Float) -> Any:
+def _target(corners: Float, single: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> _Target | None:
+    """The chosen ones of triangles (T, 3, 3), None if there are none."""
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
-    if not len(corners):
+    if not chosen.any():
         return None
     scene = EmbreeScene(robust=True)
-    TriangleMesh(scene, corners.astype(np.float32))
-    return scene
+    own = corners[chosen]
+    TriangleMesh(scene, own.astype(np.float32))
+    a, b, c = (own[:, i] for i in range(3))
+    return _Target(scene, np.where(single[chosen, None], np.cross(b - a, c - a), 0.0))
 
 
-def _cast(scene: Any, origins: Float, directions: Float) -> tuple[Float, NDArray[np.int64]]:
-    """Distance along each ray (infinite where nothing is hit) and triangle (-1)."""
-    if scene is None:
-        return np.full(len(origins), np.inf), np.full(len(origins), -1, np.int64)
-    hit = scene.run(np.ascontiguousarray(origins, np.float32), directions.astype(np.float32), output=True)
-    triangle = np.asarray(hit["primID"], np.int64)
-    return np.where(triangle < 0, np.inf, np.asarray(hit["tfar"], np.float64)), triangle
+def _cast(target: _Target | None, origins: Float, directions: Float) -> tuple[Float, NDArray[np.int64]]:
+    """Distance along each ray (infinite where nothing is hit) and triangle (-1); rays pass the backs of single-sided ones."""
+    distance, triangle = np.full(len(origins), np.inf), np.full(len(origins), -1, np.int64)
+    if target is None:
+        return distance, triangle
+    left, passed = np.arange(len(origins)), np.zeros(len(origins))
+    while len(left):
+        start = origins[left] + passed[left, None] * directions[left]
+        hit = target.scene.run(start.astype(np.float32, order="C"), directions[left].astype(np.float32), output=True)
+        met = np.asarray(hit["primID"], np.int64)
+        further = np.where(met < 0, np.inf, np.asarray(hit["tfar"], np.float64))
+        distance[left], triangle[left] = passed[left] + further, met
+        is_back = (met >= 0) & ((target.fronts[met] * directions[left]).sum(axis=1) > 0)
+        left, further = left[is_back], further[is_back]
+        passed[left] += further + BEYOND * (1 + np.abs(start[is_back]).max(axis=1, initial=0) + further)
+    return distance, triangle
 
 
-def _read(file: Path, step: str | None) -> _Soup:
-    """An exported GLB in the object's axes; of a model that deforms what is below a time step's node."""
+def _read(file: Path, step: str | None, fronts_only: bool) -> _Soup:
+    """An exported GLB in the object's axes; of a model that deforms what is below a time step's node. fronts_only: whether
+    cameras do not see the backs of single-sided materials.
+    """
     import trimesh
 
-    with open_file(file, "MAX_FILE_BYTES") as stream:
-        scene: Any = trimesh.load_scene(stream, file_type="glb", process=False)
+    scene: Any = trimesh.load_scene(BytesIO(read_bytes(file, "MAX_FILE_BYTES")), file_type="glb", process=False)
     corners: list[Float] = []
     opaque: list[NDArray[np.bool_]] = []
+    single: list[NDArray[np.bool_]] = []
     shown = scene.graph.transforms.successors(step or scene.graph.base_frame)
     for name in filter(shown.__contains__, scene.graph.nodes_geometry):
         matrix, geometry = scene.graph.get(name, step)
@@ -220,4 +251,5 @@ def _read(file: Path, step: str | None) -> _Soup:
         corners.append(np.stack([x, -z, y], axis=-1)[mesh.faces])
         material = getattr(mesh.visual, "material", None)
         opaque.append(np.full(len(mesh.faces), getattr(material, "alphaMode", None) in (None, "OPAQUE")))
-    return _Soup(np.concatenate(corners), np.concatenate(opaque))
+        single.append(np.full(len(mesh.faces), fronts_only and not getattr(material, "doubleSided", True)))
+    return _Soup(np.concatenate(corners), np.concatenate(opaque), np.concatenate(single))

@@ -35,7 +35,7 @@ class ModelSpec(Brief):
     its file's first frame; which time step it shows, and when, its thing's motion says.
     """
 
-    UNSAID = ("fps", "sidecar", "symmetries", "keypoints", "color", "material", "size")
+    UNSAID = ("fps", "sidecar", "symmetries", "keypoints", "color", "material", "size", "faces")
 
     key: str  # unique and stable in the data set: also the name of its folder
     source: str
@@ -59,6 +59,7 @@ class ModelSpec(Brief):
     sidecar: str | None = None  # absolute path of the file that says symmetries and keypoints, where it is not beside its own
     symmetries: Literal["found"] | None = None  # whether they are looked for where none are declared
     keypoints: int | None = None  # how many are spread over its surface where none are named
+    faces: Literal["as_file"] | None = None  # cameras see single-sided materials from their fronts alone; None: all from both
     color: Word | None = None  # what captions call its colour, where that is not what its sidecar or its surface says
     material: Word | None = None  # the same of its material
 

@@ -155,6 +155,11 @@ class ModelEntry(Brief):
     keypoints: Annotated[Count, Field(le=MOST_POINTS)] | None = Field(
         default=None, description="of models that name none, so many points that lie far apart on the surface"
     )
+    faces: Literal["both", "as_file"] | None = Field(
+        default=None,
+        description="as_file: cameras do not see the backs of materials that the file has single-sided (glTF: without "
+        "doubleSided); both (the default): all surfaces are seen from both sides",
+    )
     color: Word | None = Field(
         default=None, description="what captions call the models' colour, instead of what their surfaces say"
     )

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, cast
 
 from pydantic import (
     AfterValidator,
@@ -56,6 +56,7 @@ LATER = {"scenes", "time", "rig", "tracks", "variations", "min_visibility", "wan
 """Fields that recipes once did not have: without them a recipe has the digest that it had then."""
 
 LATER_FIELDS: dict[tuple[str, ...], Any] = {
+    ("models", "faces"): None,
     ("viewpoints", "shake"): None,
     ("camera", "principal_point"): None,
     ("scene", "company", "orientation"): "upright",
@@ -387,12 +388,17 @@ class Recipe(Shown, Frozen):
         return dump(plain)
 
 
-def _leave_out(value: Any, path: tuple[str, ...], default: object) -> None:
-    """Take a field that has its default out of nested mappings, where it is."""
-    for name in path[:-1]:
-        value = value.get(name) if isinstance(value, dict) else None
-    if isinstance(value, dict) and path[-1] in value and value[path[-1]] == default:
-        del value[path[-1]]
+def _leave_out(value: Any, path: Sequence[str], default: object) -> None:
+    """Take a field that has its default out of nested mappings, and out of each entry of lists on the way, where it is."""
+    name, *rest = path
+    if isinstance(value, list):
+        for entry in cast("list[Any]", value):
+            _leave_out(entry, path, default)
+    elif isinstance(value, dict) and name in value:
+        if rest:
+            _leave_out(value[name], rest, default)
+        elif value[name] == default:
+            del value[name]
 
 
 def _plain(value: Any) -> Any:

@@ -226,7 +226,7 @@ def _joined(categories: dict[int, Category], category: Category, others: set[int
 def _key_for(contents: dict[str, tuple[object, ...]], info: ModelInfo, category: Category) -> str:
     """The model's key, or one with a number where another model has it; `contents` gets it."""
     steps = tuple((one.key, one.digest, one.real_size) for one in info.steps)
-    said = info.symmetries, info.keypoints, info.looks
+    said = info.symmetries, info.keypoints, info.looks, info.faces
     number, key, content = 1, info.key, (info.digest, info.real_size, category.id, steps, *said)
     while contents.get(key, content) != content:
         number += 1

@@ -166,6 +166,7 @@ class Models:
             keypoints=traits.keypoints,
             body_parts=mesh.body_parts,
             looks=traits.looks() if self._keeps_looks else None,
+            faces=spec.faces,
         )
 
     def _compare(self, spec: ModelSpec, known: ModelInfo, wanted: Steps) -> None:

@@ -226,6 +226,7 @@ def _spec(info: ModelInfo) -> ModelSpec:
         category=info.category,
         supercategory=info.supercategory,
         category_id=info.category_id,
+        faces=info.faces,
     )
 
 

@@ -108,6 +108,7 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             sidecar=_sidecar(recipe, found.entry),
             symmetries="found" if entry.symmetries == "found" else None,
             keypoints=entry.keypoints,
+            faces="as_file" if entry.faces == "as_file" else None,
             color=entry.color,
             material=entry.material,
         )

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import accumulate, chain
 from pathlib import PurePosixPath
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,6 +108,7 @@ class ModelInfo:
     keypoints: Keypoints | None = None
     body_parts: tuple[str, ...] = ()
     looks: Looks | None = None
+    faces: Literal["as_file"] | None = None  # see `ModelSpec.faces`
 
     @property
     def node(self) -> str | None:
@@ -143,7 +144,7 @@ class ModelInfo:
             del value["body_parts"]
         for name in ("symmetries", "keypoints", "looks"):
             value[name] = value[name] and value[name].model_dump(mode="json")
-        for name in ("credit", "diameter", "symmetries", "keypoints", "looks"):
+        for name in ("credit", "diameter", "symmetries", "keypoints", "looks", "faces"):
             if value[name] is None:
                 del value[name]
         return value

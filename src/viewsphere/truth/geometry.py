@@ -16,7 +16,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.model.classes import GROUND, stuff_of, thing_class
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing
-from viewsphere.truth.cutouts import ENDLESS, NO_CUTOUTS, Cutouts, mesh_cutouts, stack_cutouts
+from viewsphere.truth.cutouts import ENDLESS, NEVER, NO_CUTOUTS, Cutouts, mesh_cutouts, stack_cutouts
 from viewsphere.truth.sparse import Spare
 
 BACKGROUND = 0
@@ -53,6 +53,7 @@ class Geometry:
 
     triangles (T, 3) int32; triangle_object (T,) int32: 0 for scenery and ground; triangle_part, triangle_category,
     triangle_material, triangle_body_part int32: of the objects' triangles alone, which come first, all others have 0;
+    single_sided (n,) int32: the triangles that a camera sees from their fronts alone, see `seen_from`;
     triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32: -1 all surface, -2 never
     seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
 
@@ -79,6 +80,7 @@ class Geometry:
     triangle_body_part: NDArray[np.int32]
     triangle_cutout: NDArray[np.int32]
     cutouts: Cutouts
+    single_sided: NDArray[np.int32]
     is_used: NDArray[np.bool_]
     bounds: NDArray[np.float64]
     vertex_start: tuple[int, ...]
@@ -292,6 +294,29 @@ def without_ground(geometry: Geometry) -> Geometry:
     return replace(geometry, **kept, ground_z=None)
 
 
+def seen_from(geometry: Geometry, q: NDArray[np.float64], base: int = 0) -> Geometry:
+    """The same, but the single-sided triangles that turn their backs to the camera are never seen, and no others are looked at
+    again; q: vertices from `base` on as `truth.visibility.homogeneous` gives them for the camera.
+
+    By the sign that the rasteriser computes, so nothing changes where no triangle is single-sided.
+    """
+    corners = geometry.triangles[geometry.single_sided] - base
+    chosen = ((corners >= 0) & (corners < len(q))).all(axis=1)
+    if not chosen.any():
+        return geometry
+    a, b, c = (q[corners[chosen, i], :3] for i in range(3))
+    with np.errstate(invalid="ignore", over="ignore"):  # of things outside of the picture, which are left out of q
+        is_turned = (np.cross(b - a, c - a) * a).sum(axis=1) > 0
+    cutout = geometry.triangle_cutout.copy()
+    cutout[geometry.single_sided[chosen][is_turned]] = NEVER
+    return replace(geometry, triangle_cutout=cutout, single_sided=geometry.single_sided[:0])
+
+
+def with_both_sides(geometry: Geometry) -> Geometry:
+    """The same, but all triangles are seen from both sides, as by rays that are not a camera's."""
+    return replace(geometry, single_sided=geometry.single_sided[:0]) if len(geometry.single_sided) else geometry
+
+
 def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
     """The same, but BLEND materials are surface wherever they have a colour, which labels leave out where it is faint."""
     if not any(material.alpha_mode == "BLEND" for mesh in meshes for material in mesh.materials):
@@ -303,6 +328,7 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
 
 def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
     vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
+    triangle_start = (0, *accumulate(len(m.triangles) for m in meshes))
     triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], np.int32)
     objects = sum(p.id > 0 for p in things)
     held = list(zip(things, meshes, strict=True))
@@ -325,10 +351,11 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         triangle_body_part=labels[:, 5],
         triangle_cutout=rows,
         cutouts=cutouts,
+        single_sided=_offset([_single_sided(*pair) for pair in held], triangle_start),
         is_used=is_used,
         bounds=np.empty((len(things), 2, 3)),
         vertex_start=vertex_start,
-        triangle_start=(0, *accumulate(len(m.triangles) for m in meshes)),
+        triangle_start=triangle_start,
         object_count=objects,
         ground_z=None,
         facing=Facing(),
@@ -345,6 +372,7 @@ _scenery = lru_cache(maxsize=1)(_placed)
 def _stacked(parts: Sequence[Geometry]) -> Geometry:
     """One after another; where the last is the ground, it stays that."""
     firsts = (0, *accumulate(len(part.coordinates) for part in parts))
+    first_triangles = (0, *accumulate(len(part.triangles) for part in parts))
     cutouts, rows = stack_cutouts([(part.cutouts, part.triangle_cutout) for part in parts])
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in STACKED}
     return Geometry(
@@ -352,6 +380,7 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
         triangles=np.concatenate([part.triangles + np.int32(first) for part, first in zip(parts, firsts, strict=False)]),
         triangle_cutout=rows,
         cutouts=cutouts,
+        single_sided=_offset([part.single_sided for part in parts], first_triangles),
         vertex_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.vertex_start))),
         triangle_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.triangle_start))),
         object_count=sum(part.object_count for part in parts),
@@ -360,6 +389,20 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
         facing=Facing(),
         spare=Spare(),
     )
+
+
+def _single_sided(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
+    """The triangles of a thing that a camera sees from their fronts alone: none, unless its entry has `faces: as_file`."""
+    if thing.model.faces is None:
+        return np.empty(0, np.int32)
+    is_single = np.array([not material.double_sided for material in mesh.materials])
+    return np.flatnonzero(is_single[mesh.triangle_material]).astype(np.int32)
+
+
+def _offset(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int]) -> NDArray[np.int32]:
+    """Numbers of triangles, counted in each part, as those of the whole."""
+    moved = (part + np.int32(first) for part, first in zip(parts, firsts, strict=False))
+    return np.concatenate([np.empty(0, np.int32), *moved])
 
 
 def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
@@ -395,6 +438,7 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         triangle_body_part=none,
         triangle_cutout=np.array(ENDLESS, np.int32),
         cutouts=NO_CUTOUTS,
+        single_sided=none,
         is_used=np.ones(4, np.bool_),
         bounds=np.empty((0, 2, 3)),
         vertex_start=(0,),

@@ -26,7 +26,8 @@ VISIBLE, OCCLUDED, OUTSIDE, BEHIND, INVALID = range(5)
 
 INVALID: it is nowhere (its thing is not there or has other triangles, a flat picture). BEHIND: behind the camera, or the lens
 has no pixel for its direction. OUTSIDE: not in [0, W) x [0, H). OCCLUDED: the segment from the camera's centre to the point
-meets surface other than its own triangle, nearer by more than `GAP` of its depth.
+meets surface other than its own triangle, nearer by more than `GAP` of its depth; or its own triangle is single-sided and
+turns its back to the camera.
 """
 
 GAP = 1e-6
@@ -89,6 +90,8 @@ def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
     state, cell = _classified(xy, near, (view.camera.width, view.camera.height))
     for index, met in _meetings(view, xy, near, own, cell, rays):
         kernels.hide(met, index, np.uint8(OCCLUDED), state)
+    if view.shown is not view.geometry:
+        state[(state == VISIBLE) & view.is_turned_away(own)] = OCCLUDED
     stops = np.cumsum([points.near.size for points in placed])[:-1]
     return [part.reshape(points.near.shape) for part, points in zip(np.split(state, stops), placed, strict=True)]
 
@@ -152,7 +155,7 @@ def _meet(
     from viewsphere.truth import kernels_points as kernels
 
     geometry, (width, height) = view.geometry, size
-    ground, cut = np.int32(geometry.triangle_start[-1]), (geometry.triangle_cutout, geometry.cutouts.arrays)
+    ground, cut = np.int32(geometry.triangle_start[-1]), (view.shown.triangle_cutout, geometry.cutouts.arrays)
     clear = ground if ground < len(geometry.triangles) else np.int32(-1)
     start, far, covered = np.empty(width * height + 2, np.int32), np.empty((height, width)), np.empty(width * height, np.bool_)
     order, number = np.empty(len(near), np.int32), np.empty(len(near) + FOUR, np.int32)

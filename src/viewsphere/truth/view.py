@@ -14,7 +14,7 @@ from viewsphere.geometry.camera import has_unit_rays, inverse_camera_matrix
 from viewsphere.geometry.rotation import inverse, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.thing import Thing
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.geometry import Geometry, seen_from
 from viewsphere.truth.visibility import Visibility, homogeneous, lens_rays, pixels_of, rasterize
 
 Float = NDArray[np.float64]
@@ -86,6 +86,16 @@ class View:
     def boxes(self) -> NDArray[np.int32]:
         """The pixel that each vertex is in, (n, 4), as `truth.visibility.pixels_of` says; of a pinhole."""
         return pixels_of(self.geometry, self.corners, (self.camera.width, self.camera.height))
+
+    @cached_property
+    def shown(self) -> Geometry:
+        """The geometry without the triangles that turn a back to the camera which it does not see."""
+        return seen_from(self.geometry, self.corners)
+
+    def is_turned_away(self, triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Whether the camera cannot see these triangles, -1 for none, because they turn their backs to it."""
+        is_gone = self.shown.triangle_cutout != self.geometry.triangle_cutout
+        return (triangles >= 0) & is_gone[triangles]
 
     @cached_property
     def visibility(self) -> Visibility:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import Window, has_unit_rays, pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.geometry import Geometry, seen_from
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
 
@@ -312,7 +312,7 @@ def _draw(
     nearest, seen = shown or (np.zeros((y1 - y0, x1 - x0)), np.full((y1 - y0, x1 - x0), -1, np.int32))
     first, last, base, stop = part
     span = (first, last, base)
-    cut = (geometry.triangle_cutout, geometry.cutouts.arrays)
+    cut = (seen_from(geometry, q, base).triangle_cutout, geometry.cutouts.arrays)
     if camera.distortion is not None:
         canvas = _canvas(camera, window)
         t = _ray_table(camera.intrinsics.model_dump_json(), samples, canvas)

@@ -20,13 +20,16 @@ IMAGE_EXTENSIONS = ("EXT_texture_webp", "MSFT_texture_dds")
 
 
 def read_materials(document: Document, used: Collection[int]) -> list[Material]:
-    """All materials in file order (unused ones as plain `Material()`), then the default for primitives without a material.
+    """All materials in file order (unused ones plain, but for their sides), then the default for primitives without a material.
 
     Primitives without material are plain white plastic rather than the specification's mirror-like metal.
     """
     reader = _Reader(document)
     entries = document.root.items("materials")
-    read = [reader.material(entry) if i in used else Material() for i, entry in enumerate(entries)]
+    read = [
+        reader.material(entry) if i in used else Material(double_sided=entry.boolean("doubleSided"))
+        for i, entry in enumerate(entries)
+    ]
     return [*read, Material(name="default")]
 
 

@@ -89,7 +89,14 @@ def fill_material(material, told, images, has_uv, has_colors, is_traced=True):
             _tell(graph, told, look)
         if told["transmission"] > 0 and not is_traced:
             material.surface_render_method = "BLENDED"
-    graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
+    graph.node("ShaderNodeOutputMaterial", {"Surface": _single_sided(graph, surface) if told.get("fronts_only") else surface})
+
+
+def _single_sided(graph, surface):
+    """The surface, through whose back cameras see: it casts shadows and is mirrored as it is."""
+    camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
+    back = graph.node("ShaderNodeNewGeometry").outputs["Backfacing"]
+    return graph.mix(graph.product(camera, back), surface, _nothing(graph))
 
 
 def _tell(graph, told, look):

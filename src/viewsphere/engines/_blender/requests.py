@@ -93,11 +93,11 @@ def members_of(shot: Shot) -> dict[str, int]:
 
 def kinds_of(things: Sequence[Thing], meshes: Sequence[Mesh], scene: Scene) -> tuple[Kind, ...]:
     """The models that are put into the scene, each with its changes to materials."""
-    found: dict[tuple[int, tuple[Repaint, ...]], tuple[Mesh, list[Thing]]] = {}
+    found: dict[tuple[int, tuple[Repaint, ...], bool], tuple[Mesh, list[Thing]]] = {}
     for i in staged(things, scene):
         thing, mesh = things[i], meshes[i]
-        found.setdefault((id(mesh), thing.repaints), (mesh, []))[1].append(thing)
-    return tuple(Kind(mesh, repaints, tuple(own)) for (_, repaints), (mesh, own) in found.items())
+        found.setdefault((id(mesh), thing.repaints, thing.model.faces is None), (mesh, []))[1].append(thing)
+    return tuple(Kind(mesh, repaints, both, tuple(own)) for (_, repaints, both), (mesh, own) in found.items())
 
 
 def materials_request(kinds: Sequence[Kind], put: Put, levels: Sequence[Levels] | None) -> list[Request]:
@@ -117,7 +117,7 @@ def materials_request(kinds: Sequence[Kind], put: Put, levels: Sequence[Levels] 
         request.append(
             {
                 "images": _images_request(images, put_once),
-                "materials": [_material_request(material, kind.repaints) for material in materials],
+                "materials": [_material_request(material, kind.repaints, kind.has_backs) for material in materials],
             }
         )
     return request
@@ -146,10 +146,11 @@ def _images_request(images: Sequence[Image], put: Put) -> list[Request]:
     return [{"name": image.name, "pixels": put(image.pixels)} for image in images]
 
 
-def _material_request(material: Material, repaints: Sequence[Repaint]) -> Request:
+def _material_request(material: Material, repaints: Sequence[Repaint], has_backs: bool = True) -> Request:
     """A material with its repaints; a repaint's metallic or roughness replaces both the factor and its texture."""
     tinted, repaint = repainted(material, repaints)
     request = asdict(tinted)
+    request["fronts_only"] = not (has_backs or material.double_sided)
     request["fixed_metallic"] = None if repaint is None else repaint.metallic
     request["fixed_roughness"] = None if repaint is None else repaint.roughness
     return request

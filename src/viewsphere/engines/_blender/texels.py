@@ -130,10 +130,13 @@ def _fewest(edges: Float, across: Float) -> Float:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """A model with one set of repainted materials, and all things that use it."""
+    """A model with one set of repainted materials, and all things that use it. has_backs: whether cameras see the backs of
+    single-sided materials.
+    """
 
     mesh: Mesh
     repaints: tuple[Repaint, ...]
+    has_backs: bool
     things: tuple[Thing, ...]
     _densities: dict[tuple[int, Texture, tuple[int, int]], Density] = field(default_factory=dict)
     _made: dict[Key, Image] = field(default_factory=dict)

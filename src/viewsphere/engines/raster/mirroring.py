@@ -15,7 +15,7 @@ from viewsphere.engines.raster.records import Float32
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.model.camera import Camera
 from viewsphere.truth.cutouts import NEVER
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.geometry import Geometry, with_both_sides
 from viewsphere.truth.visibility import Visibility, lens_rays, rasterize
 
 Float = NDArray[np.float64]
@@ -79,8 +79,8 @@ def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bo
 
 
 def _without(geometry: Geometry, left_out: NDArray[np.bool_]) -> Geometry:
-    """The same, but these triangles (T,) are never seen."""
-    return replace(geometry, triangle_cutout=np.where(left_out, np.int32(NEVER), geometry.triangle_cutout))
+    """The same, but these triangles (T,) are never seen, and all others from both sides: a mirror is no camera."""
+    return replace(with_both_sides(geometry), triangle_cutout=np.where(left_out, np.int32(NEVER), geometry.triangle_cutout))
 
 
 def _below(camera: Camera, plane: float) -> Camera:

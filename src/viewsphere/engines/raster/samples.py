@@ -14,7 +14,7 @@ from viewsphere.engines.raster import kernels_chosen, kernels_edges, kernels_lin
 from viewsphere.engines.raster import kernels_samples as kernels
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.geometry import Geometry, seen_from
 from viewsphere.truth.visibility import RayTable, Runs, Visibility, homogeneous, in_picture, index_rays, left_out, lens_table
 
 OFFSETS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
@@ -76,6 +76,7 @@ def edge_samples(
     instead.
     """
     q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
+    geometry = seen_from(geometry, q)
     normals = geometry.triangle_normals_of(np.flatnonzero(~left_out(geometry, q)).tolist())
     look = visibility.triangle, visibility.inverse_depth, owner, normals
     marks = _differs_from_neighbour(*look)
@@ -136,6 +137,7 @@ def layers(
     if not see_through.any():
         return []
     q = homogeneous(geometry, camera) if corners is None else corners
+    geometry = seen_from(geometry, q)
     clear = _within(in_picture(geometry, q)[1], see_through)
     shape, count = (camera.height, camera.width), 1 if pixels is None else 4
     shown = triangle.reshape(-1, count), inverse_depth.reshape(-1, count)
