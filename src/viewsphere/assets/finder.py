@@ -70,7 +70,7 @@ class Finder:
         known = [parent / name for parent, names in self._known(folders) for name in names]
         for last, folder in ((PurePosixPath(name).name, folder) for name in names for folder in [*folders, *known]):
             if last and (path := self._followed(folder, last)) is not None:
-                return Found(path, elsewhere=last not in names)
+                return Found(path, elsewhere=PurePosixPath(last) not in map(PurePosixPath, names))
         raise NotFoundError(self._why(names, [*folders, *known]))
 
     def holds(self, reference: str, base: Path | None = None) -> bool:
