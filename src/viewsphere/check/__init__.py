@@ -72,8 +72,9 @@ def check(
     positions = _spread(range(len(dataset)), frames)
     chosen = _chosen(dataset, positions, sample, repaint, rays)
     is_whole, names = len(positions) == len(dataset), exports(dataset)
-    reports = [found, _of_models(dataset), _of_recipes(dataset, sample)]
-    reports += _reports(dataset, positions, chosen, names if is_whole else (), workers)
+    recomputed = Recomputed(dataset)
+    reports = [found, _of_models(dataset), _of_recipes(dataset, recomputed, sample)]
+    reports += _reports(dataset, positions, chosen, names if is_whole else (), workers, recomputed)
     if compared is not None:
         reports.append(_by_cycles(compared, dataset, _spread(positions, against_cycles)))
     if not is_whole:
@@ -116,10 +117,9 @@ def _of_models(dataset: Dataset) -> Report:
     return Report({"models": len(dataset.models)}, tuple(findings), not_run=not_run)
 
 
-def _of_recipes(dataset: Dataset, sample: int | None) -> Report:
+def _of_recipes(dataset: Dataset, recomputed: Recomputed, sample: int | None) -> Report:
     """The proofs that the plan, models' records and what was left out are as the recipes give them; of so many models."""
-    recomputed, untried = Recomputed(dataset), list[str]()
-    sources = Sources(dataset, recomputed)
+    sources, untried = Sources(dataset, recomputed), list[str]()
     findings = [Finding("plan", None, message) for message in recomputed.of_plan()]
     keys = dataset.plan.models
     some = [keys[i] for i in _spread(range(len(keys)), sample)]
@@ -187,13 +187,15 @@ def _spread(positions: range, most: int | None) -> range:
     return positions if most is None else positions[:: max(1, -(-len(positions) // most))] if most else positions[:0]
 
 
-def _reports(dataset: Dataset, positions: range, chosen: Chosen, names: Collection[str], workers: int) -> Iterator[Report]:
+def _reports(
+    dataset: Dataset, positions: range, chosen: Chosen, names: Collection[str], workers: int, recomputed: Recomputed
+) -> Iterator[Report]:
     """The findings in frames, chunk by chunk, and in the exports of these names."""
     size = max(FEWEST, -(-len(positions) // max(2 * workers, 1)))
     chunks = [positions[at : at + size] for at in range(0, len(positions), size)]
     prover = partial(_prover, dataset, chosen)
     if workers < 2 or len(chunks) < 2:
-        yield from map(prover(), (positions, *names))
+        yield from map(prover(recomputed), (positions, *names))
         return
     tasks = (*names, *chunks)  # each export is one long task, so they begin first
     with closing(in_order(min(workers, len(chunks)), prover, tasks)) as made:
@@ -201,11 +203,15 @@ def _reports(dataset: Dataset, positions: range, chosen: Chosen, names: Collecti
     yield from (*reports[len(names) :], *reports[: len(names)])
 
 
-def _prover(dataset: Dataset, chosen: Chosen) -> Callable[[range | str], Report]:
+def _prover(dataset: Dataset, chosen: Chosen, recomputed: Recomputed | None = None) -> Callable[[range | str], Report]:
     """Proves the frames at some positions, or the export of a name."""
-    return lambda asked: (
-        export_report(dataset, chosen.computed, asked) if isinstance(asked, str) else frame_report(dataset, chosen, asked)
-    )
+
+    def prove(asked: range | str) -> Report:
+        if isinstance(asked, str):
+            return export_report(dataset, chosen.computed, asked)
+        return frame_report(dataset, chosen, asked, recomputed)
+
+    return prove
 
 
 __all__ = ["Finding", "Report", "check", "exports", "lacking_models"]

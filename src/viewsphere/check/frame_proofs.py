@@ -12,9 +12,9 @@ from viewsphere.check.again import Again
 from viewsphere.check.failure import failure
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.check.rays import RayCaster
-from viewsphere.check.recomputed import Recomputed, rows_of
+from viewsphere.check.recomputed import CONTRADICTED, Recomputed, rows_of
 from viewsphere.check.repainted import Repainted
-from viewsphere.check.report import Finding, Report
+from viewsphere.check.report import Finding, Report, in_short
 from viewsphere.check.shots import contradictions
 from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.labels import channel_labels, labels, on_request
@@ -36,9 +36,9 @@ class Chosen:
     rays: bool | None
 
 
-def frame_report(dataset: Dataset, chosen: Chosen, positions: range) -> Report:
-    """The findings in the frames at these positions."""
-    proofs = _Proofs(dataset, chosen)
+def frame_report(dataset: Dataset, chosen: Chosen, positions: range, recomputed: Recomputed | None = None) -> Report:
+    """The findings in the frames at these positions; `recomputed` has the plans of the recipes if they are known."""
+    proofs = _Proofs(dataset, chosen, recomputed or Recomputed(dataset))
     for position, index, read in _frames(dataset, positions):
         if isinstance(read, Sample):
             for name, messages in proofs.of(position, read):
@@ -51,15 +51,15 @@ def frame_report(dataset: Dataset, chosen: Chosen, positions: range) -> Report:
 class _Proofs:
     """Proves frames one after another; what several need is kept."""
 
-    def __init__(self, dataset: Dataset, chosen: Chosen) -> None:
+    def __init__(self, dataset: Dataset, chosen: Chosen, recomputed: Recomputed) -> None:
         self.findings: list[Finding] = []
         self._dataset, self._chosen = dataset, chosen
         self._not_run: dict[str, str] = {}
         self._scenery, self._models = Scenery(dataset), {info.key: info for info in dataset.models}
         self._again = Again(dataset, self._scenery, self._models)
         self._caster = None if chosen.rays is False else self._make_caster()
-        self._recomputed = Recomputed(dataset)
-        self._repainted = Repainted(dataset, self._recomputed)
+        self._recomputed = recomputed
+        self._repainted = Repainted(dataset, recomputed)
         self._composed: set[str] = set()
         names = (*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name)))
         self._checked: dict[str, dict[int, None]] = {name: {} for name in names}
@@ -85,9 +85,9 @@ class _Proofs:
         if self._chosen.rays is False:
             not_run["surface"] = "no rays were asked for"
         if self._scenery.notes:
-            not_run["background"] = "; ".join(self._scenery.notes)
-        if self._recomputed.why_not:
-            not_run["recipe"] = self._recomputed.reasons
+            not_run["background"] = in_short(self._scenery.notes)
+        if self._recomputed.why_not or self._recomputed.refused:
+            not_run["recipe"] = self._recomputed.reasons or CONTRADICTED
         if self._repainted.why_not:
             not_run["repaint"] = self._repainted.reasons
         checked = {name: len(frames) for name, frames in self._checked.items()}

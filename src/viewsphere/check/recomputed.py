@@ -12,13 +12,16 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from viewsphere.assets.inside import split_source
 from viewsphere.check.differences import Difference, differences, in_words
 from viewsphere.check.failure import failure
+from viewsphere.check.report import in_short
 from viewsphere.errors import UserError
 from viewsphere.files import read_bytes, read_text
 from viewsphere.run.composing import Composer
 from viewsphere.run.replanning import AnotherPlan, Replanned
 from viewsphere.run.stages import Stages, StoredBoxes
+from viewsphere.sampling.engine_digest import script_digest
 from viewsphere.sampling.extension import NOTHING, Portion, extend
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, PlanRecord, Row, kept_shot
@@ -30,8 +33,14 @@ FILE = re.compile(r"[*?/\\]|\.\w{2,8}$")
 FREE = ("name", "licence", "attribution", "source_url", "category", "supercategory")
 """Fields of a recipe whose texts may be anything."""
 
-BY_FILES = re.compile(r"models|categories|blocks|poses|frames|images|script|rig|tracks|clip")
-"""Occurs in fields of a plan that follow from files: which there are, and what a table of poses or a calibration holds."""
+BY_FILES = re.compile(r"(^|\.)(models|blocks|poses|frames|new_poses|pose_names)\b|images|script")
+"""Occurs in fields of a plan that follow from the names of files, and from tables of poses."""
+
+MOST_SUBJECTS = 200
+"""Models or scenes of a part whose files are looked for."""
+
+CONTRADICTED = "the plan contradicts its recipe"
+"""The reason why nothing more is made by a recipe."""
 
 
 def rows_of(plan: PlanRecord, frame: int) -> Iterator[Row]:
@@ -63,7 +72,7 @@ class Recomputed:
     @property
     def reasons(self) -> str:
         """Why parts could not be planned; empty if all could."""
-        return "; ".join(dict.fromkeys(self.why_not.values()))
+        return in_short(self.why_not.values())
 
     def composer(self, number: int) -> Composer | None:
         """The composer of a part's shots; None where its recipe cannot be planned, or gives another plan."""
@@ -112,17 +121,29 @@ class Recomputed:
             except AnotherPlan as error:
                 self._judge(number, error.planned)
             except (UserError, ValidationError) as error:
-                if _names_files(part.recipe):
+                if self._lacks_files(number):
                     self.why_not[number] = f"its recipe cannot be planned: {error}"
                 else:
                     self.refused[number] = (f"plan.json: recipe: {failure('one that can be planned', error)}",)
         return None
 
+    def _lacks_files(self, number: int) -> bool:
+        """Whether a recipe names files that may be gone: others than models', or a model's that is no longer there."""
+        recipe, store = self._record.parts[number].recipe, self._dataset.store
+        if _names_files({name: value for name, value in recipe.items() if name != "models"}):
+            return True
+        index = self._record.indices[number]
+        rows = (next(index.of(subject)) for subject, _ in zip(index.counts, range(MOST_SUBJECTS), strict=False))
+        shots = (store.labelled(row.key) for row in rows if store.has_shot(row.key))
+        sources = {thing.model.source for shot in shots if shot for thing in shot.things}
+        return not all(source.startswith("zoo:") or split_source(Path(source))[0].exists() for source in sources)
+
     def _judge(self, number: int, planned: Plan) -> None:
         """Note whether a part contradicts its recipe, or files that the recipe names changed since."""
         found = tuple(self._against(number, planned))
         beside = [path for path, _, _ in found if not path.endswith("digest") and not path.startswith("recipe")]
-        if _names_files(self._record.parts[number].recipe) and (not beside or any(map(BY_FILES.search, beside))):
+        by_files = any(map(BY_FILES.search, beside)) or (not beside and _reads_tables(planned))
+        if by_files and _names_files(self._record.parts[number].recipe):
             self.why_not[number] = "the files that the recipe names are others now"
         else:
             self.refused[number] = tuple(in_words(iter(found), "plan.json", "the recipe"))
@@ -147,11 +168,21 @@ def _names_files(recipe: Any) -> bool:
     return isinstance(recipe, str) and FILE.search(recipe) is not None
 
 
+def _reads_tables(planned: Plan) -> bool:
+    """Whether a plan follows from what files say, such as tables of poses and calibrations."""
+    path = getattr(planned.recipe.viewpoints, "path", None)
+    read = (path, planned.blend, planned.own_rig, planned.tracks, script_digest(planned.recipe))
+    return any(one is not None for one in read)
+
+
 def _inside(text: str, record: PlanRecord) -> Iterator[str]:
     """Contradictions of plan.json that need no recipe: between its fields and those that follow from them."""
     found = parsed(text)
     yield from in_words(differences(parsed(record.to_json()), found), "plan.json", "the rest of it")
     rendered = all(part.is_sampled and not part.merged for part in record.parts)
+    merged = [part.merged for part in record.parts]
+    if sum(merged) == 1 or merged != sorted(merged, reverse=True):
+        yield f"plan.json: expected parts of two merged data sets before all others, or none; found merged: {merged}"
     parts, last = record.parts, record.parts[-1:] if rendered else ()
     firsts = list(accumulate((part.frames for part in parts), initial=0))[:-1]
     follows = {"max_objects": max((part.max_objects for part in parts), default=0)}

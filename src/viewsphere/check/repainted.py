@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.check.again import unequal
-from viewsphere.check.recomputed import Recomputed, rows_of
+from viewsphere.check.recomputed import CONTRADICTED, Recomputed, rows_of
+from viewsphere.check.report import in_short
 from viewsphere.errors import BlenderDied, BlenderError, UserError
 from viewsphere.kernels.kernel_cache import PAINTER
 from viewsphere.labels import channels
@@ -51,12 +52,12 @@ class Repainted:
     @property
     def reasons(self) -> str:
         """Why parts could not be painted; empty if all could."""
-        return "; ".join(dict.fromkeys(self.why_not.values()))
+        return in_short(self.why_not.values())
 
     def _of_row(self, row: Row, sample: Sample) -> Iterator[str]:
         composer = self._recomputed.composer(row.part)
         if composer is None:
-            self.why_not[row.part] = self._recomputed.reasons or "its plan contradicts its recipe"
+            self.why_not[row.part] = self._recomputed.reasons or CONTRADICTED
             return
         if self._dataset.plan.parts[row.part].settings.get(LOOK) != engine_digest(composer.portion.plan.recipe.engine.name):
             self.why_not[row.part] = "painted by another state of the engine's program"

@@ -66,6 +66,12 @@ def joined(reports: Iterable[Report]) -> Report:
     return Report(checked, tuple(findings), tuple(notes), not_run)
 
 
+def in_short(reasons: Iterable[str]) -> str:
+    """The first of several reasons, each once, and the number of others."""
+    first, *others = dict.fromkeys(reasons) or ("",)
+    return f"{first}; and {len(others):,} more" if others else first
+
+
 def _reasons(not_run: Mapping[str, str]) -> str:
     """Names of proofs, those of one reason together, each reason in parentheses."""
     names_of: dict[str, list[str]] = {}

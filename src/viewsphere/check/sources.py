@@ -8,7 +8,8 @@ from pathlib import Path
 
 from viewsphere.aside import temporary
 from viewsphere.check.differences import differences, in_words
-from viewsphere.check.recomputed import Recomputed
+from viewsphere.check.recomputed import CONTRADICTED, Recomputed
+from viewsphere.check.report import in_short
 from viewsphere.errors import UserError
 from viewsphere.files import read_bytes
 from viewsphere.model.model_spec import ModelSpec
@@ -30,7 +31,7 @@ class Sources:
     @property
     def reasons(self) -> str:
         """Why models could not be made again; empty if all could."""
-        return "; ".join(dict.fromkeys(self.why_not.values()))
+        return in_short(self.why_not.values())
 
     def contradictions(self, keys: Iterable[str]) -> Iterator[Finding]:
         """Differences of the records of these models from those made again."""
@@ -76,7 +77,7 @@ class Sources:
                 spec = self._recomputed.replanned.models(number).get(key)
                 if spec is not None:
                     return number, spec
-        self.why_not[key] = self._recomputed.reasons or f"no recipe has {key}"
+        self.why_not[key] = self._recomputed.reasons or CONTRADICTED
         return 0, None
 
     def _is_same(self, info: ModelInfo, export: Export) -> bool:
