@@ -16,7 +16,7 @@ BOX = [{"source": "zoo:post_box", "count": 3, "scale": {"length": 0.18}}]
 def wanted(**changes):
     values = {
         "models": BOX,
-        "viewpoints": {"kind": "sphere", "count": 3, "elevation": [5, 25], "distance": {"fill": 0.4}},
+        "viewpoints": {"kind": "sphere", "count": 3, "elevation": [5, 25], "distance": {"fill": 0.4}, "shared": True},
         "channels": ["rgb", "instances", "depth"],
         "formats": [],
         "splits": {"by": "frame"},
