@@ -12,6 +12,7 @@ from base64 import b64encode
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from functools import cache, partial
 from pathlib import Path
 from random import Random
@@ -23,6 +24,7 @@ from cube_dataset import LENS, MESHES, POSES, make
 from pictures import photograph, sunny, write, write_hdr
 from sealing import seal_again
 from viewsphere.errors import ViewsphereError
+from viewsphere.sampling.tables import table_rows
 
 Pack = tuple["Sample", ...]
 
@@ -414,6 +416,28 @@ def poses() -> Pack:
     )
 
 
+def _table(path: Path) -> None:
+    from viewsphere.sampling import credits, models, tracks
+
+    if path.name == "credits.csv":
+        for name in credits._read(path.parent, True):
+            fnmatchcase("a model of that name.obj", name)
+    elif path.name == "points.csv":
+        [*tracks._read(path)]
+    else:
+        [*table_rows(path, models.COLUMNS)]
+
+
+@cache
+def tables() -> Pack:
+    credits = b'file,licence,attribution,source_url\n"a, b.obj",CC0-1.0,Ann,https://example.org/a\nb.obj,MIT,"A ""b""",\n'
+    sizes = b"name,width,height,length\na,0.5,1,0.25\nb,1,,\n"
+    points = b"instant,x,y\n0,1.5,2\n1,3,4.25\n"
+    return tuple(
+        Sample(f"{name}.csv", data, "text") for name, data in (("credits", credits), ("points", points), ("sizes", sizes))
+    )
+
+
 def _rig(path: Path) -> None:
     from viewsphere.sampling.rig_files import read_rig
 
@@ -657,6 +681,7 @@ OF_STORES = (
     )
 )
 OF_STORES = tuple(f"store/{pattern}" for pattern in OF_STORES)
+OF_TARS = ("store/shots/*/*/manifest.json",) * 3 + ("store/shots/*/*/channels.tar",)
 OF_EXPORTS = ("coco/**/*.json", "native/**/*.json", "csv/**/*.*", "webdataset/**/*.*", "coco/**/*.*")
 OF_COCO = ("coco/annotations/*.json",) * 4 + ("coco/images/*/*.png",)
 OF_KITTI = (
@@ -676,11 +701,13 @@ TARGETS: dict[str, Files | Folders] = {
     "gltf": Files(_model, gltfs),
     "models": Files(_model, others),
     "poses": Files(_poses, poses),
+    "tables": Files(_table, tables),
     "rigs": Files(_rig, rigs),
     "channels": Files(_channel, coded),
     "textures": Files(_model, textures),
     "sky": Files(_environment, skies),
     "store": Folders(_store, (partial(_made, True), partial(_made, True, "tar"), _played), (*OF_STORES, *("store/shots/*/*/shot.json",) * 3), ("store",)),
+    "spans": Folders(_store, (partial(_made, False, "tar"),), OF_TARS, ("store",)),
     "records": Folders(_store, (partial(_made, False), partial(_made, False, "tar")), OF_STORES, ("store",)),
     "exports": Folders(_exports, (partial(_made, False),), OF_EXPORTS, ("store", *EXPORTS)),
     "coco": Folders(partial(_import, "coco"), (partial(_made, False),), OF_COCO, ("coco",)),

@@ -13,13 +13,14 @@ QUICK = {
     "gltf": 80,
     "models": 60,
     "poses": 150,
+    "tables": 150,
     "rigs": 10,
     "channels": 100,
     "textures": 60,
     "sky": 40,
     "recipe": 15,
 }
-LONG = {"store": 12, "records": 8, "exports": 6, "coco": 15, "native": 15, "kitti": 15, "pascal3d": 15}
+LONG = {"store": 12, "spans": 8, "records": 8, "exports": 6, "coco": 15, "native": 15, "kitti": 15, "pascal3d": 15}
 """Inputs of each target; those of whole data sets take longest."""
 
 

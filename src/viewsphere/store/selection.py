@@ -86,7 +86,7 @@ def _value(sample: Sample, name: str) -> Any:
 def _of_objects() -> dict[str, Field]:
     """The fields of objects."""
     fields = {field.name: field for label in object_labels() for field in label.fields}
-    return {"id": Field("id", "", int), "mask": Field("mask", "", bool), **fields}
+    return {"id": Field("id", "", int, ids={}), "mask": Field("mask", "", bool), **fields}
 
 
 def _of_pictures() -> dict[str, Field]:
