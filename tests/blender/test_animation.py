@@ -356,7 +356,7 @@ def test_mistakes_cost_one_line(files):
 def test_a_data_set_of_time_steps(files, tmp_path):
     asked = recipe(files, frames={"step": 12}, channels=["rgb", "instances", "depth"])
     planned = plan(asked)
-    assert (planned.frames, planned.time_steps, planned.factors) == (6, 3, "1 models x 3 time steps x 2 poses")
+    assert (planned.frames, planned.time_steps, planned.factors) == (6, 3, "1 model x 3 time steps x 2 poses")
     generate(asked, tmp_path / "out")
     dataset = Dataset(tmp_path / "out")
     assert [(s.pose.time.frame, s.pose.time.seconds) for s in dataset] == [(f, (f - 1) / 24) for f in FRAMES for _ in range(2)]

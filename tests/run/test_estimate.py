@@ -60,7 +60,7 @@ def test_the_command_says_it_in_one_line(tmp_path):
     )
     arguments = ["plan", str(tmp_path / "recipe.yaml"), "--estimate", "--workers", "2"]
     lines = viewsphere(*arguments).stdout.splitlines()
-    assert lines[0].startswith("dataset: 1 models x 2 poses = 2 frames")
+    assert lines[0].startswith("dataset: 1 model x 2 poses = 2 frames")
     assert re.fullmatch(r"about \d+ s with 2 workers, \d+ MB on disk", lines[-1])
     printed = json.loads(viewsphere(*arguments, "--json").stdout)["estimate"]
     assert printed.keys() == {"seconds", "bytes", "workers", "unused"} and printed["workers"] == 2

@@ -179,7 +179,7 @@ def test_channels_that_were_not_added_to_the_end_are_an_unfinished_data_set(sour
     generate(recipe(viewpoints=one, channels=more), tmp_path / "a", append=True)
     grown = Dataset(tmp_path / "a")
     shutil.rmtree(grown.store.shot_folder(next(row for index, _ in grown.plan.supplements for row in index).key))
-    with pytest.raises(StoreError, match=r"expected all channels, found 1 frames that lack those that were added last"):
+    with pytest.raises(StoreError, match=r"expected all channels, found 1 frame that lack those that were added last"):
         merge([sources[0], tmp_path / "a"], tmp_path / "e", mixed=True)
     assert not (tmp_path / "e").exists()
 

@@ -139,7 +139,7 @@ def _suggestions(spec: ModelSpec, facts: FileFacts, size: Size) -> tuple[str, ..
         elif longest < 0.01:
             said.append(f"{longest:.4g} m across: set unit (metres in one unit of the file) or scale")
     if spec.forward is None and width > 1.5 * length and facts.format not in PICTURE_SUFFIXES:
-        sideways = "+x" if facts.forward[1] != "x" and (spec.up or facts.up)[1] != "x" else "+y"
+        sideways = next(f"+{axis}" for axis in "xyz" if axis not in (facts.forward[1], (spec.up or facts.up)[1]))
         said.append(f"wider than long: if the picture shows its side at the front, set forward: {sideways} or its opposite")
     if spec.up is None and facts.format in {"obj", "ply", "stl", "off"} and height > 2 * max(width, length):
         said.append(f"the format does not say which way is up, {facts.up} was assumed: set up if it lies on its back")

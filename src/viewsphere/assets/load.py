@@ -17,6 +17,8 @@ SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")
 BLENDER_SUFFIXES = ("abc", "blend", "fbx", "usd", "usda", "usdc", "usdz")
 """Suffixes of formats that only Blender reads."""
 GLTF = ("glb", "gltf")
+UP = {"glb": "y", "gltf": "y", "obj": "y", "3mf": "z", "ply": "z", "stl": "z", "off": "z"}
+"""The axis that is up in files of each suffix; other formats say it in the file."""
 ANIMATED_SUFFIXES = (*BLENDER_SUFFIXES, *GLTF)
 PICTURE_SUFFIXES = ("bmp", "jpeg", "jpg", "png", "tif", "tiff", "webp")
 

@@ -83,15 +83,19 @@ def _placing(mesh: Mesh, turn: Float, facts: FileFacts, spec: ModelSpec) -> tupl
 
 
 def axes(spec: ModelSpec, facts: FileFacts) -> tuple[Axis, Axis]:
-    """Up and forward of a model: its settings', else the file's; where one is set alone, along the file's other one, the file's
-    axes are turned together, so that the other is at right angles.
+    """Up and forward of a model: its settings', else the file's. An `up` along the file's forward turns both axes of the file.
+
+    Raises ModelError for a `forward` along the file's up axis, as nothing says which way is up then.
     """
     up, forward = spec.up or facts.up, spec.forward or facts.forward
     if up[1] != forward[1] or (spec.up and spec.forward):
         return up, forward
-    if spec.up:
-        return up, _opposite(facts.up) if up == facts.forward else facts.up
-    return _opposite(facts.forward) if forward == facts.up else facts.forward, forward
+    if not spec.up:
+        raise ModelError(
+            f"{facts.path}: `forward: {forward}` lies along {facts.up}, which is up in this file. Set `up:`, too, or another "
+            "`forward:`"
+        )
+    return up, _opposite(facts.up) if up == facts.forward else facts.up
 
 
 def _opposite(axis: Axis) -> Axis:

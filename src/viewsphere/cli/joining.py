@@ -12,6 +12,7 @@ from viewsphere.cli import completion
 from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, Workers, asked_formats, at, cores, with_options
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json, say
 from viewsphere.errors import UserError
+from viewsphere.model.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.recipe.formats import FormatEntry
@@ -45,7 +46,7 @@ def merge(
     for note in notes:
         say(note)
     names = ", ".join(c.name for c in dataset.categories)
-    say(f"{target}: {len(dataset):,} frames, {len(dataset.plan.models):,} models; {names}")
+    say(f"{target}: {quantity(len(dataset), 'frame')}, {quantity(len(dataset.plan.models), 'model')}; {names}")
 
 
 def import_(
@@ -79,7 +80,7 @@ def import_(
     _tell_left_out(foreign.left_out)
     for note in notes:
         say(note)
-    say(f"{target}: {foreign.count:,} frames; {', '.join(c.name for c in foreign.categories)}")
+    say(f"{target}: {quantity(foreign.count, 'frame')}; {', '.join(c.name for c in foreign.categories)}")
 
 
 def convert(

@@ -37,6 +37,7 @@ from viewsphere.cli.terminal import (
     write_picture,
 )
 from viewsphere.errors import StoreError, UserError
+from viewsphere.model.quantity import quantity
 from viewsphere.recipe.starts import FIRST, kinds, start
 
 if TYPE_CHECKING:
@@ -88,8 +89,8 @@ def _new_again(format_: str, source: Path, folder: Path | None) -> None:
     made = make_again(format_, source, folder or Path(f"{source.resolve().stem}-again"))
     for note in made.notes:
         say(f"note: {note}", err=True)
-    what = f"{made.models:,} models" if made.models else "a model of the zoo's, as the data set has none"
-    say(f"wrote {made.recipe}: {made.shots:,} shots, {what}; next: viewsphere preview {made.recipe}")
+    what = quantity(made.models, "model") if made.models else "a model of the zoo's, as the data set has none"
+    say(f"wrote {made.recipe}: {quantity(made.shots, 'shot')}, {what}; next: viewsphere preview {made.recipe}")
 
 
 def _new_start(folder: Path, kind: str) -> None:
@@ -296,7 +297,7 @@ def preview(
     for warning in small_objects(samples, recipe):
         say(f"warning: {warning}", err=True)
     write_picture(output, contact_sheet(samples, names, columns, before=before))
-    say(f"wrote {output} ({len(samples)} frames)")
+    say(f"wrote {output} ({quantity(len(samples), 'frame')})")
 
 
 def _write_video(source: Path, file: Path, draw: list[str], sequence: str | None) -> None:
@@ -312,8 +313,8 @@ def _write_video(source: Path, file: Path, draw: list[str], sequence: str | None
             bar.show(Progress("video", done, total))
 
         made = write_video(Dataset(source), file, draw, sequence, tell)
-    many = f"{made.sequences} sequences" if made.sequences > 1 else "1 sequence"
-    say(f"wrote {file} ({many}, {made.pictures} pictures, {made.seconds:g} s)")
+    many = f"{quantity(made.sequences, 'sequence')}, {quantity(made.pictures, 'picture')}"
+    say(f"wrote {file} ({many}, {made.seconds:g} s)")
 
 
 def render(
@@ -391,9 +392,20 @@ def render(
             )
         except KeyboardInterrupt:
             bar.stop()
-            say(f"stopped; {bar.kept}. Run the same command to go on", err=True)
+            say(f"stopped; {_kept(output)}. Run the same command to go on", err=True)
             raise typer.Exit(130) from None
     print_summary(summary, json_)
+
+
+def _kept(output: Path) -> str:
+    """How many frames of a stopped run the data set holds, as `status` counts them."""
+    from viewsphere.run.status import status
+
+    try:
+        found = status(output)
+    except StoreError:  # stopped before the store was made
+        return "nothing was finished yet"
+    return f"{found.finished:,} of {quantity(found.frames, 'frame')} are kept"
 
 
 def _estimate(recipe: Recipe, workers: int | None) -> Estimate:

@@ -16,7 +16,7 @@ import typer
 
 from viewsphere.aside import write_whole
 from viewsphere.errors import UserError, ViewsphereError
-from viewsphere.printable import printable
+from viewsphere.model.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.check import Report
@@ -82,7 +82,7 @@ def print_json(value: object) -> None:
 def print_plan(planned: Plan) -> None:
     """Print the counts of a plan, and its warnings."""
     splits = ", ".join(f"{name} {count:,}" for name, count in planned.split_counts.items())
-    say(f"{planned.recipe.name}: {planned.factors} = {planned.frames:,} frames ({splits})")
+    say(f"{planned.recipe.name}: {planned.factors} = {quantity(planned.frames, 'frame')} ({splits})")
     for warning in planned.warnings:
         say(f"warning: {warning}", err=True)
 
@@ -119,7 +119,7 @@ def print_report(report: Report, repaired: Sequence[str] = ()) -> None:
         say(f"repaired: {line}")
     failed = Counter(finding.check for finding in report.findings)
     for name, count in report.checked.items():
-        found = f"{failed[name]:,} finding{'' if failed[name] == 1 else 's'}" if failed[name] else "ok"
+        found = quantity(failed[name], "finding") if failed[name] else "ok"
         say(f"{name:17} {found:14} {count:,} checked")
     for name, reason in report.not_run.items():
         say(f"not run: {name}: {reason}")
@@ -128,7 +128,7 @@ def print_report(report: Report, repaired: Sequence[str] = ()) -> None:
     for finding in report.findings[:MOST_FINDINGS]:
         say(f"failed: {finding}", err=True)
     if len(report.findings) > MOST_FINDINGS:
-        say(f"and {len(report.findings) - MOST_FINDINGS:,} findings more; --json lists all", err=True)
+        say(f"and {quantity(len(report.findings) - MOST_FINDINGS, 'finding')} more; --json lists all", err=True)
     say(report.verdict)
 
 
@@ -138,7 +138,7 @@ def _print_warnings(warnings: Warnings) -> None:
     for line in lines[:MOST_FINDINGS]:
         say(f"warning: {line}", err=True)
     if len(lines) > MOST_FINDINGS:
-        say(f"and {len(lines) - MOST_FINDINGS:,} warnings more; --json lists all", err=True)
+        say(f"and {quantity(len(lines) - MOST_FINDINGS, 'warning')} more; --json lists all", err=True)
 
 
 def _shared(what: str, warnings: Mapping[str, Sequence[str]]) -> Iterator[str]:
@@ -162,9 +162,9 @@ def print_summary(summary: Summary, as_json: bool) -> None:
     _print_warnings(summary.warnings)
     for note in summary.notes:
         say(note)
-    rate = f", {_rate(summary.rendered, summary.seconds)}" if summary.rendered else ""
+    rate = f" at {_rate(summary.rendered, summary.seconds)}, models and formats included" if summary.rendered else ""
     formats = ", ".join(summary.formats) or "no format asked for"
-    say(f"{summary.root}: {summary.frames:,} frames ({summary.rendered:,} new{rate}); {formats}")
+    say(f"{summary.root}: {quantity(summary.frames, 'frame')} ({summary.rendered:,} new{rate}); {formats}")
 
 
 def print_formats(found: Sequence[Listed]) -> None:
@@ -183,7 +183,7 @@ def print_status(found: Status) -> None:
     """Print how far a data set is, and the runs at work on it."""
     counts = f"{found.finished:,} finished, {found.under_way:,} under way, {found.left_out:,} left out"
     waiting = found.missing - found.under_way
-    say(f"{found.root}: {found.frames:,} frames: {counts}, {waiting:,} missing{_share_done(found)}")
+    say(f"{found.root}: {quantity(found.frames, 'frame')}: {counts}, {waiting:,} missing{_share_done(found)}")
     if found.models:
         say(f"models to be made: {_some(found.models)}")
     for run in found.runs:
@@ -227,7 +227,6 @@ class ProgressBar:
     """A line for each phase: work done, frames a second, time left."""
 
     def __init__(self, quiet: bool) -> None:
-        self.kept = "nothing was finished yet"
         self._quiet = quiet
         self._bars: dict[str, Any] = {}
         self._rich: Any = None
@@ -258,8 +257,6 @@ class ProgressBar:
         """A listener for `generate`."""
 
         def listen(progress: Progress) -> None:
-            if progress.phase == "frames":
-                self.kept = f"{progress.done:,} of {progress.total:,} frames are kept"
             if self._rich is None:
                 return
             if progress.phase not in self._bars:

@@ -16,6 +16,7 @@ from viewsphere.model.channel import picture_of
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import Size
 from viewsphere.model.notebook import Shown
+from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.shot import Shot
 
@@ -195,7 +196,7 @@ class Sample(Shown):
     def __repr__(self) -> str:
         size = f"{self.width} x {self.height} pixels"
         taken = f"{self.sequence}, {self.sensor}, {self.time:g} s, " if self.sequence else ""
-        objects = "1 object" if len(self.objects) == 1 else f"{len(self.objects)} objects"
+        objects = quantity(len(self.objects), "object")
         return f"<Sample {self.index} ({self.split}): {taken}{size}, {objects}; {', '.join(self.channels)}>"
 
     @property

@@ -12,6 +12,7 @@ from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Format
 from viewsphere.model.mistakes import one_of
+from viewsphere.model.quantity import quantity
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.run.preparing import Entries, leaves_out, prepared, targets
 from viewsphere.run.progress import Listener, Progress, unheard
@@ -75,8 +76,8 @@ def _lacks(dataset: Dataset) -> Iterator[str]:
     there = len(Dataset(dataset.root)) if dataset.choice.is_some else len(dataset)
     if there < dataset.plan.frames:
         yield (
-            f"{dataset.root}: {there:,} of {dataset.plan.frames:,} frames are there to export; viewsphere status says what "
-            "became of the others"
+            f"{dataset.root}: {there:,} of {quantity(dataset.plan.frames, 'frame')} are there to export; "
+            "viewsphere status says what became of the others"
         )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from viewsphere.errors import UserError
 from viewsphere.model.mistakes import shown
 from viewsphere.model.notebook import Shown
+from viewsphere.model.quantity import quantity
 from viewsphere.model.sample import Sample
 from viewsphere.model.share import Share
 from viewsphere.recipe.recipe import Recipe
@@ -43,7 +44,7 @@ class Frames(Shown, Iterable[Sample]):
 
     def __repr__(self) -> str:
         loops = "endless" if self._epochs is None else f"epochs {self._epochs}"
-        return f"<Frames of {self.plan.recipe.name}: {self.plan.frames:,} frames, {loops}, next epoch {self.epoch}>"
+        return f"<Frames of {self.plan.recipe.name}: {quantity(self.plan.frames, 'frame')}, {loops}, next epoch {self.epoch}>"
 
     def __len__(self) -> int:
         """Frames of a loop, of this shard or rank alone; raises TypeError where loops are endless."""

@@ -25,6 +25,7 @@ from viewsphere.labels import (
 )
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.credit import Credit
+from viewsphere.model.quantity import quantity
 from viewsphere.model.sample import MERGED, ObjectAnnotation, Sample
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.sampling.pose_numbers import kept, names_of
@@ -130,13 +131,13 @@ def _check_whole(datasets: Sequence[Dataset]) -> None:
         left = sum(index.samples for index in added) - sum(row.count for row in there if row.key not in own)
         if left and len(dataset) == dataset.plan.frames:
             raise StoreError(
-                f"{dataset.root}: expected all channels, found {left:,} frames that lack those that were added last: render it "
-                "to the end, or merge what is there with --keep-going"
+                f"{dataset.root}: expected all channels, found {quantity(left, 'frame')} that lack those that were added last: "
+                "render it to the end, or merge what is there with --keep-going"
             )
         if len(dataset) != dataset.plan.frames:
             raise StoreError(
-                f"{dataset.root}: expected {dataset.plan.frames:,} frames, found {len(dataset):,}: render it to the end, or "
-                "merge what is there with --keep-going"
+                f"{dataset.root}: expected {quantity(dataset.plan.frames, 'frame')}, found {len(dataset):,}: "
+                "render it to the end, or merge what is there with --keep-going"
             )
 
 

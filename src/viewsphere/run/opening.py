@@ -10,6 +10,7 @@ from viewsphere.errors import RecipeError, StoreError, UserError
 from viewsphere.formats import Format
 from viewsphere.labels import on_request
 from viewsphere.model.channel import PASSES, missing
+from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Sensor
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
@@ -108,7 +109,7 @@ def to_append(planned: Plan, store: Store) -> Portion:
     if left:
         frames = sum(gap.frames for gap in left)
         raise StoreError(
-            f"{store.root}: expected a finished data set to append to, found {frames:,} frames missing (first shot "
+            f"{store.root}: expected a finished data set to append to, found {quantity(frames, 'frame')} missing (first shot "
             f"{left[0].first.key}): first render the recipe that they are of to the end (the last was {found.name!r})"
         )
     return extend(planned, found)

@@ -14,6 +14,7 @@ from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics, Scan
+from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.rigs import rig_of
@@ -118,7 +119,7 @@ def _angles(pose: Float) -> tuple[float, float, float]:
 def rig_lines(rig: Rig) -> Iterator[str]:
     """The rig as lines of text."""
     facts = sensor_facts(rig)
-    yield f"{len(facts)} sensors" if len(facts) > 1 else "1 sensor"
+    yield quantity(len(facts), "sensor")
     for one in facts:
         place, turn = (", ".join(f"{v:.6g}" for v in values) for values in (one.position, one.rotation))
         lens = f"{one.size[0]} x {one.size[1]}, {one.fov_deg[0]:.4g} x {one.fov_deg[1]:.4g} degrees"

@@ -13,6 +13,9 @@ from viewsphere.model.scene import IDENTITY, Vector
 
 Float = NDArray[np.float64]
 
+LARGE = 10.0
+"""Metres: a model that reaches farther, and encloses its camera, is in millimetres more often than a building."""
+
 
 def looking(viewpoint: Viewpoint, focus: Vector, **more: Any) -> Instant:
     """The instant at which a camera stands at a viewpoint; it looks at `focus` unless the viewpoint has a target of its own."""
@@ -42,7 +45,6 @@ def distance_problem(pose: Viewpoint, box: Float) -> str | None:
     if not inside_box(box, camera[None])[0]:
         return None
     reach = float(np.linalg.norm(box - target, axis=1).max())
-    return (
-        f"expected the camera outside the model; found distance {pose.distance:g} m (pose {pose.index}) inside its "
-        f"box, which reaches {reach:.3g} m"
-    )
+    millimetres = LARGE < reach < 1000 * pose.distance
+    remedy = "If the model is in millimetres, set `unit: mm`" if millimetres else "Set a larger `distance`"
+    return f"`distance` {pose.distance:g} m is inside the model, which reaches {reach:.3g} m (pose {pose.index}). {remedy}"

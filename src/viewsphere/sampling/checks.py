@@ -21,7 +21,7 @@ from viewsphere.recipe.rig import SensorList
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
 from viewsphere.recipe.viewpoints import Jitter, Normal, Sphere
-from viewsphere.sampling.layouts import check_layout
+from viewsphere.sampling.layouts import check_layout, check_orientation
 from viewsphere.sampling.models import count_models
 from viewsphere.sampling.viewpoints import Poses
 
@@ -79,11 +79,13 @@ def check_names(recipe: Recipe) -> None:
     company = recipe.scene.company
     if company is not None:
         check_layout(company.layout, "scene.company")
+        check_orientation(company.orientation, "scene.company")
     samplers = plugins.names("samplers")
     if recipe.sampler not in samplers:
         raise RecipeError(f"scenes.sampler: {one_of(recipe.sampler, samplers)}")
     if isinstance(recipe.scenes, ScenesEntry):
         check_layout(recipe.scenes.layout, "scenes")
+        check_orientation(recipe.scenes.orientation, "scenes")
     for i, name in enumerate(recipe.channels):
         if name in on_request():
             raise RecipeError(f"channels[{i}]: expected a channel; found {name}, which is one of annotations")

@@ -18,6 +18,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
 from viewsphere.model.share import ALL, Share
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
@@ -70,9 +71,9 @@ class Portion(Sendable):
         plan, part = self.plan, self.part
         there = plan.frames - part.frames
         less = f" less {there:,} that are there" if there else ""
-        text = f"adds {part.frames:,} frames ({plan.factors}{less})"
+        text = f"adds {quantity(part.frames, 'frame')} ({plan.factors}{less})"
         for number, channels in part.supplies:
-            text += f", and {', '.join(channels)} to {self.record.parts[number].frames:,} frames that are there"
+            text += f", and {', '.join(channels)} to {quantity(self.record.parts[number].frames, 'frame')} that are there"
         return text
 
     @cached_property
@@ -302,7 +303,7 @@ def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterat
         problem = (
             f"no {'model' if part.is_product else 'scene'} {min(absent)!r}"
             if absent
-            else f"only {len(np.intersect1d(asked, poses)):,} of {len(poses):,} poses"
+            else f"only {len(np.intersect1d(asked, poses)):,} of {quantity(len(poses), 'pose')}"
             if not np.isin(poses, asked).all()
             else f"{'company' if part.is_product else 'scenes'} drawn from other models"
             if together

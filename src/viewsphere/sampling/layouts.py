@@ -22,6 +22,7 @@ from viewsphere.recipe.layout import Layout, options_of, placer_of
 from viewsphere.recipe.scenery import CompanyEntry
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.sampling.filling import shape_of
+from viewsphere.sampling.packages import check_packages
 from viewsphere.sampling.physics import EDITION
 from viewsphere.sampling.placing import Draws, Piece, Placer, Room, Shape, Way
 from viewsphere.sampling.scenery import composed
@@ -133,8 +134,17 @@ def laid(
 
 
 def check_layout(layout: Layout, field: str) -> None:
-    """Raise RecipeError for a placer that is not known, or for options that it does not have; the field's name comes first."""
-    _module(layout, field)
+    """See that a placer can place; raises RecipeError for an unknown one and for options that it does not have, which begins
+    with the field's name, and MissingExtraError for packages that it needs.
+    """
+    module, _ = _module(layout, field)
+    check_packages(getattr(module, "NEEDS", ()), "physics", f"{field}.layout: {placer_of(layout)}")
+
+
+def check_orientation(orientation: str, field: str) -> None:
+    """See that things can be turned in this way; raises MissingExtraError for packages that it needs."""
+    if orientation == "stable":
+        check_packages(("scipy",), "physics", f"{field}.orientation: stable")
 
 
 def has_ways(layout: Layout) -> bool:

@@ -22,6 +22,7 @@ from viewsphere.model.files import Files
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import step_key
 from viewsphere.model.notebook import Shown
+from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Shot
@@ -69,7 +70,7 @@ class Dataset(Shown, Sequence[Sample]):
         self._facts = lru_cache(maxsize=10_000)(self._model_facts)
 
     def __repr__(self) -> str:
-        return f"<Dataset {self.name} in {self.root}: {len(self):,} frames; {', '.join(self.plan.channels)}>"
+        return f"<Dataset {self.name} in {self.root}: {quantity(len(self), 'frame')}; {', '.join(self.plan.channels)}>"
 
     def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice]]:
         """A data set travels to other processes (data loaders) as its folder."""
@@ -305,7 +306,7 @@ class Dataset(Shown, Sequence[Sample]):
             if not isinstance(records, list) or not all(isinstance(record, dict) for record in records):
                 raise ValueError("no list of records")
             if row is None or len(records) != row.count:
-                raise ValueError(f"{len(records)} frames instead of {row and row.count}")
+                raise ValueError(f"{quantity(len(records), 'frame')} instead of {row and row.count}")
             if any(record.get("index") != row.first + i for i, record in enumerate(records)):
                 raise ValueError(f"other numbers of frames than {row.first} and on")
             if not all(isinstance(record.get(name, ""), str) for record in records for name in ("sequence", "split")):

@@ -13,6 +13,7 @@ from viewsphere.errors import UserError
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.labels import Field, object_labels, on_request, sample_labels
 from viewsphere.model.mistakes import one_of
+from viewsphere.model.quantity import quantity
 from viewsphere.model.sample import ObjectView, Rle, Sample
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class Selection(Sequence[dict[str, Any]]):
             raise UserError(f"{dataset.root}: select: sensor: expected one that took pictures; found {sensor!r}")
 
     def __repr__(self) -> str:
-        return f"<Selection of {self.dataset.name}: {len(self):,} frames; {', '.join(self.fields)}>"
+        return f"<Selection of {self.dataset.name}: {quantity(len(self), 'frame')}; {', '.join(self.fields)}>"
 
     def __len__(self) -> int:
         return len(self.dataset if self._numbers is None else self._numbers)

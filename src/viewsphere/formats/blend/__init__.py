@@ -36,6 +36,7 @@ from viewsphere.model.camera import Scan
 from viewsphere.model.files import Files
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Rig
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4, Scene
@@ -103,10 +104,11 @@ def _left_out(dataset: Dataset, groups: Collection[_Group]) -> Iterator[str]:
     if total and not written:
         raise UserError(f"{dataset.root}: format blend: expected frames with known {needs}; found none")
     if written < total:
-        yield f"{total - written:,} of {total:,} frames are left out: their {needs} are not known, or they are a LiDAR's"
+        left = f"{total - written:,} of {quantity(total, 'frame')} are left out"
+        yield f"{left}: their {needs} are not known, or they are a LiDAR's"
     unlit = sum(len(group.places[key]) for group in groups for key in group.places if dataset.store.shot(key) is None)
     if unlit:
-        yield f"nothing is known of the light of {unlit:,} frames: they have the default sun and sky"
+        yield f"nothing is known of the light of {quantity(unlit, 'frame')}: they have the default sun and sky"
 
 
 def _save(dataset: Dataset, folder: Path, groups: Collection[_Group]) -> Iterator[str]:

@@ -74,6 +74,7 @@ class Placer(Protocol):
     `around(cast, room, shapes, rng[, options])`, if there, gives the pieces of scenery that things stand in.
     `ways(cast, room, shapes, rng[, options])`, if there, gives the `Way` of each to its place.
     `IS_SLOW = True`: where things stand is not asked before frames are rendered.
+    `NEEDS`, if there, names the packages of the extra `physics` without which it cannot place.
     """
 
     def place(

@@ -22,6 +22,7 @@ from viewsphere.sampling.placing._dropping import Drop, Ground, Matter, poses_of
 from viewsphere.zoo.open_box import boards
 
 IS_SLOW = True
+NEEDS = ("mujoco", "scipy")
 
 FULL = 0.5
 """Share of a box's room that hulls of models which lie as they fall may fill at most; packings of alike ones reach 0.6."""

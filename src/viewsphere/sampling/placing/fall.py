@@ -20,6 +20,7 @@ from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, Way, draw
 from viewsphere.sampling.placing._dropping import Drop, Ground, Matter, poses_of, ways_of
 
 IS_SLOW = True
+NEEDS = ("mujoco", "scipy")
 
 LOOSE = 2.0
 """How many times as large as the things' boxes together the floor is over which they are let go."""

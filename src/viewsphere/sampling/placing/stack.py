@@ -26,6 +26,7 @@ from viewsphere.sampling.placing._spot import free_spot
 Float = NDArray[np.float64]
 
 IS_SLOW = True
+NEEDS = ("mujoco", "scipy")
 
 TRIES = 12
 """Orders and turns of one pile that are tried."""

@@ -10,6 +10,7 @@ from viewsphere.errors import RecipeError, each
 from viewsphere.model.listed import ListedObject
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.shot import Shot
@@ -55,7 +56,7 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
 
 def factors(stock: Stock) -> str:
     """The number of shots."""
-    return f"{len(stock.subjects):,} listed shots of {stock.models:,} models"
+    return f"{quantity(len(stock.subjects), 'listed shot')} of {quantity(stock.models, 'model')}"
 
 
 def blocks(stock: Stock) -> tuple[Block, ...]:

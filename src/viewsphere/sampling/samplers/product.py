@@ -8,6 +8,7 @@ from itertools import groupby
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor, Scene, Vector
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
@@ -31,14 +32,14 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
 def factors(stock: Stock) -> str:
     """Models, time steps and poses."""
     if not stock.timings:
-        return f"{stock.models:,} models x {len(stock.pose_list):,} poses"
+        return f"{quantity(stock.models, 'model')} x {quantity(len(stock.pose_list), 'pose')}"
     base = stock.pose_list.base if isinstance(stock.pose_list, TimedPoses) else stock.pose_list
     counts = {len(timing.steps) if timing else 0 for timing in stock.timings}
     if len(counts) > 1:
-        return f"{stock.models:,} models of different time steps, {len(base):,} poses"
+        return f"{quantity(stock.models, 'model')} of different time steps, {quantity(len(base), 'pose')}"
     moving = [timing.moving for timing in stock.timings if timing]
-    poses = "a pose each" if all(moving) else f"{len(base):,} poses{', of some a pose each' if any(moving) else ''}"
-    return f"{stock.models:,} models x {counts.pop():,} time steps x {poses}"
+    poses = "a pose each" if all(moving) else f"{quantity(len(base), 'pose')}{', of some a pose each' if any(moving) else ''}"
+    return f"{quantity(stock.models, 'model')} x {quantity(counts.pop(), 'time step')} x {poses}"
 
 
 def blocks(stock: Stock) -> tuple[Block, ...]:

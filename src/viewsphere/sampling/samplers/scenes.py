@@ -11,6 +11,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.recipe import Recipe
@@ -53,7 +54,7 @@ def factors(stock: Stock) -> str:
     """Scenes, and the poses of each."""
     entry = scenes_entry(stock.recipe)
     views = len(stock.pose_list) if entry.views is None else min(entry.views, len(stock.pose_list))
-    return f"{len(stock.subjects):,} scenes of {stock.models:,} models x {views:,} poses"
+    return f"{quantity(len(stock.subjects), 'scene')} of {quantity(stock.models, 'model')} x {quantity(views, 'pose')}"
 
 
 def blocks(stock: Stock) -> tuple[Block, ...]:

@@ -14,6 +14,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.labels import labels
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
@@ -59,9 +60,9 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
 
 def factors(stock: Stock) -> str:
     """Models or scenes, viewpoints and instants."""
-    what = "scenes" if stock.recipe.scenes is not None else "models"
+    subjects = quantity(len(stock.subjects), "model" if stock.recipe.scenes is None else "scene")
     views = sum(len(names) for names in _taken(stock).values())
-    return f"{len(stock.subjects):,} {what}, {views:,} sequences x {time_of(stock).count:,} instants"
+    return f"{subjects}, {quantity(views, 'sequence')} x {quantity(time_of(stock).count, 'instant')}"
 
 
 def blocks(stock: Stock) -> tuple[Block, ...]:

@@ -1,0 +1,16 @@
+"""Packages of extras, looked for before they are needed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib.util import find_spec
+
+from viewsphere.errors import MissingExtraError
+
+
+def check_packages(packages: Iterable[str], extra: str, what: str) -> None:
+    """See that packages of an extra are installed, importing none; raises MissingExtraError that begins with `what`."""
+    missing = [name for name in packages if find_spec(name) is None]
+    if missing:
+        names = " and ".join(missing)
+        raise MissingExtraError(f"{what} needs {names}, which is not installed: pip install 'viewsphere[{extra}]'")
