@@ -140,7 +140,7 @@ def test_a_preview_tells_all_models_that_cannot_be_used(tmp_path):
     file.write_text(near)
     answer = viewsphere("preview", file, "-o", tmp_path / "p.png")
     assert answer.returncode == 2
-    assert len(re.findall(r"expected the camera outside the model; .* \(model (?:chair|car)_000\)", answer.stderr)) == 2
+    assert len(re.findall(r"is inside the model, which reaches .* \(model (?:chair|car)_000\)", answer.stderr)) == 2
 
 
 def test_categories_that_coco_does_not_have_are_told(tmp_path):

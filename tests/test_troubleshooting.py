@@ -118,7 +118,7 @@ COMMANDS = {
     "set max_frames": "plan r.yaml --set max_frames=3",
     "which format <format> needs": "render r.yaml -o out --workers 0 --set channels=[instances] --format coco",
     "--format: <name> is unknown": "render r.yaml -o out --workers 0 --format kiti",
-    "the camera outside the model": "render r.yaml -o out --workers 0 --set viewpoints.distance=0.1",
+    "is inside the model": "render r.yaml -o out --workers 0 --set viewpoints.distance=0.1",
     "scene.company.count": "plan r.yaml --set scene.company=5",
     "expected columns": "plan r.yaml --set 'viewpoints={kind: file, path: short.csv}'",
     "expected a finite number": "plan r.yaml --set 'viewpoints={kind: file, path: walk.csv}'",

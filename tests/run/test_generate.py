@@ -177,7 +177,7 @@ def test_a_background_that_is_no_image_is_refused_before_rendering(how, tmp_path
 
 def test_a_recipe_can_be_mended_and_tried_again(tmp_path):
     near = small_recipe(viewpoints={"azimuth": 0, "elevation": 0, "distance": 0.05}, formats=[])
-    with pytest.raises(RecipeError, match="outside the model"):
+    with pytest.raises(RecipeError, match="inside the model"):
         generate(near, tmp_path / "out")
     mended = small_recipe(viewpoints={"azimuth": 0, "elevation": 0, "distance": 1}, formats=[])
     assert generate(mended, tmp_path / "out").frames == 2
@@ -193,7 +193,7 @@ def test_warnings_of_models_are_told(tmp_path):
 
 def test_camera_inside_the_model_is_refused_in_memory():
     near = small_recipe(viewpoints={"azimuth": 0, "elevation": 0, "distance": 0.05})
-    with pytest.raises(RecipeError, match="outside the model"):
+    with pytest.raises(RecipeError, match="inside the model"):
         next(vs.render(near))
 
 

@@ -181,8 +181,8 @@ def test_plan_notes_it_and_succeeds(folder, tmp_path):
     file = tmp_path / "recipe.yaml"
     file.write_text(recipe(folder).to_yaml())
     told = viewsphere("plan", file)
-    assert told.returncode == 0 and told.stdout.count("note: no licence is known of 2 models, 0, 1: ") == 1
-    assert json.loads(viewsphere("plan", file, "--json").stdout)["notes"][0].startswith("no licence is known of 2 models")
+    assert told.returncode == 0 and told.stdout.count("note: 2 models have no licence (0, 1). ") == 1
+    assert json.loads(viewsphere("plan", file, "--json").stdout)["notes"][0].startswith("2 models have no licence")
     file.write_text(recipe(folder, credit=MAKER).to_yaml())
     assert "note" not in viewsphere("plan", file).stdout
 

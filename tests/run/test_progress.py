@@ -57,13 +57,12 @@ def test_frames_of_a_worker_that_dies_are_not_counted_twice(tmp_path):
     assert tree_hash(tmp_path / "killed") == tree_hash(tmp_path / "whole")  # nothing that it began is left
 
 
-def test_the_bar_moves_within_a_shot_but_keeps_only_what_is_finished():
+def test_the_bar_moves_within_a_shot():
     with ProgressBar(quiet=False) as bar:
         bar.show(Progress("frames", 100, 400, 40))
         bar.show(Progress("frames", 100, 400, 40, 30))
         (task,) = bar._rich.tasks
         assert (task.completed, task.total) == (130, 400)
-        assert bar.kept == "100 of 400 frames are kept"
 
 
 def test_the_bar_tells_the_machines_of_a_cluster():

@@ -52,7 +52,7 @@ def test_the_zoo_has_the_project_s_licence_unless_its_entry_says_another(planned
 
 def test_the_plan_names_models_without_a_licence_in_one_line(planned):
     (note,) = planned(entry(), table=HEAD + "a.obj,MIT,,\nb.obj,,They,\n").notes
-    assert note.startswith("no licence is known of 2 models, b, c: ") and "\n" not in note
+    assert note.startswith("2 models have no licence (b, c). Set `licence:`") and "\n" not in note
     assert planned(entry(licence="MIT")).notes == ()
 
 
@@ -60,7 +60,7 @@ def test_many_models_without_a_licence_are_counted(planned, tmp_path):
     for i in range(20):
         (tmp_path / f"m{i:02d}.obj").write_text("x")
     (note,) = planned(entry("m*.obj")).notes
-    assert note.startswith("no licence is known of 20 models, m00, m01, m02, m03, m04 and 15 more: ")
+    assert note.startswith("20 models have no licence (m00, m01, m02, m03, m04 and 15 more). ")
 
 
 def test_credits_are_no_part_of_a_digest(planned):

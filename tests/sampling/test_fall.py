@@ -108,7 +108,7 @@ def test_mass_friction_and_restitution_may_be_drawn_for_each():
         ({"kind": "fall", "restitution": 2}, r"scenes\.layout\.restitution"),
         ({"kind": "fall", "fricton": 0.5}, r"scenes\.layout.*fricton.*did you mean 'friction'"),
         ({"kind": "row", "friction": 0.5}, r"scenes\.layout: expected no options, row has none; found friction"),
-        ({"kind": "fal"}, r"scenes\.layout.*'fal'; did you mean 'fall'"),
+        ({"kind": "fal"}, r"scenes\.layout.*'fal' is unknown; did you mean 'fall'"),
         ({"kind": "container", "size": [0.3, 0, 0.3]}, r"scenes\.layout\.size"),
     ],
 )

@@ -38,11 +38,12 @@ from viewsphere.cli.terminal import (
 )
 from viewsphere.errors import StoreError, UserError
 from viewsphere.model.quantity import quantity
-from viewsphere.recipe.starts import FIRST, kinds, start
+from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
 
 if TYPE_CHECKING:
     from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.estimate import Estimate
+    from viewsphere.sampling.plan import Plan
 
 
 def new(
@@ -71,7 +72,7 @@ def new(
         ),
     ] = None,
 ) -> None:
-    """Write a commented recipe to start from, for some kinds with a script; or one that renders a data set again."""
+    """Write a commented recipe to start from, of the models in FOLDER if any lie there; or one of a data set."""
     if from_ is not None:
         if kind is not None:
             raise UserError(f"new: expected --kind or --from; found --kind {kind} and --from {from_[0]}: leave one of them out")
@@ -99,16 +100,26 @@ def _new_start(folder: Path, kind: str) -> None:
 
         raise UserError(f"--kind: {one_of(kind, kinds())}")
     file = folder if folder.suffix in {".yaml", ".yml"} else folder / "recipe.yaml"
+    models = _models_in(file.parent)
     found = {file if name == "recipe.yaml" else file.parent / name: text for name, text in start(kind).items()}
+    if models:
+        found[file] = with_models(found[file], file.parent.absolute().name, models)
     for path in found:
         if path.exists():
             raise UserError(f"{path}: expected a new file, found one that exists: choose another folder")
-    with ExitStack() as undo:
-        for path, text in found.items():
-            write_whole(path, text.encode())
-            undo.callback(path.unlink)
-        undo.pop_all()
-    say(f"wrote {' and '.join(map(str, found))}; next: viewsphere preview {file}")
+    for path, text in found.items():
+        write(path, text.encode())
+    of = f" of {quantity(sum(one.number for one in models), 'model file')}" if models else ""
+    say(f"wrote {' and '.join(map(str, found))}{of}; next: viewsphere preview {file}")
+
+
+def _models_in(folder: Path) -> tuple[FoundFiles, ...]:
+    """The model files that lie in a folder, if it is there."""
+    if not folder.is_dir():
+        return ()
+    from viewsphere.sampling.models import files_below
+
+    return tuple(FoundFiles(*found) for found in files_below(folder))
 
 
 def schema() -> None:
@@ -204,6 +215,10 @@ def plan(
     estimate: Annotated[
         bool, typer.Option("--estimate", help="Also make a few frames in a temporary folder, and say what all will take.")
     ] = False,
+    models: Annotated[
+        bool,
+        typer.Option("--models", help="Also read every model: report unusable files, and cameras inside of models."),
+    ] = False,
     workers: Annotated[
         int | None,
         typer.Option(min=0, help="Processes that the estimate is for; default: one a core.", show_default=False),
@@ -211,7 +226,7 @@ def plan(
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:
-    """Say what a recipe would make: models, poses, frames, splits. Without --estimate no model is read, but its sidecar is."""
+    """Report what a recipe would make: models, poses, frames, splits. No mesh is read without --models or --estimate."""
     from viewsphere.run.opening import check_formats, prepare
     from viewsphere.sampling.plan import check_sidecars
 
@@ -223,6 +238,7 @@ def plan(
         print_plan(planned)
         for note in planned.notes:
             say(f"note: {note}")
+    said = _model_warnings(planned, json_) if models else ()
     cost = _estimate(loaded, workers) if estimate else None
     counts = {
         "name": planned.recipe.name,
@@ -237,7 +253,7 @@ def plan(
                 **counts,
                 "splits": dict(planned.split_counts),
                 "shots": planned.shot_count,
-                "warnings": list(planned.warnings),
+                "warnings": [*planned.warnings, *said],
                 "notes": list(planned.notes),
                 **({"estimate": asdict(cost)} if cost else {}),
             }
@@ -395,6 +411,16 @@ def render(
             say(f"stopped; {_kept(output)}. Run the same command to go on", err=True)
             raise typer.Exit(130) from None
     print_summary(summary, json_)
+
+
+def _model_warnings(planned: Plan, quiet: bool) -> tuple[str, ...]:
+    from viewsphere.run.model_check import check_models
+
+    with ProgressBar(quiet) as bar:
+        said = check_models(planned, bar.show)
+    for line in () if quiet else said:
+        typer.echo(f"warning: {line}", err=True)
+    return said
 
 
 def _kept(output: Path) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
@@ -10,7 +12,7 @@ from itertools import islice
 from pathlib import Path
 
 from viewsphere.aside import aside
-from viewsphere.errors import UserError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.recipe.formats import Formats, read_formats
 from viewsphere.run.exporting import linked, writable, write
 from viewsphere.run.importing import put_in_store, read_dataset
@@ -57,19 +59,26 @@ def convert(
     with ExitStack() as whole:
         folders = [(entry, whole.enter_context(new_folder(located(out) / entry.name))) for entry in entries]
         store = whole.enter_context(aside(folders[0][1].parent)) / "store"  # on the same disk, for links
-        with _told_of(store, foreign, source):
+        with _told_of(store, foreign, source, located(out)):
             put_in_store(foreign, store, listener)
             dataset = Dataset(store)
             notes = write(dataset, folders, listener or unheard, workers)
         return Converted(len(dataset), foreign.left_out, tuple(dict.fromkeys(notes)) + tuple(linked(dataset, out)))
 
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a disk that takes no more data."""
+
+
 @contextmanager
-def _told_of(store: Path, foreign: ForeignDataset, source: Path | str) -> Generator[None]:
-    """Tell the user's mistakes of the source, and not of a store that nobody sees."""
+def _told_of(store: Path, foreign: ForeignDataset, source: Path | str, out: Path) -> Generator[None]:
+    """Report errors as the source's, or as the output's where its disk is full, and not as those of a store that goes."""
     try:
         yield
     except UserError as error:
+        full = next((reason for reason in map(os.strerror, FULL) if reason in str(error)), None)
+        if full is not None:
+            raise StoreError(f"{out}: the disk takes no more data ({full}). Free some room, or choose another folder") from None
         found = re.search(rf"{re.escape(str(store))}\S*/(\w+)/(\d{{8}})\.\w+: ", str(error))
         if found is None:
             raise type(error)(str(error).replace(str(store), str(source))) from None

@@ -14,6 +14,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.credit import Credit
 from viewsphere.model.mistakes import report, shown
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import first_few, quantity
 from viewsphere.recipe.models import ZOO
 from viewsphere.sampling.tables import Cells, table_rows
 
@@ -23,9 +24,6 @@ TABLE = "credits.csv"
 COLUMNS = ("file", *Credit.model_fields)
 
 ZOO_CREDIT = Credit(licence="Apache-2.0", attribution="The viewsphere contributors")
-
-MOST_NAMED = 5
-"""Models that a note names."""
 
 Table = Mapping[str, Credit]
 """Credits by the files' names, or patterns of them."""
@@ -45,11 +43,8 @@ def unlicensed(keys: Iterable[str], known: Mapping[str, Credit]) -> Iterator[str
     """One line that names the models whose licence is not known; none if there is no such model."""
     keys = [key for key in keys if key not in known or known[key].licence is None]
     if keys:
-        more = f" and {len(keys) - MOST_NAMED:,} more" if len(keys) > MOST_NAMED else ""
-        yield (
-            f"no licence is known of {len(keys):,} model{'s' if len(keys) > 1 else ''}, {', '.join(keys[:MOST_NAMED])}{more}: "
-            f"say licence in models, or list their files in a {TABLE} beside them"
-        )
+        have = f"{quantity(len(keys), 'model')} {'have' if len(keys) > 1 else 'has'} no licence ({first_few(keys)})"
+        yield f"{have}. Set `licence:` in the recipe, or add a {TABLE} next to the files"
 
 
 def _looked_up(spec: ModelSpec, table: Callable[[Path, bool], Table]) -> Credit | None:

@@ -6,7 +6,7 @@ import hashlib
 import math
 import os
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cache
@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Literal
 
 from viewsphere.assets.inside import split_source
-from viewsphere.assets.load import BLENDER_SUFFIXES
-from viewsphere.errors import RecipeError, each
+from viewsphere.assets.load import BLENDER_SUFFIXES, UP, check_source
+from viewsphere.blender.interpreter import find_blender
+from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.limits import limits
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.mistakes import nearest, one_of
@@ -90,6 +91,8 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
 
     def numbered(found: _Found) -> tuple[ModelSpec, int]:
         entry = recipe.models[found.entry]
+        if not found.in_zoo:
+            _check_file(entry, found)
         category = _category(entry, found.source)
         spec = ModelSpec(
             key=found.key,
@@ -115,6 +118,46 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
         return spec, found.entry
 
     return tuple(each(numbered, _with_unique_keys([*chain.from_iterable(found)])))
+
+
+def files_below(folder: Path) -> Iterator[tuple[str, int, str]]:
+    """Of the model files in a folder and those below: a pattern of each folder and suffix, how many files it names, and their
+    folder's name in words; those that only Blender reads are among them.
+    """
+    endings = MODEL_SUFFIXES | {f".{suffix}" for suffix in BLENDER_SUFFIXES}
+    groups = Counter((file.parent, file.suffix) for file in _below(folder) if file.suffix.lower() in endings and file.is_file())
+    for (parent, suffix), count in sorted(groups.items()):
+        named = parent if parent != folder else folder.absolute()
+        yield (
+            (parent.relative_to(folder) / f"*{suffix}").as_posix(),
+            count,
+            re.sub(r"[_-]+", " ", named.name).strip() or "model",
+        )
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    return (f for f in folder.rglob("*") if not any(map(_is_hidden, f.relative_to(folder).parts)))
+
+
+def _check_file(entry: ModelEntry, found: _Found) -> None:
+    """See, by its name alone, that a file can be read as the entry says.
+
+    Raises RecipeError for a kind of file that is not read and a forward along the file's up axis, MissingExtraError where
+    Blender reads such files and is not installed.
+    """
+    where, path = f"models[{found.entry}]", Path(found.source)
+    try:
+        suffix = check_source(path)
+    except ModelError as error:
+        raise RecipeError(f"{where}.source: {error}") from None
+    if suffix in BLENDER_SUFFIXES:
+        find_blender()
+    up = UP.get(suffix)
+    if up and entry.up is None and entry.forward is not None and entry.forward[1] == up:
+        raise RecipeError(
+            f"{where}.forward: {entry.forward} lies along +{up}, which is up in {suffix} files. Set `up:`, too, or another "
+            "`forward:`"
+        )
 
 
 def categories(recipe: Recipe) -> tuple[Category, ...]:
@@ -282,7 +325,7 @@ def _candidates(folder: Path, source: str, where: str) -> list[Path]:
     if split_source(path)[0].is_file():
         return [path]
     if path.is_dir():
-        return [f for f in below(path, where) if not any(map(_is_hidden, f.relative_to(path).parts))]
+        return list(_below(path))
     if has_magic(source):
         return matching(folder, source, where)
     kinds = "a file, folder, pattern or zoo:<family>"

@@ -171,7 +171,7 @@ class Plan(Shown, Stock):
             found.append(
                 f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
             )
-        doubts: Iterator[str] = out_of_view(scene, self.pose_list, self.intrinsics)
+        doubts: Iterator[str] = out_of_view(self.recipe, self.pose_list, self.intrinsics)
         for name, recipe in self.recipe.conditions.items():
             found += (
                 message.replace("scene", f"variations.{name}", 1) if name else message for message in _unlit(recipe.scene)

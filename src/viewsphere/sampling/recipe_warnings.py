@@ -74,19 +74,22 @@ def hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
         yield f"scene.view.exposure: at {high:g} stops black is white, and so is the picture; lower it, or the lights' strength"
 
 
-def out_of_view(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[str]:
-    """A warning if the models' centre is in no picture, or jitter moves it out of some.
+def out_of_view(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
+    """A warning if the models' centre is in no picture, or jitter moves it out of some; of scenes it is not known.
 
     How large the models are is not known yet: near ones may still be seen.
     """
+    scene = recipe.scene
     if lens.distortion is not None or not views.are_known:
         return
     widest = math.hypot(max(lens.cx, lens.width - lens.cx) / lens.fx, max(lens.cy, lens.height - lens.cy) / lens.fy)
     chosen = _some(views)
     centres = [views.target(i) for i in chosen]
     away = [_offset(views, i) for i in chosen]
-    if not scene.is_composed and all(
-        c is not None and _misses(np.array([c]), d, widest) for c, d in zip(centres, away, strict=True)
+    if (
+        recipe.scenes is None
+        and not scene.is_composed
+        and all(c is not None and _misses(np.array([c]), d, widest) for c, d in zip(centres, away, strict=True))
     ):
         yield (
             "viewpoints: the models' centre, which stands at the origin, is in no picture: pictures may be empty; "

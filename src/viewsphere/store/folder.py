@@ -28,6 +28,7 @@ from viewsphere.store.heartbeat import Heartbeat, Pulse
 from viewsphere.store.index import Index, Row
 from viewsphere.store.manifest import MANIFEST, Manifest, refuse_another
 from viewsphere.store.moving import move
+from viewsphere.store.other_files import other_files
 from viewsphere.store.paths import file_inside
 from viewsphere.store.places import place_of
 from viewsphere.store.places.local import NEW, disk_errors
@@ -238,7 +239,9 @@ class Store:
         found = self.plan()
         if found.digest != plan.digest:
             differing = different(found.recipe, plan.recipe)
-            what = f"another in {', '.join(differing)}" if differing else "one whose files have other names"
+            if not differing:
+                raise StoreError(f"{self.root}: {other_files(found.models, plan.models)}")
+            what = f"another in {', '.join(differing)}"
             raise StoreError(
                 f"{self.root}: expected data of recipe {plan.name!r} (digest {plan.digest[:12]}), found that of "
                 f"{found.name!r} ({found.digest[:12]}), {what}: choose another output folder, add to it with --append, or "
