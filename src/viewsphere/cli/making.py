@@ -107,8 +107,11 @@ def _new_start(folder: Path, kind: str) -> None:
     for path in found:
         if path.exists():
             raise UserError(f"{path}: expected a new file, found one that exists: choose another folder")
-    for path, text in found.items():
-        write(path, text.encode())
+    with ExitStack() as undo:
+        for path, text in found.items():
+            write_whole(path, text.encode())
+            undo.callback(path.unlink)
+        undo.pop_all()
     of = f" of {quantity(sum(one.number for one in models), 'model file')}" if models else ""
     say(f"wrote {' and '.join(map(str, found))}{of}; next: viewsphere preview {file}")
 
@@ -419,7 +422,7 @@ def _model_warnings(planned: Plan, quiet: bool) -> tuple[str, ...]:
     with ProgressBar(quiet) as bar:
         said = check_models(planned, bar.show)
     for line in () if quiet else said:
-        typer.echo(f"warning: {line}", err=True)
+        say(f"warning: {line}", err=True)
     return said
 
 

@@ -17,6 +17,7 @@ import typer
 from viewsphere.aside import write_whole
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.model.quantity import quantity
+from viewsphere.printable import printable
 
 if TYPE_CHECKING:
     from viewsphere.check import Report

@@ -125,18 +125,16 @@ def files_below(folder: Path) -> Iterator[tuple[str, int, str]]:
     folder's name in words; those that only Blender reads are among them.
     """
     endings = MODEL_SUFFIXES | {f".{suffix}" for suffix in BLENDER_SUFFIXES}
-    groups = Counter((file.parent, file.suffix) for file in _below(folder) if file.suffix.lower() in endings and file.is_file())
+    found = (file for file in _shown(folder, "new") if file.suffix.lower() in endings and file.is_file())
+    groups = Counter((file.parent, file.suffix) for file in found)
     for (parent, suffix), count in sorted(groups.items()):
-        named = parent if parent != folder else folder.absolute()
-        yield (
-            (parent.relative_to(folder) / f"*{suffix}").as_posix(),
-            count,
-            re.sub(r"[_-]+", " ", named.name).strip() or "model",
-        )
+        pattern = (parent.relative_to(folder) / f"*{suffix}").as_posix()
+        yield pattern, count, re.sub(r"[_-]+", " ", parent.absolute().name).strip() or "model"
 
 
-def _below(folder: Path) -> Iterator[Path]:
-    return (f for f in folder.rglob("*") if not any(map(_is_hidden, f.relative_to(folder).parts)))
+def _shown(folder: Path, where: str) -> list[Path]:
+    """All files and folders below a folder that are not hidden."""
+    return [file for file in below(folder, where) if not any(map(_is_hidden, file.relative_to(folder).parts))]
 
 
 def _check_file(entry: ModelEntry, found: _Found) -> None:
@@ -325,7 +323,7 @@ def _candidates(folder: Path, source: str, where: str) -> list[Path]:
     if split_source(path)[0].is_file():
         return [path]
     if path.is_dir():
-        return list(_below(path))
+        return _shown(path, where)
     if has_magic(source):
         return matching(folder, source, where)
     kinds = "a file, folder, pattern or zoo:<family>"
