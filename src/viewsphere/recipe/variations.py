@@ -53,22 +53,16 @@ def _as_written(entry: SceneEntry) -> dict[str, Any]:
 
 Change = Annotated[SceneEntry, AfterValidator(_of_light_alone), PlainSerializer(_as_written)]
 
-_Changes = Annotated[
-    dict[Name, Change],
-    Field(
-        min_length=1,
-        json_schema_extra={
-            "properties": {
-                PAIRED: {
-                    "type": "boolean",
-                    "default": False,
-                    "description": "whether equal distributions of several variations have equal draws",
-                }
-            }
-        },
-    ),
-    AfterValidator(_distinct),
-]
+
+def _with_paired(schema: dict[str, Any]) -> None:
+    """Let the JSON schema of variations have the key `paired`, which is no variation."""
+    changes = dict(schema.pop("patternProperties"))
+    schema["patternProperties"] = {pattern.replace("^", f"^(?!{PAIRED}$)", 1): change for pattern, change in changes.items()}
+    description = "whether equal distributions of several variations have equal draws"
+    schema["properties"] = {PAIRED: {"type": "boolean", "default": False, "description": description}}
+
+
+_Changes = Annotated[dict[Name, Change], Field(min_length=1, json_schema_extra=_with_paired), AfterValidator(_distinct)]
 
 
 class Variations(dict[str, SceneEntry]):
