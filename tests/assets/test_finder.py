@@ -11,8 +11,8 @@ from viewsphere.assets.finder import Finder, NotFoundError
 @pytest.fixture
 def find(write):
     """Find a reference from `asset/meshes/model.obj`, whose library may lie in another folder."""
-    finder = Finder(write("asset/meshes/model.obj", "v 0 0 0\n"))
-    return lambda reference, base=None: finder.find(reference, base).path
+    model = write("asset/meshes/model.obj", "v 0 0 0\n")
+    return lambda reference, base=None: Finder(model).find(reference, base).path
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import re
 import unicodedata
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import islice
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote
@@ -54,6 +55,8 @@ class Finder:
     confined: bool = True
     looked_for: dict[Path, None] = field(default_factory=dict[Path, None])
     _listings: dict[Path, dict[str, str]] = field(default_factory=dict[Path, dict[str, str]])
+    _found: dict[tuple[str, Path | None], Found | None] = field(default_factory=dict[tuple[str, "Path | None"], "Found | None"])
+    _files: dict[tuple[Path, ...], list[Path]] = field(default_factory=dict[tuple[Path, ...], list[Path]])
 
     def find(self, reference: str, base: Path | None = None) -> Found:
         """The file of a reference, which may be percent-encoded, in another case, or written with backslashes.
@@ -63,23 +66,41 @@ class Finder:
         NotFoundError.
         """
         names = self._names(reference)
-        folders = [self.model.parent] if base in (None, self.model.parent) else [self.model.parent, base]
-        for name, folder in ((name, folder) for name in names for folder in folders):
-            if not DRIVE.match(name) and (path := self._followed(folder, name)) is not None:
-                return Found(path)
-        known = [parent / name for parent, names in self._known(folders) for name in names]
-        for last, folder in ((PurePosixPath(name).name, folder) for name in names for folder in [*folders, *known]):
-            if last and (path := self._followed(folder, last)) is not None:
-                return Found(path, elsewhere=PurePosixPath(last) not in map(PurePosixPath, names))
-        raise NotFoundError(self._why(names, [*folders, *known]))
+        if (reference, base) not in self._found:
+            self._found[reference, base] = self._search(names, base)
+        if (found := self._found[reference, base]) is None:
+            raise NotFoundError(self._why(names, self._folders(base)))
+        return found
 
     def holds(self, reference: str, base: Path | None = None) -> bool:
         """Whether there is a file for a reference."""
         try:
-            self.find(reference, base)
+            names = self._names(reference)
         except NotFoundError:
             return False
-        return True
+        if (reference, base) not in self._found:
+            self._found[reference, base] = self._search(names, base)
+        return self._found[reference, base] is not None
+
+    def _search(self, names: list[str], base: Path | None) -> Found | None:
+        starts = [self.model.parent] if base in (None, self.model.parent) else [self.model.parent, base]
+        for name, folder in ((name, folder) for name in names for folder in starts):
+            if not DRIVE.match(name) and (path := self._followed(folder, name)) is not None:
+                return Found(path)
+        for last, folder in ((PurePosixPath(name).name, folder) for name in names for folder in self._folders(base)):
+            if last and (path := self._followed(folder, last)) is not None:
+                return Found(path, elsewhere=PurePosixPath(last) not in map(PurePosixPath, names))
+        return None
+
+    def _folders(self, base: Path | None) -> list[Path]:
+        """Folders in which a file counts by its last name alone."""
+        starts = [self.model.parent] if base in (None, self.model.parent) else [self.model.parent, base]
+        below = [start / name for start in starts for name in BELOW]
+        return [*starts, *below, *(self._root.parent / name for name in LAYOUTS)]
+
+    @cached_property
+    def _root(self) -> Path:
+        return _real(self.model.parent)
 
     def _names(self, reference: str) -> list[str]:
         """The reference as it is and percent-decoded, with slashes; a file: URL is a path."""
@@ -90,14 +111,9 @@ class Finder:
         name = name[len("file://") :] if url else name
         return [name for name in dict.fromkeys((name, unquote(name))) if "\0" not in name]
 
-    def _known(self, folders: Iterable[Path]) -> Iterator[tuple[Path, tuple[str, ...]]]:
-        for folder in folders:
-            yield folder, BELOW
-        yield _real(self.model.parent).parent, LAYOUTS
-
     def is_inside(self, path: Path) -> bool:
         """Whether a path, its links followed, lies in the asset's root."""
-        real, folder = _real(path), _real(self.model.parent)
+        real, folder = _real(path), self._root
         if real.is_relative_to(folder):
             return True
         beside = real.relative_to(folder.parent) if real.is_relative_to(folder.parent) else Path()
@@ -152,15 +168,20 @@ class Finder:
         """The file below these folders whose name resembles this one most, from the model's folder."""
         wanted = PurePosixPath(last.lower())
         kinds = PICTURES if wanted.suffix in PICTURES else {wanted.suffix}
-        files = {file: PurePosixPath(file.name.lower()) for file in islice(self._files(folders), NEAREST_AMONG)}
-        stems = {file: name.stem for file, name in files.items() if name.suffix in kinds}
+        stems = {file: PurePosixPath(file.name.lower()) for file in self._files_in(tuple(folders))}
+        stems = {file: name.stem for file, name in stems.items() if name.suffix in kinds}
         # 0.6, difflib's own threshold, is where names of one series (wood_1, wood_2) still count and others do not.
         close = difflib.get_close_matches(wanted.stem, list(stems.values()), 1, 0.6)
         best = [file for file, stem in stems.items() if [stem] == close]
-        return os.path.relpath(best[0], _real(self.model.parent)).replace(os.sep, "/") if best else None
+        return os.path.relpath(best[0], self._root).replace(os.sep, "/") if best else None
 
-    def _files(self, folders: Iterable[Path]) -> Iterator[Path]:
-        """Files that may be given, in these folders and the folders in them, each once."""
+    def _files_in(self, folders: tuple[Path, ...]) -> list[Path]:
+        """Files that may be given, in these folders and the folders in them."""
+        if folders not in self._files:
+            self._files[folders] = list(islice(self._walked(folders), NEAREST_AMONG))
+        return self._files[folders]
+
+    def _walked(self, folders: Iterable[Path]) -> Iterator[Path]:
         seen: set[Path] = set()
         for folder in map(_real, folders):
             places = [folder, *(folder / name for name in sorted(self._names_in(folder)))]
