@@ -55,7 +55,7 @@ POSITIONS = [
         "recipe.yaml:5: models[0].categry: 'categry' is unknown; did you mean 'category'? Valid: source, category, "
         "supercategory, count, name, "
         "frames, clip, fps, poses, motion, up, forward, unit, centring, real_size, scale, sidecar, symmetries, "
-        "keypoints, color, material, labels, confined, licence, attribution, source_url",
+        "keypoints, faces, color, material, labels, confined, licence, attribution, source_url",
     ),
     (("count: 2", "count: two"), "recipe.yaml:4: models[0].count: expected a whole number; found 'two'"),
     (("    - 30", "    - 99"), "recipe.yaml:8: viewpoints.elevation: expected elevations of -90 to 90 degrees; found 99"),
