@@ -1,6 +1,7 @@
 """PLY: all encodings, faces of any shape, strips, and colours and textures under all their names."""
 
 import io
+import time
 
 import numpy as np
 import pytest
@@ -270,3 +271,26 @@ def test_whatever_is_written_is_read_back(tmp_path_factory, made, encoding):
 def test_a_refusal_names_the_reason(write, data, reason):
     with pytest.raises(ModelError, match=reason):
         load_model(write("a.ply", data))
+
+
+@pytest.mark.slow
+def test_five_million_triangles_take_two_seconds_of_processor_time(tmp_path):
+    """Positions and faces; shading normals and the checks of any model come on top."""
+    side = 1583
+    grid = np.arange(side * side).reshape(side, side)
+    a, b, c, d = (corner.ravel() for corner in (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]))
+    rows = np.zeros(2 * len(a), [("count", "u1"), ("corners", "<i4", 3)])
+    rows["count"], rows["corners"] = 3, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    points = np.column_stack([grid.ravel() % side, grid.ravel() // side, np.zeros(side * side)]).astype("<f4")
+    head = ply([("vertex", XYZ, []), ("face", FACES, [])], "binary_little_endian").decode()
+    head = head.replace("vertex 0", f"vertex {len(points)}").replace("face 0", f"face {len(rows)}")
+    path = tmp_path / "a.ply"
+    path.write_bytes(head.encode() + points.tobytes() + rows.tobytes())
+    start = time.process_time()
+    folder = ModelFolder(path)
+    columns = read_elements(folder, folder.read_model()).columns
+    corners = columns["face"]["vertex_indices"].values.astype(np.int64)
+    positions = np.column_stack([columns["vertex"][axis] for axis in "xyz"])
+    assert time.process_time() - start < 2
+    assert len(corners) == 3 * len(rows) > 15_000_000
+    np.testing.assert_array_equal(positions[corners[-1]], [side - 2, side - 1, 0])

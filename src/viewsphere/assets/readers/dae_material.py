@@ -105,7 +105,7 @@ class _Coordinates:
         number = min(uvs, default=0)
         for bind in [] if self.instance is None else self.instance.iterfind("bind_vertex_input"):
             if bind.get("semantic") == wanted and bind.get("input_semantic") == "TEXCOORD":
-                number = int(bind.get("input_set") or 0)
+                number = int(text) if (text := str(bind.get("input_set"))).isdecimal() else 0
         number = number if number in uvs else min(uvs, default=0)
         if uvs and number not in self.sets and len(self.sets) < 2:
             self.sets.append(number)

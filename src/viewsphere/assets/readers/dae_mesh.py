@@ -19,6 +19,9 @@ from viewsphere.assets.smoothing import row_numbers
 from viewsphere.assets.srgb import linear
 
 LINES = frozenset({"lines", "linestrips"})
+WIDEST = 64
+"""Numbers of a row of a source, and indices of a corner, at most: real files have up to 16."""
+
 FACES = frozenset({"polylist", "polygons", "triangles", "trifans", "tristrips"})
 
 
@@ -62,16 +65,25 @@ class _Input:
 def _inputs(folder: ModelFolder, element: Any, sources: dict[str, Any], shared: dict[str, list[Any]]) -> list[_Input]:
     inputs: list[_Input] = []
     for entry in element.iterfind("input"):
-        offset, name = int(entry.get("offset", 0)), _target(entry)
+        offset, name = whole(folder, entry, "offset"), _target(entry)
         below = shared.get(name) if entry.get("semantic") == "VERTEX" else None
         for inner in [entry] if below is None else below:
             source = sources.get(_target(inner))
             if source is None:
                 raise folder.error(f"the source {_target(inner)[:80]!r} of a mesh does not exist; export the model again")
             semantic = str(inner.get("semantic"))
-            number = int(inner.get("set") or entry.get("set") or sum(one.semantic == semantic for one in inputs))
+            before = sum(one.semantic == semantic for one in inputs)
+            number = whole(folder, inner, "set", whole(folder, entry, "set", before))
             inputs.append(_Input("POSITION" if semantic == "VERTEX" else semantic, number, offset, _values(folder, source)))
     return inputs
+
+
+def whole(folder: ModelFolder, element: Any, attribute: str, default: int = 0) -> int:
+    """A whole number of at least 0 in an attribute; `default` where it is missing or empty."""
+    text = str(element.get(attribute) or default).strip()
+    if not (text.isascii() and text.isdecimal() and len(text) < 12):
+        raise folder.error(f"<{element.tag}> has {attribute} {text[:40]!r}: expected a whole number; the file may be damaged")
+    return int(text)
 
 
 def _target(element: Any) -> str:
@@ -83,14 +95,14 @@ def _values(folder: ModelFolder, source: Any) -> Float:
     array, accessor = source.find("float_array"), source.find("technique_common/accessor")
     numbers = numbers_of(folder, array, np.float64)
     params = [] if accessor is None else accessor.findall("param")
-    stride = int(accessor.get("stride") or 1) if accessor is not None else 3
-    offset = int(accessor.get("offset") or 0) if accessor is not None else 0
+    stride = 3 if accessor is None else whole(folder, accessor, "stride", 1)
+    offset = 0 if accessor is None else whole(folder, accessor, "offset")
     # A column without a name is skipped, but some programs name none.
     named = [i for i, param in enumerate(params) if param.get("name")] or list(range(len(params) or stride))
-    if stride < 1 or offset < 0 or max(named) >= stride:
+    if not 1 <= stride <= WIDEST or max(named) >= stride:
         raise folder.error(f"the source {str(source.get('id'))[:80]!r} has an accessor that is damaged; export the model again")
     rows = (len(numbers) - offset) // stride
-    count = min(int(accessor.get("count") or rows) if accessor is not None else rows, rows)
+    count = rows if accessor is None else min(whole(folder, accessor, "count", rows), rows)
     return numbers[offset : offset + max(count, 0) * stride].reshape(-1, stride)[:, named]
 
 
@@ -120,7 +132,9 @@ def _faces(folder: ModelFolder, element: Any, inputs: Sequence[_Input]) -> DaeFa
     position = next((one for one in inputs if one.semantic == "POSITION" and one.values.shape[1] == 3), None)
     if position is None:
         raise folder.error(f"a <{element.tag}> has no positions of three coordinates; export the model again")
-    width = 1 + max(int(entry.get("offset", 0)) for entry in element.iterfind("input"))
+    width = 1 + max(whole(folder, entry, "offset") for entry in element.iterfind("input"))
+    if width > WIDEST:
+        raise folder.error(f"a <{element.tag}> has an input of offset {width - 1:,}; the file may be damaged")
     index, counts = _corners(folder, element, width, position)
     if not len(counts):
         return None

@@ -176,8 +176,8 @@ class _Ply:
         if isinstance(number, np.ndarray):
             given[: len(number)] = number.astype(np.int64)
         if corner_uv is not None:
-            first = np.cumsum(counts) - counts
-            given[np.isnan(corner_uv[first, 0])] = -1
+            owner = np.repeat(np.arange(len(counts)), counts)
+            given[owner[np.isnan(corner_uv[:, 0])]] = -1
         if pictures and (given >= pictures).any():
             self.folder.warn(f"faces name texture {given.max()}, of {pictures} in the file (from 0); they are plain")
         return np.where((given < 0) | (given >= pictures), 0, given + 1)

@@ -297,7 +297,7 @@ class _Table:
                 skip += size
         try:
             at = _walk(self.data, at, self.element.rows, steps, skip)
-        except (struct.error, ValueError):
+        except (struct.error, ValueError, OverflowError):  # a list as long as NaN or infinity
             raise self._truncated() from None
         if at > len(self.data):
             raise self._truncated()
