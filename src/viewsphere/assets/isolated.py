@@ -24,7 +24,9 @@ LOG = "log.txt"
 READ_HERE = "VIEWSPHERE_READ_HERE"
 """Set to 1, this variable lets models be read in the calling process, unprotected."""
 
-SINGLE_THREADED = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+SINGLE_THREADED = {
+    name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "PXR_WORK_THREAD_LIMIT")
+}
 """Threads reserve address space, which is limited, and readers have no use for them."""
 
 

@@ -11,6 +11,7 @@ from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.primitive import FileFacts
+from viewsphere.assets.readers import usd
 from viewsphere.errors import ModelError
 
 SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")
@@ -19,6 +20,7 @@ BLENDER_SUFFIXES = ("abc", "blend", "fbx", "usd", "usda", "usdc", "usdz")
 GLTF = ("glb", "gltf")
 UP = {"glb": "y", "gltf": "y", "obj": "y", "3mf": "z", "ply": "z", "stl": "z", "off": "z"}
 """The axis that is up in files of each suffix; other formats say it in the file."""
+USD = ("usd", "usda", "usdc", "usdz")
 ANIMATED_SUFFIXES = (*BLENDER_SUFFIXES, *GLTF)
 PICTURE_SUFFIXES = ("bmp", "jpeg", "jpg", "png", "tif", "tiff", "webp")
 
@@ -133,6 +135,10 @@ def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, Fil
         from viewsphere.assets.gltf import read_gltf
 
         return read_gltf(folder, node)
+    if suffix in USD and usd.is_available():
+        from viewsphere.assets.readers.usd.scene import read_usd
+
+        return read_usd(folder)
     if suffix in BLENDER_SUFFIXES:
         from viewsphere.assets.via_blender import read_via_blender
 

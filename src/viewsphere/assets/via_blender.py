@@ -115,7 +115,8 @@ def started(folder: ModelFolder) -> BlenderProcess:
         python = find_blender()
     except MissingExtraError:
         kind = NAMES.get(folder.model.suffix[1:].lower(), "such")
-        raise folder.error(f"{kind} files are read by Blender, found none: {SETUP}") from None
+        other = "; a USD model at rest needs only pip install 'viewsphere[usd]'" if kind == "USD" else ""
+        raise folder.error(f"{kind} files are read by Blender, found none: {SETUP}{other}") from None
     except UserError as error:
         raise folder.error(str(error)) from None
     readable = [folder.model.parent.resolve()] if folder.confined else [Path("/")]

@@ -1,0 +1,168 @@
+"""The scene of a USD file as one mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.named_points import NamedPoint, named_points
+from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
+from viewsphere.assets.readers.usd.layers import opened
+from viewsphere.assets.readers.usd.library import Usd, UsdGeom
+from viewsphere.assets.readers.usd.material import Look, UsdMaterials
+from viewsphere.assets.readers.usd.mesh import Influences, by_material, pieces_of, read_shape
+from viewsphere.assets.readers.usd.skel import skins_of
+from viewsphere.assets.smoothing import creased
+from viewsphere.assets.transform import moved
+
+KEYPOINT = "keypoint:"
+"""Begins a prim's display name that is a named point; in prim names, which hold no colons, `keypoint_`."""
+
+LEFT_OUT = ("BasisCurves", "NurbsCurves", "HermiteCurves", "NurbsPatch", "Points", "TetMesh", "Volume")
+
+
+def read_usd(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+    """The file as a render at its first frame shows it, in its own axes and unit; each mesh is a part.
+
+    Skins stand in the pose of that frame, instances are repeated, guides and proxies left out. Subdivision surfaces are read
+    as their cages. Raises ModelError.
+    """
+    stage = opened(folder)
+    time = Usd.TimeCode(stage.GetStartTimeCode()) if stage.HasAuthoredTimeCodeRange() else Usd.TimeCode.EarliestTime()
+    influences, joints = skins_of(stage, time)
+    scene = _Scene(folder, time, influences, UsdMaterials(folder, time))
+    pieces = list(scene.below(stage.GetPseudoRoot(), np.eye(4), 1))
+    if not pieces:
+        why = f" ({folder.warnings[0].partition(': ')[2]})" if folder.warnings else ""
+        raise folder.error(f"no triangles found that a render would show{why}; export the model as a mesh of faces")
+    is_y = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y
+    points = dict(enumerate(scene.points or joints))
+    facts = FileFacts(
+        folder.model,
+        folder.model.suffix[1:].lower(),
+        "+y" if is_y else "+z",
+        "+z" if is_y else "-y",
+        float(UsdGeom.GetStageMetersPerUnit(stage)),
+        keypoints=named_points(folder, points),
+    )
+    return assemble(folder, pieces, scene.materials, facts)
+
+
+@dataclass(eq=False)
+class _Scene:
+    folder: ModelFolder
+    time: Any
+    influences: dict[str, Influences]
+    looks: UsdMaterials
+    materials: list[Material] = field(default_factory=list[Material])
+    points: list[NamedPoint] = field(default_factory=list[NamedPoint])
+    total: int = 0
+    instances: int = 0
+    _local: dict[str, list[Primitive]] = field(default_factory=dict[str, "list[Primitive]"])
+    _names: dict[str, int] = field(default_factory=dict[str, int])
+
+    def below(self, prim: Any, world: Float, depth: int, above: int | None = None) -> Iterator[Primitive]:
+        """All that a render shows below a prim, whose matrix in the world is given."""
+        self.folder.check("MAX_NESTING", depth, "prims within one another")
+        for child in prim.GetFilteredChildren(Usd.TraverseInstanceProxies()):
+            yield from self._prim(child, self._matrix(child, world), depth, above)
+
+    def _prim(self, prim: Any, world: Float, depth: int, above: int | None) -> Iterator[Primitive]:
+        if prim.IsA(UsdGeom.Imageable) and not self._is_shown(UsdGeom.Imageable(prim)):
+            return
+        point = _point_name(prim)
+        if point:
+            self.points.append(NamedPoint(point, world[:3, 3].copy(), above))
+            above = len(self.points) - 1
+        if prim.IsA(UsdGeom.PointInstancer):
+            yield from self._instanced(UsdGeom.PointInstancer(prim), world, depth)
+            return
+        if prim.IsA(UsdGeom.Gprim):
+            yield from self._drawn(prim, world)
+        yield from self.below(prim, world, depth + 1, above)
+
+    def _is_shown(self, prim: Any) -> bool:
+        """Whether a prim is not hidden itself; those above it are known to be shown."""
+        hidden = prim.GetVisibilityAttr().Get(self.time) == UsdGeom.Tokens.invisible
+        return not hidden and prim.GetPurposeAttr().Get() not in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+
+    def _matrix(self, prim: Any, parent: Float) -> Float:
+        """The prim's matrix in the world."""
+        if not prim.IsA(UsdGeom.Xformable):
+            return parent
+        form = UsdGeom.Xformable(prim)
+        local = np.array(form.GetLocalTransformation(self.time)).T
+        return local if form.GetResetXformStack() else parent @ local
+
+    def _instanced(self, instancer: Any, world: Float, depth: int) -> Iterator[Primitive]:
+        """The prototypes of a point instancer, where it puts them."""
+        matrices = instancer.ComputeInstanceTransformsAtTime(self.time, self.time)
+        numbers = instancer.GetProtoIndicesAttr().Get(self.time) or ()
+        targets = instancer.GetPrototypesRel().GetForwardedTargets()
+        mask = instancer.ComputeMaskAtTime(self.time)
+        numbers = [n for i, n in enumerate(numbers) if not mask or mask[i]]
+        self.instances += len(matrices)
+        self.folder.check("MAX_INSTANCES", self.instances, "instances")
+        stage = instancer.GetPrim().GetStage()
+        for number, matrix in zip(numbers, matrices, strict=False):
+            prim = stage.GetPrimAtPath(targets[number]) if 0 <= number < len(targets) else None
+            if prim:
+                yield from self._prim(prim, world @ np.array(matrix).T, depth + 1, None)
+
+    def _drawn(self, prim: Any, world: Float) -> Iterator[Primitive]:
+        kind = str(prim.GetTypeName())
+        if kind in LEFT_OUT:
+            self.folder.warn(f"prims of type {kind} are left out")
+            return
+        own = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        key = str(own.GetPath())
+        if key not in self._local:
+            self._local[key] = list(self._pieces(prim))
+        part = self._unique(_part_name(prim)) if self._local[key] else ""
+        self.total += sum(len(piece.triangles) for piece in self._local[key])
+        self.folder.check("MAX_TRIANGLES", self.total, "triangles, all instances counted,")
+        yield from (replace(moved(piece, world), part=part) for piece in self._local[key])
+
+    def _pieces(self, prim: Any) -> Iterator[Primitive]:
+        """A prim's triangles in its own axes, a piece for each material."""
+        shape = read_shape(self.folder, prim, self.time)
+        if shape is None:
+            return
+        for subset, triangles in by_material(shape):
+            look = self.looks.look(prim if subset is None else subset)
+            material, influences = self._number(look), self.influences.get(str(prim.GetPath()))
+            piece = pieces_of(shape, material, look.uvs, look.color, influences, triangles)
+            yield piece if piece.normals is not None else creased(piece)
+
+    def _number(self, look: Look) -> int:
+        if look.material not in self.materials:
+            self.materials.append(look.material)
+        return self.materials.index(look.material)
+
+    def _unique(self, name: str) -> str:
+        number = self._names[name] = self._names.get(name, 0) + 1
+        return name if number == 1 else f"{name}_{number}"
+
+
+def _part_name(prim: Any) -> str:
+    """The name of a prim, or of the transform that holds it alone, as programs write one for each object."""
+    parent = prim.GetParent()
+    is_alone = parent.GetTypeName() == "Xform" and len(parent.GetAllChildren()) == 1 and not parent.GetParent().IsPseudoRoot()
+    named = parent if is_alone and not parent.IsA(UsdGeom.Gprim) else prim
+    return str(named.GetDisplayName() or named.GetName())
+
+
+def _point_name(prim: Any) -> str:
+    """The point that a prim is said to be: by `userProperties:keypoint`, its display name or its name; else empty."""
+    attribute = prim.GetAttribute("userProperties:keypoint")
+    said = attribute.Get() if attribute else None
+    name = str(prim.GetDisplayName() or prim.GetName())
+    plain = name.removeprefix(KEYPOINT).removeprefix("keypoint_")
+    if isinstance(said, str) and said:
+        return said
+    return plain if said or plain != name else ""
