@@ -84,6 +84,7 @@ class Limits:
     MAX_VOXELS = Limit(100_000_000, "cells of the grid of a label voxels; 1 GB while it is computed")
     MAX_FETCHED_BYTES = Limit(10 << 30, "bytes of the folder of a recipe at a URL, which is copied to this machine")
     MAX_REMOTE_TRIES = Limit(5, "times that a URL is asked for the same, 0.2 seconds and then three times as long apart")
+    MAX_REDRAWS = Limit(32, "draws of a frame, and of a scene with so many objects, until one fits; the first one included")
     MAX_REPAIRED_SHOTS = Limit(1_000_000, "shots that a repair renders because they are missing")
 
 

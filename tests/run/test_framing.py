@@ -2,7 +2,6 @@
 
 import json
 import re
-from functools import partial
 
 import numpy as np
 import pytest
@@ -13,8 +12,9 @@ from quick import quick
 from small import tree_hash
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
+from viewsphere.limits import limits
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.framing import MOST_TRIES, Framing
+from viewsphere.run.framing import Framing
 from viewsphere.run.merging import merge
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import plan
@@ -22,6 +22,8 @@ from viewsphere.sampling.samplers import _stock
 from viewsphere.sampling.scenes import Scenes
 from viewsphere.store import Exported
 from viewsphere.store.checksums import write_checksums, written_least, written_options
+
+MOST_TRIES = limits.MAX_REDRAWS
 
 CROWD = {"company": {"count": 2, "draw": "per_frame", "gap": 0.05}, "ground": "off"}
 LOW = {"kind": "sphere", "count": 6, "elevation": [0, 8], "distance": [2.5, 3]}
@@ -106,13 +108,17 @@ def test_no_shot_is_made_twice(frames, least):
     recipe = recipe_of(viewpoints=views, scene=row, min_visibility=least)
     planned, stages, taken = plan(recipe), Stages(), []
 
-    def take(row, tries):
-        taken.append((tuple(tries) or (0,) * frames, planned.shot(row, stages.box, tries)))
-        return taken[-1][1]
+    class Source:
+        def shot(self, row, box_of, tries=(), redraw=0):
+            taken.append((tuple(tries) or (0,) * frames, planned.shot(row, box_of, tries, redraw)))
+            return taken[-1][1]
+
+        def whole(self, row):
+            return planned.whole(row)
 
     for row in planned.rows:
         taken.clear()
-        made = Framing(recipe, stages).shot(partial(take, row))
+        made = Framing(planned, Source(), stages, stages.box).shot(row)
         assert len({tries for tries, _ in taken}) == len(taken) <= MOST_TRIES
         drawn = [own(stages.render(shot)) for _, shot in taken]
         assert own(stages.render(made)) == [

@@ -39,6 +39,7 @@ class Shot(Frozen):
     instants: tuple[Instant, ...]
     scene: Scene
     first: int = 0
+    redraw: int = 0  # how often what the scene leaves to chance was drawn again until all fitted
     sequence: str = ""  # of still pictures none
     variation: str = ""  # of the recipe's variations, under which it is rendered; it ends the sequence's name
     tracks: Tracks | None = None
@@ -88,7 +89,7 @@ class Shot(Frozen):
         so that records of such shots are what they were before.
         """
         found: dict[str, Any] = handler(self)
-        for name in ("annotations", "labels", "variation"):
+        for name in ("annotations", "labels", "variation", "redraw"):
             if not getattr(self, name):
                 found.pop(name, None)
         if not self.shutter:

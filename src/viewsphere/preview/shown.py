@@ -25,7 +25,7 @@ from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Dataset
+from viewsphere.store import Dataset, Row
 from viewsphere.store.films import Film
 from viewsphere.store.index import Ranges, length, nth, numbers
 
@@ -85,7 +85,8 @@ def _each(count: int, films: int, row: int) -> int:
 
 
 def _rendered(stages: Stages, planned: Plan, subject: str, poses: Sequence[int], width: int) -> Iterator[Sample]:
-    shot = Framing(planned.recipe, stages).shot(lambda tries: planned.take(subject, poses, stages.box, tries=tries))
+    row = Row(subject, subject, 0, len(poses) * len(planned.rig.sensors), 0, tuple((pose, pose + 1) for pose in poses))
+    shot = Framing(planned, planned, stages, stages.box).shot(row)
     channels = tuple(dict.fromkeys((*shot.channels, picture_of(shot.channels) or "rgb", "depth", "instances")))
     return stages.render(shot.model_copy(update=_scaled(shot, width) | {"channels": channels}))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.shot import Shot
@@ -32,9 +33,20 @@ class Composer:
 
     def shot(self, row: Row) -> Shot:
         """The shot of a row, with everything that is drawn again until it fits. Raises UserError as `Portion.shot`."""
-        framing = Framing(self.portion.plan.recipe, self.stages)
         with self.portion.plan.recipe.located():
-            return framing.shot(lambda tries: self.portion.shot(row, self.boxes, tries))
+            return self._framing.shot(row, self._settled(row))
+
+    @cached_property
+    def _framing(self) -> Framing:
+        return Framing(self.portion.plan, self.portion, self.stages, self.boxes)
+
+    def _settled(self, row: Row) -> int | None:
+        """The draw of a row's scene in the shots that earlier parts have of it; None where they have none."""
+        if not self.portion.number or self.portion.plan.draws == 1:
+            return None
+        parts = (index for number in range(self.portion.number) for index in self.portion.record.indices_of(number))
+        shots = (self.boxes.store.shot(other.key) for index in parts for other in index.of(row.subject))
+        return next((shot.redraw for shot in shots if shot), None)
 
     def scenery(self, shot: Shot) -> str:
         """The background of a shot, and digests of its meshes, as `SceneryRecord` reads it; empty without any."""

@@ -99,7 +99,7 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     made = sum(max(1, len(steps)) for _, steps in shown)
     model = stopwatch.mean([_model_work(store, portion, *one) for one in shown]) * len(shown) / made
     worker = Worker(store.root, portion)  # one that did not make the models: in a run that is seldom the one that renders them
-    shots = [planned.shot(row, worker.stages.box) for row in rows]
+    shots = [worker.composer.shot(row) for row in rows]
     load_kernels(shots[0])
     begun = frame = 0.0
     for row, shot in zip(rows, shots, strict=True):

@@ -1,77 +1,172 @@
-"""Pictures in which enough is seen of their models: what is random in a frame is drawn again where too little is.
+"""Shots that fit: what is random in a scene, or in a frame, is drawn again where a camera cannot stand, or too little is seen.
 
-What decides is the label `visibility` itself, of the whole picture. A frame's draws follow from its names and the number of the
-try, and it is judged by itself: neither workers nor the cut of shots change what is taken.
+The label `visibility` itself, of the whole picture, decides what is seen. A frame's draws follow from its names and the number
+of the try, and it is judged by itself. A scene's draws follow from its names and the number of the redraw, and all of its
+cameras judge it: neither workers nor the cut of shots change what is taken.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from operator import itemgetter
+from typing import Protocol
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import transform
 from viewsphere.labels import Sight
 from viewsphere.labels.visibility import LABEL as VISIBILITY
+from viewsphere.limits import limits
+from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
-from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.wanted import WantedEntry
+from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages
-from viewsphere.store import Dataset
+from viewsphere.sampling.composition import BoxOf
+from viewsphere.sampling.plan import Plan
+from viewsphere.sampling.redraws import redraws_frames
+from viewsphere.store import Row
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.moving import Ring, shot_floor
 from viewsphere.truth.shot_views import ShotViews
 
-MOST_TRIES = 32
-"""Draws of a frame, the first one included, of which the one that shows most is taken where none shows enough."""
+NO_PLACE = -10.0
+"""How good a frame is whose camera cannot stand there: far below any that misses what is wanted."""
 
-Take = Callable[[Sequence[int]], Shot]
-"""Makes a shot, each frame at its try."""
+OUT_OF_VIEW = -1.0
+"""How good a frame is in which no object can be seen, where the recipe does not ask for visibility."""
+
+Take = Callable[[Sequence[int], int], Shot]
+"""Makes a shot, each frame at its try, in the first draw of its scene, from a number on, in which all has room."""
+
+
+class Source(Protocol):
+    """A plan, or a part of a data set, whose shots are made."""
+
+    def shot(self, row: Row, box_of: BoxOf, tries: Sequence[int] = (), redraw: int = 0) -> Shot:
+        """The shot of a row."""
+        ...
+
+    def whole(self, row: Row) -> Row | None:
+        """All poses of the row's scene in the plan's numbers; None where the row has them."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
 class Framing:
-    """How shots of a recipe come to show enough of their models."""
+    """Composes the shots of a plan, or of a part of a data set (`source`), so that they fit."""
 
-    recipe: Recipe
+    plan: Plan
+    source: Source
     stages: Stages
+    box_of: BoxOf
+    _scenes: dict[Row, int] = field(default_factory=dict[Row, int])
 
-    def shot(self, take: Take) -> Shot:
-        """The shot that `take` makes, with the first draw of each frame that shows enough of its models, or the best.
+    def shot(self, row: Row, settled: int | None = None) -> Shot:
+        """The shot of a row: its scene in the first draw that fits, and each frame at its first try that shows enough of its
+        models, or at the best. `settled`: the draw of the scene in frames that are there already.
+
+        Raises RecipeError where nothing fits.
+        """
+        take, whole = self._taker(self.source, row), self.source.whole(row)
+        if settled is not None:
+            return self._fitting(take, settled, settled + 1)
+        if whole is None:
+            return self._fitting(take, 0, self.plan.draws)
+        if whole not in self._scenes:
+            self._scenes.clear()  # the shots of a scene follow one another
+            self._scenes[whole] = self._fitting(self._taker(self.plan, whole), 0, self.plan.draws, False).redraw
+        return self._fitting(take, self._scenes[whole], self._scenes[whole] + 1)
+
+    def _taker(self, source: Source, row: Row) -> Take:
+        return lambda tries, redraw: source.shot(row, self.box_of, tries, redraw)
+
+    def _fitting(self, take: Take, redraw: int, stop: int, is_judged: bool = True) -> Shot:
+        """The shot in the first of its scene's draws that fits; not `is_judged`: only its cameras have to."""
+        problems: list[RecipeError] = []
+        while redraw < stop:
+            try:
+                shot, problem = self._framed(take, redraw, is_judged)
+            except RecipeError as error:
+                problems.append(error)
+                break
+            if problem is None:
+                return shot
+            problems.append(problem)
+            redraw = shot.redraw + 1
+        raise problems[0]
+
+    def _framed(self, take: Take, redraw: int, is_judged: bool) -> tuple[Shot, RecipeError | None]:
+        """The shot in a draw of its scene, and what is wrong with the first of its frames whose camera never fits.
 
         Shots of several frames differ by their instants alone, whatever these's tries: the best of each are put together.
         """
-        shot, least, wanted = take(()), self.recipe.min_visibility, self.recipe.wanted
-        if wanted is None and least is None:
-            return shot
-        enough = 0.0 if wanted is not None or least is None else least
-        ring = Ring(shot.scene.ground is not None, shot.label_alpha)
-        best = [(self._seen(shot, i, ring), shot) for i in range(len(shot.instants))]
-        for number in range(1, MOST_TRIES):
-            hidden = [i for i, (seen, _) in enumerate(best) if seen < enough]
-            if not hidden:
+        shot = take((), redraw)
+        first = self._problems(shot)
+        if not redraws_frames(self.plan.recipe):
+            return shot, next((problem for problem in first if problem), None)
+        judge = self._judge(shot) if is_judged else _content
+        best = [(NO_PLACE if problem else judge(shot, i), shot) for i, problem in enumerate(first)]
+        for number in range(1, limits.MAX_REDRAWS):
+            poor = [i for i, (seen, _) in enumerate(best) if seen < self._enough]
+            if not poor:
                 break
-            shot = take([number if i in hidden else 0 for i in range(len(best))])
-            for i in hidden:
-                best[i] = max(best[i], (self._seen(shot, i, ring), shot), key=itemgetter(0))
-        instants = tuple(shot.instants[i] for i, (_, shot) in enumerate(best))
-        return best[0][1].model_copy(update={"instants": instants})
+            try:
+                other = take([number if i in poor else 0 for i in range(len(best))], shot.redraw)
+            except RecipeError:  # no room for company that a frame draws for itself
+                continue
+            if other.redraw != shot.redraw:
+                continue
+            for i in poor:
+                seen = NO_PLACE if self._problem(other, i) else judge(other, i)
+                best[i] = max(best[i], (seen, other), key=itemgetter(0))
+        framed = best[0][1].model_copy(update={"instants": tuple(shot.instants[i] for i, (_, shot) in enumerate(best))})
+        return framed, next((first[i] for i, (seen, _) in enumerate(best) if seen == NO_PLACE), None)
 
-    def _seen(self, shot: Shot, instant: int, ring: Ring) -> float:
+    @property
+    def _enough(self) -> float:
+        """How good a frame is that need not be drawn again."""
+        return 0.0 if self.plan.recipe.wanted is not None else self.plan.recipe.min_visibility or 0.0
+
+    def _problems(self, shot: Shot) -> list[RecipeError | None]:
+        """What is wrong with the cameras of each frame."""
+        try:
+            self.stages.check_shot(shot)
+        except RecipeError as error:
+            if len(shot.instants) == 1 or shot.sequence:  # which is drawn as a whole
+                return [error] * len(shot.instants)
+            return [self._problem(shot, i) for i in range(len(shot.instants))]
+        return [None] * len(shot.instants)
+
+    def _problem(self, shot: Shot, instant: int) -> RecipeError | None:
+        try:
+            self.stages.check_instant(shot, instant)
+        except RecipeError as error:
+            return error
+        return None
+
+    def _judge(self, shot: Shot) -> Callable[[Shot, int], float]:
+        """Says how good a frame of such a shot is."""
+        recipe = self.plan.recipe
+        if recipe.wanted is None and recipe.min_visibility is None:
+            return partial(_in_view, self.box_of, recipe.scenes is not None)
+        return partial(self._seen, Ring(shot.scene.ground is not None, shot.label_alpha))
+
+    def _seen(self, ring: Ring, shot: Shot, instant: int) -> float:
         """How good a frame is: the least visibility of what has to be seen in it, or, below 0, how much it misses what is
-        wanted; far below where its camera is inside of something.
+        wanted.
         """
-        wanted = shot.targets(self.recipe.scenes is not None)
+        recipe = self.plan.recipe
+        wanted = shot.targets(recipe.scenes is not None)
         if not all(thing.at(instant).is_there for thing in wanted):
-            return 1.0 if self.recipe.wanted is None else 0.0
-        if not self.stages.is_free(shot, instant):
-            return -10.0
+            return 1.0 if recipe.wanted is None else 0.0
         views = ShotViews(shot, lambda i: self._geometry(shot, i, ring))
         view = views.view(instant, 0)
         sight = Sight(view.geometry, view.camera, view.visibility)
         labels = [VISIBILITY.compute(sight, thing.id - 1) for thing in wanted]
         visibility, truncation = min(o["visibility"] for o in labels), max(o["truncation"] for o in labels)
-        return visibility if self.recipe.wanted is None else -self.recipe.wanted.miss(visibility, truncation)
+        return visibility if recipe.wanted is None else -recipe.wanted.miss(visibility, truncation)
 
     def _geometry(self, shot: Shot, instant: int, ring: Ring) -> Geometry:
         """The triangles that stages of all engines have at an instant."""
@@ -82,26 +177,25 @@ class Framing:
         return ring.at(shot.things_at(instant), meshes(instant), shot_floor(shot, meshes))
 
 
-def missed_frames(dataset: Dataset, wanted: WantedEntry, together: bool) -> tuple[int, float]:
-    """How many frames of a data set are not as wanted, and how far the farthest is from it; empty ones do not count."""
-    misses: list[float] = []
-    for key, places in dataset.shots():
-        shot = dataset.store.labelled(key)
-        ids = {thing.id for thing in shot.targets(together)} if shot else set[int]()
-        for sample in dataset.samples_of(key, places):
-            own = [o for o in sample.objects if o.id in ids]
-            if own:
-                misses.append(wanted.miss(min(o.visibility for o in own), max(o.truncation for o in own)))
-    return sum(miss > 0 for miss in misses), max(misses, default=0.0)
+def _content(shot: Shot, instant: int) -> float:
+    return 0.0
 
 
-def hidden_frames(dataset: Dataset, least: float, together: bool) -> int:
-    """How many frames of a data set show less than this visibility of what has to be seen; empty ones do not count."""
-    count = 0
-    for key, places in dataset.shots():
-        shot = dataset.store.labelled(key)
-        wanted = {thing.id for thing in shot.targets(together)} if shot else set[int]()
-        for sample in dataset.samples_of(key, places):
-            shown = [o.visibility for o in sample.objects if o.id in wanted]
-            count += bool(shown) and min(shown) < least
-    return count
+def _in_view(box_of: BoxOf, together: bool, shot: Shot, instant: int) -> float:
+    """Whether some object may be in some sensor's picture at an instant, as the corners of its box tell."""
+    targets = [now for thing in shot.targets(together) if (now := thing.at(instant)).is_there]
+    cameras = (shot.camera(instant, sensor) for sensor in range(len(shot.rig.sensors)))
+    seen = not targets or any(_may_show(camera, thing, box_of) for camera in cameras for thing in targets)
+    return 0.0 if seen else OUT_OF_VIEW
+
+
+def _may_show(camera: Camera, thing: Thing, box_of: BoxOf) -> bool:
+    """Whether a camera may show a thing; lenses other than a plain pinhole are taken to show all."""
+    lens = camera.intrinsics
+    if lens.distortion is not None or lens.skew:
+        return True
+    corners = transform(thing.world_from_object, box_of(thing.model, thing.step))
+    x, y, z = (transform(camera.R, corners) + camera.t).T
+    u, v = lens.fx * x + lens.cx * z, lens.fy * y + lens.cy * z
+    beside = (u < 0, u > lens.width * z, v < 0, v > lens.height * z, z <= 0)
+    return not any(side.all() for side in beside)

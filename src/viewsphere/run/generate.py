@@ -18,9 +18,9 @@ from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereErro
 from viewsphere.model.share import ALL
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.chance import left_by_chance
 from viewsphere.run.executors import Crew, Job, Listed, Outcome, hired
 from viewsphere.run.exporting import export, is_out_of_date, is_written
-from viewsphere.run.framing import MOST_TRIES, hidden_frames, missed_frames
 from viewsphere.run.opening import check_formats, commit, prepare, to_append, to_render
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.pulse import heard, watched
@@ -35,7 +35,7 @@ from viewsphere.run.warm import is_compiled
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Choice, Dataset, Row, Store, located
+from viewsphere.store import Dataset, Row, Store, located
 from viewsphere.store.credits import write_credits
 from viewsphere.store.heartbeat import Pulse
 
@@ -141,7 +141,7 @@ def generate(
     notes += (f"note: {left}",) if left else ()
     if append and not rendered and share.is_all:
         notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)
-    notes += tuple(_hidden(store, portion))
+    notes += tuple(left_by_chance(store, portion))
     misses = unpainted(recipe, [s for s in planned.model_specs if s.key not in skipped], store)
     warnings = _warnings(planned, dataset, misses)
     return Summary(
@@ -204,27 +204,6 @@ def _others(wanted: Iterable[FormatEntry], store: Store) -> tuple[FormatEntry, .
     """The formats that lie in the data set beside those; they keep the options that they were written with."""
     known = options_of(wanted)
     return tuple(FormatEntry(name=n) for n in plugins.names("formats") if n not in known and (store.root / n).is_dir())
-
-
-def _hidden(store: Store, portion: Portion) -> Iterator[str]:
-    """A warning that counts the recipe's frames in which less of their models is seen than it asks for."""
-    recipe, part = portion.plan.recipe, portion.part
-    least, wanted = recipe.min_visibility, recipe.wanted
-    if least is None and wanted is None:
-        return
-    own = Dataset(store.root, Choice(frames=((part.first, part.first + part.frames),)))
-    if wanted is not None:
-        count, farthest = missed_frames(own, wanted, recipe.scenes is not None)
-        if count:
-            yield (
-                f"warning: wanted: {count:,} of {len(own):,} frames are not as wanted, the best of {MOST_TRIES} draws each; "
-                f"the farthest is {farthest:.2g} beside: ask for wider shares, or for more that is random"
-            )
-    elif least is not None and (count := hidden_frames(own, least, recipe.scenes is not None)):
-        yield (
-            f"warning: min_visibility: {count:,} of {len(own):,} frames show less than {least:g} of their models, the "
-            f"best of {MOST_TRIES} draws each: ask for less, or for less around the models"
-        )
 
 
 def _warnings(planned: Plan, dataset: Dataset, misses: Mapping[str, tuple[str, ...]] | None = None) -> Warnings:

@@ -79,7 +79,7 @@ class Frames(Shown, Iterable[Sample]):
         planned = self._drawn(epoch)
         whole = share.of == 1 and not self._shuffle
         turns, seen = Turns(planned, planned.shot_frames if whole else 1), set[str]()
-        framing, box = Framing(planned.recipe, self._stages), self._stages.box
+        framing = Framing(planned, planned, self._stages, self._stages.box)
         order = turns.shuffled(epoch) if self._shuffle else turns.in_order()
         for turn in share(order):
             if turn.subject not in seen:
@@ -87,7 +87,7 @@ class Frames(Shown, Iterable[Sample]):
                 self._stages.read_ahead(planned, planned.cast(turn.subject))
                 self._stages.check_distances(planned, turn.subject)
             for row in turns.rows(turn):
-                yield from self._stages.render(framing.shot(lambda tries, row=row: planned.shot(row, box, tries)))
+                yield from self._stages.render(framing.shot(row))
 
     def _drawn(self, epoch: int) -> Plan:
         """The plan, whose random choices are drawn anew for each epoch where that is asked for."""

@@ -33,6 +33,7 @@ from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.traits import Traits
 from viewsphere.run.walls import Step, check_rooms, check_way
 from viewsphere.sampling.camera import inside_box
+from viewsphere.sampling.redraws import is_redrawn
 from viewsphere.store import ModelInfo, Store
 from viewsphere.surroundings.ground import ground_stamps
 from viewsphere.truth.enclosure import sky_hidden
@@ -177,10 +178,10 @@ class Stages:
         from viewsphere.sampling.distances import Distances
 
         scene = planned.recipe.scene
-        if planned.composition is None or not scene.has_fixed_scenery:
+        if planned.composition is None or not scene.has_fixed_scenery or is_redrawn(planned.recipe):
             return
         subject = planned.subjects[0]
-        there = next(planned.sampler.standing(planned, subject, self.box), None)
+        there = next(iter(planned.standing(subject, self.box)), None)
         if there is None or not there.views.are_known:  # where the camera is, is known with its shot
             return
         things = planned.composition.things(subject, there.things, None, self.box)
@@ -217,7 +218,7 @@ class Stages:
                         f"drawn at random are drawn again"
                     )
 
-    def _check_shot(self, shot: Shot) -> None:
+    def check_shot(self, shot: Shot) -> None:
         """Raise RecipeError where a camera of a shot is inside of something, or a trajectory leads through a wall; what stands
         still is looked at once.
         """
@@ -237,13 +238,9 @@ class Stages:
         rooms = tuple(transform(pose, box) for box in rooms_of(thing.model.source, thing.model.seed)) if thing.scenery else ()
         return _Stand(transform(pose, self.box(thing.model, thing.step)), rooms)
 
-    def is_free(self, shot: Shot, instant: int) -> bool:
-        """Whether no camera of a shot is inside of something at an instant, counted from 0 in the shot."""
-        try:
-            self._check_shot(shot.model_copy(update={"instants": (shot.instants[instant],), "things": shot.things_at(instant)}))
-        except RecipeError:
-            return False
-        return True
+    def check_instant(self, shot: Shot, instant: int) -> None:
+        """Raise RecipeError where a camera of a shot is inside of something at an instant, counted from 0 in the shot."""
+        self.check_shot(shot.model_copy(update={"instants": (shot.instants[instant],), "things": shot.things_at(instant)}))
 
     def _roofs(self, thing: Thing, point: Float) -> bool:
         """Whether scenery hides most of the sky from a point in the world."""
@@ -263,9 +260,8 @@ class Stages:
         return self._stage
 
     def render(self, shot: Shot) -> Iterator[Sample]:
-        """The shot's samples in order, channels in memory; raises RecipeError for a camera inside of scenery or a target."""
+        """The shot's samples in order, channels in memory; `check_shot` says beforehand whether its cameras can stand there."""
         stage = self.stage(shot)
-        self._check_shot(shot)
         views = ShotViews(shot, stage.at, lambda thing: self.model(thing.model, thing.step))
         shown: tuple[TimeStep | None, ...] | None = None
         boxes, sizes, traits = list[Float](), list[Size | None](), list[Callable[[], Traits]]()

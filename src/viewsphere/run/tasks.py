@@ -58,7 +58,7 @@ class Worker:
         self.models = Models(self.store, self.stages, portion.record)
         self._portion = portion.remembering(self.store)
         self._boxes = StoredBoxes(self.store)
-        self._composer = Composer(self._portion, self._boxes, self.stages)
+        self.composer = Composer(self._portion, self._boxes, self.stages)
 
     def do(self, task: ModelTask | KernelTask | Row | Damaged, tell: Callable[[int], None]) -> int:
         """Make models, kernels, or the shot of a row; gives the number of frames that were made. `tell` is given their number
@@ -86,9 +86,9 @@ class Worker:
         """Make the shot of a row and render it into the store; gives the number of its frames, and `tell` so far after each.
         Errors of one that takes the place of a damaged one (`again`) as for `Store.aside`.
         """
-        shot = self._composer.shot(row)
+        shot = self.composer.shot(row)
         samples = _counted(self.stages.render(shot), tell)
-        scenery = self._composer.scenery(shot)
+        scenery = self.composer.scenery(shot)
         return self.store.write_shot(shot.key, samples, scenery, shot.files, shot, again, PAINTER)
 
 

@@ -15,14 +15,14 @@ from viewsphere.labels import Needs, channels, labels, on_request
 from viewsphere.model.channel import MATERIAL_PASSES, PASSES, PICTURES
 from viewsphere.model.mistakes import nearest, one_of, read_options
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.recipe.draws import alternatives, is_random, span
+from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.rig import SensorList
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
-from viewsphere.recipe.viewpoints import Jitter, Normal, Sphere
 from viewsphere.sampling.layouts import check_layout, check_orientation
 from viewsphere.sampling.models import count_models
+from viewsphere.sampling.redraws import redraws_frames
 from viewsphere.sampling.viewpoints import Poses
 
 Said = TypeVar("Said")
@@ -33,14 +33,10 @@ def check_redraws(recipe: Recipe) -> None:
     for name in ("min_visibility", "wanted", "empty") if recipe.time is not None else ():
         if getattr(recipe, name) is not None:
             raise RecipeError(f"{name}: expected none beside time, as it is about single pictures; found one: leave it out")
-    company = recipe.scene.company
     if recipe.wanted is not None and recipe.min_visibility is not None:
         raise RecipeError("wanted: expected wanted or min_visibility; found both: write wanted: {visibility: [0.3, 1]}")
-    jitter = recipe.scene.jitter
-    is_redrawn = isinstance(recipe.viewpoints, Sphere | Normal | Jitter) or (company and company.draw == "per_frame")
-    is_redrawn = is_redrawn or (jitter.draw == "per_frame" and is_random(jitter))
     for name in ("min_visibility", "wanted"):
-        if getattr(recipe, name) is not None and not is_redrawn:
+        if getattr(recipe, name) is not None and not redraws_frames(recipe):
             raise RecipeError(
                 f"{name}: expected something to draw again, viewpoints of kind sphere, normal or jitter, scene.jitter or "
                 f"scene.company.draw: per_frame; found viewpoints of kind {recipe.viewpoints.kind} and nothing drawn for each "

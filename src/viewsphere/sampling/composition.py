@@ -21,6 +21,7 @@ from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.cast import companions
 from viewsphere.sampling.layouts import BoxOf, Laid, Remembering, laid, remembered_as, shape, unremembered
 from viewsphere.sampling.placing import Footprint, Room, footprint, standing
+from viewsphere.sampling.redraws import SAME_MODELS, fewer, least_objects, redraw_names, redraws_place
 from viewsphere.sampling.scenery import (
     SceneryPiece,
     draw_names,
@@ -124,10 +125,10 @@ class Composition(Sendable):
             count += max(len(draw_place(seed, name, n).pieces) if name else 1 for n in self._place_draws)
         return count
 
-    def cast(self, spec: ModelSpec, pose: str | None) -> tuple[ModelSpec, ...]:
+    def cast(self, spec: ModelSpec, pose: str | None, redraw: int = 0) -> tuple[ModelSpec, ...]:
         """The targets of a frame: its model, and those drawn to stand beside it.
 
-        `pose` is the pose's name; None where nothing is drawn for each frame.
+        `pose` is the pose's name; None where nothing is drawn for each frame. `redraw` is the scene's.
         """
         entry = self.recipe.scene.company
         if entry is None:
@@ -136,6 +137,8 @@ class Composition(Sendable):
         count = entry.number
         if entry.count is not None:
             count = drawn(entry.count, scene_generators(self.recipe.seed, names), ("company", "count"))
+            count = max(least_objects(self.recipe, count), count - fewer(self.recipe, redraw))
+        names += redraw_names(redraw, SAME_MODELS)
         return (spec, *companions(self.recipe.seed, spec, self.groups[spec.key], count, names))
 
     def targets(
@@ -146,12 +149,13 @@ class Composition(Sendable):
         again: Names = (),
         memory: Remembering = unremembered,
         seen_from: tuple[float, float] | None = None,
+        redraw: int = 0,
     ) -> tuple[Thing, ...]:
         """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room. `again`
         names another draw of where company stands; `seen_from`: azimuth and elevation, degrees, of the frame's camera.
         """
         own = standing(box_of(spec))
-        company = self.company(spec, pose, box_of, own, again, memory, seen_from)
+        company = self.company(spec, pose, box_of, own, again, memory, seen_from, redraw)
         return still((spec,), [own]) if company is None else still((spec, *company.members), [own, *company.poses])
 
     def company(
@@ -163,42 +167,55 @@ class Composition(Sendable):
         again: Names,
         memory: Remembering,
         seen_from: tuple[float, float] | None = None,
+        redraw: int = 0,
     ) -> Laid | None:
         """What is placed beside a frame's model that stands there; None where nothing is."""
         entry = self.recipe.scene.company
         if entry is None:
             return None
-        cast, names = self.cast(spec, pose)[1:], (*draw_names(entry.draw, spec.key, pose), *again)
+        cast, names = self.cast(spec, pose, redraw)[1:], (*draw_names(entry.draw, spec.key, pose), *again)
         taken = ((shape(spec, box_of), own),)
         keep = partial(memory, remembered_as(entry, cast, ("company", spec.key, *names)))
-        free, moves = self.free_floor(spec.key, pose), self.recipe.time is not None
+        free, moves = self.free_floor(spec.key, pose, redraw), self.recipe.time is not None
         room = Room(free, entry.gap, entry.spots, taken, "scene.company", seen_from=seen_from, memory=keep, moves=moves)
         rng = partial(generator, self.recipe.seed, "layout", *names)
         return laid(entry.layout, entry.orientation, cast, room, box_of, rng)
 
-    def free_floor(self, subject: str, pose: str | None) -> Footprint | None:
+    def place_names(self, subject: str, pose: str | None, redraw: int = 0) -> Names:
+        """What the place of a scene is drawn for."""
+        place = self.recipe.scene.place
+        names = draw_names(place.draw, subject, pose) if place else ()
+        return names + redraw_names(redraw) if redraw and redraws_place(self.recipe) else names
+
+    def free_floor(self, subject: str, pose: str | None, redraw: int = 0) -> Footprint | None:
         """The floor that the place leaves free, None for all of it."""
         place = self.recipe.scene.place
-        return free_floor(self.recipe, place, draw_names(place.draw, subject, pose)) if place else None
+        return free_floor(self.recipe, place, self.place_names(subject, pose, redraw)) if place else None
 
-    def lanes(self, subject: str, pose: str | None) -> tuple[Lane, ...]:
+    def lanes(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
         """The lanes of the place where it stands, world axes; none where it has none."""
         place = self.recipe.scene.place
-        return place_lanes(self.recipe, place, draw_names(place.draw, subject, pose)) if place else ()
+        return place_lanes(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
-    def surfaces(self, subject: str, pose: str | None) -> tuple[Surface, ...]:
+    def surfaces(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Surface, ...]:
         """Where things may stand above the floor of the place, world axes; none where it has none."""
         place = self.recipe.scene.place
-        return place_surfaces(self.recipe, place, draw_names(place.draw, subject, pose)) if place else ()
+        return place_surfaces(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
     def things(
-        self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf, moved: Moved = _as_it_stands
+        self,
+        subject: str,
+        targets: Sequence[Thing],
+        pose: str | None,
+        box_of: BoxOf,
+        moved: Moved = _as_it_stands,
+        redraw: int = 0,
     ) -> tuple[Thing, ...]:
         """All that is placed: targets, labelled scenery, then the scenery that is background.
 
         `moved` gives pieces of scenery that the recipe moves (`piece.motion`) their motion.
         """
-        pieces = self._pieces(subject, targets, pose, box_of)
+        pieces = self._pieces(subject, targets, pose, box_of, redraw)
         labelled = [p for p in pieces if p.labels == "own"]
         rest = [p for p in pieces if p.labels != "own"]
         ids = [*range(len(targets) + 1, len(targets) + len(labelled) + 1), *[0] * len(rest)]
@@ -207,15 +224,19 @@ class Composition(Sendable):
             for i, p in zip(ids, labelled + rest, strict=True)
         )
 
-    def _pieces(self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf) -> list[SceneryPiece]:
+    def _pieces(
+        self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf, redraw: int
+    ) -> list[SceneryPiece]:
         place = self.recipe.scene.place
         pieces: list[SceneryPiece] = []
         if place is not None:
-            pieces += self._place(draw_names(place.draw, subject, pose))
+            pieces += self._place(self.place_names(subject, pose, redraw))
         if self.blend is not None:
             pieces += self.blend.pieces(subject, pose, self._category_id)
         prints = [footprint(box_of(t.model), t.world_from_object) for t in targets]
-        return pieces + list(plane_pieces(self.recipe, self.images, subject, pose, prints, self._category_id))
+        return pieces + list(
+            plane_pieces(self.recipe, self.images, subject, pose, prints, self._category_id, redraw_names(redraw))
+        )
 
     @cached_property
     def _place(self) -> Callable[[Names], tuple[SceneryPiece, ...]]:

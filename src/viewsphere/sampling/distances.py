@@ -19,6 +19,7 @@ from viewsphere.model.thing import Thing
 from viewsphere.sampling.camera import distance_problem, inside_box, looking
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.plan import Plan
+from viewsphere.sampling.redraws import is_redrawn
 from viewsphere.sampling.samplers import Standing
 from viewsphere.sampling.viewpoints import Poses
 
@@ -48,12 +49,13 @@ class Distances:
     def problem(self, subject: str) -> RecipeError | None:
         """The first pose whose camera would stand inside an object's box, in words; None if there is none.
 
-        What is drawn for each frame is not looked at, nor what follows from a share of the picture: that is left to whoever
+        Cameras that can be drawn again are left to their shots; room for all is looked for nevertheless. What is drawn for
+        each frame is not looked at, nor what follows from a share of the picture: that is left to whoever
         renders the frame.
         """
         subject = self.plan.world(subject)
-        for there in self.plan.sampler.standing(self.plan, subject, self.box_of):
-            if not there.views.are_known:
+        for there in self.plan.standing(subject, self.box_of):
+            if not there.views.are_known or is_redrawn(self.plan.recipe):
                 continue
             most = MOST_PAIRS if there.views is self.plan.pose_list else MOST_DRAWS
             step = -(-self.plan.poses // max(1, min(MOST_CAMERAS, most // len(self.plan.subjects))))

@@ -128,10 +128,11 @@ class Portion(Sendable):
         """The recipe's models in a shot, that of its frames first."""
         return self.plan.cast(row.subject, self._of_recipe(row.positions[0][0]))
 
-    def shot(self, row: Row, box_of: BoxOf, tries: Sequence[int] = ()) -> Shot:
-        """The shot of a row; `box_of`, `tries` and errors as for `Plan.shot`."""
+    def shot(self, row: Row, box_of: BoxOf, tries: Sequence[int] = (), redraw: int = 0) -> Shot:
+        """The shot of a row; `box_of`, `tries`, `redraw` and errors as for `Plan.shot`."""
         poses = tuple(numbers(row.positions))
-        made = self.plan.take(row.subject, [self._of_recipe(pose) for pose in poses], box_of, row.key, row.first, tries)
+        own = [self._of_recipe(pose) for pose in poses]
+        made = self.plan.take(row.subject, own, box_of, row.key, row.first, tries, redraw)
         number_of = iter(poses)
         instants = (_at_pose(now, next(number_of)) if now.recorded else now for now in made.instants)
         return made.model_copy(
@@ -141,6 +142,10 @@ class Portion(Sendable):
                 "channels": self._channels(row.first),
             }
         )
+
+    def whole(self, row: Row) -> Row | None:
+        """All poses that the recipe has of a row's scene, in the recipe's numbers, as for `Plan.whole`."""
+        return self.plan.whole(replace(row, positions=as_ranges(np.array(list(map(self._of_recipe, numbers(row.positions)))))))
 
     def _channels(self, frame: int) -> tuple[str, ...]:
         return dict(self.part.supplies).get(self.record.part_of(frame), self.part.channels)

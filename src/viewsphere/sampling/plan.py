@@ -5,18 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import chain, repeat
 from os import PathLike
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from viewsphere import plugins
 from viewsphere.assets.timeline import Timeline
 from viewsphere.assets.traits import said_of
-from viewsphere.errors import each
+from viewsphere.errors import RecipeError, each
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.notebook import Shown
@@ -51,8 +51,9 @@ from viewsphere.sampling.motion import check_motions
 from viewsphere.sampling.off_center import off_center
 from viewsphere.sampling.pictures import check_pictures, proportions, scene_pictures
 from viewsphere.sampling.recipe_warnings import hidden_background, hidden_by_exposure, no_light, out_of_view, too_small
+from viewsphere.sampling.redraws import scene_draws
 from viewsphere.sampling.rigs import rig_of
-from viewsphere.sampling.samplers import Sampler, Stock, lens
+from viewsphere.sampling.samplers import Sampler, Standing, Stock, lens
 from viewsphere.sampling.scenes import check_night, is_night
 from viewsphere.sampling.seeds import share
 from viewsphere.sampling.sequence_checks import check_sequences
@@ -61,7 +62,9 @@ from viewsphere.sampling.splits import expected, quotas
 from viewsphere.sampling.time_steps import check_keys, timed
 from viewsphere.sampling.tracks import tracks_digest, tracks_of
 from viewsphere.store import Block, Category, Row
-from viewsphere.store.index import Index, numbers, under, without
+from viewsphere.store.index import Index, Ranges, length, numbers, under, without
+
+Made = TypeVar("Made")
 
 COUNTED = 200_000
 """Frames, or scenes, whose splits are counted one by one."""
@@ -253,15 +256,16 @@ class Plan(Shown, Stock):
         """Number of shots."""
         return len(self.rows)
 
-    def shot(self, row: Row | int, box_of: BoxOf, tries: Sequence[int] = ()) -> Shot:
-        """The shot of a row, or of its number; raises IndexError past the end.
+    def shot(self, row: Row | int, box_of: BoxOf, tries: Sequence[int] = (), redraw: int = 0) -> Shot:
+        """The shot of a row, or of its number, in the first draw of its scene from `redraw` on that has room for all; raises
+        IndexError past the end.
 
         `tries`: of each pose, how often what is random in it (its viewpoint, company of its own) is drawn again; none: never.
         `box_of` gives the sizes of what stands on the floor and of what the cameras look at. Raises RecipeError where there is
         no room for all that is to stand there, and what `box_of` raises.
         """
         row = self.rows[row] if isinstance(row, int) else row
-        return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first, tries)
+        return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first, tries, redraw)
 
     def take(
         self,
@@ -271,14 +275,62 @@ class Plan(Shown, Stock):
         key: str = "",
         first: int = 0,
         tries: Sequence[int] = (),
+        redraw: int = 0,
     ) -> Shot:
         """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
-        each frame. `first` is the number of its first sample, `tries` as for `shot`.
+        each frame. `first` is the number of its first sample, `tries` and `redraw` as for `shot`.
         """
-        key, variation, stock = key or f"{subject}-{poses[0]:06d}", "", self
+        return self._fitting(
+            redraw,
+            lambda number: self._taken_at(number, subject, poses, box_of, key or f"{subject}-{poses[0]:06d}", first, tries),
+        )
+
+    def standing(self, subject: str, box_of: BoxOf) -> Sequence[Standing]:
+        """What can be known before a frame is rendered of where a subject's objects stand, in the first draw that has room."""
+        return self._fitting(0, lambda number: tuple(self.sampler.standing(self.redrawn(number), subject, box_of)))
+
+    def _fitting(self, redraw: int, make: Callable[[int], Made]) -> Made:
+        """What is made of the first draw of a scene, from this number on, that fits; raises the first draw's RecipeError where
+        none does.
+        """
+        problems: list[RecipeError] = []
+        for number in range(redraw, max(redraw + 1, self.draws)):
+            try:
+                return make(number)
+            except RecipeError as error:
+                problems.append(error)
+        raise problems[0]
+
+    @cached_property
+    def draws(self) -> int:
+        """How many draws each scene has, the original included."""
+        return scene_draws(self.recipe)
+
+    def whole(self, row: Row) -> Row | None:
+        """All poses of a row's scene, or sequence, as one row; None where the row has them, or nothing is redrawn for all."""
+        if self.draws == 1 or (self.recipe.time is None and self.recipe.scene.is_moved_each_frame):
+            return None
+        positions, each = self._positions[row.subject], len(self.rig.sensors)
+        if isinstance(self.pose_list, SequencePoses):
+            start = row.positions[0][0] - row.positions[0][0] % self.pose_list.instants
+            positions = ((start, start + self.pose_list.instants),)
+        if positions == row.positions:
+            return None
+        return Row(row.subject, row.subject, 0, length(positions) * each, row.part, positions)
+
+    @cached_property
+    def _positions(self) -> dict[str, Ranges]:
+        """The poses of each subject, at its first time step."""
+        return {subject: block.positions for block in reversed(self.blocks) for subject in block.subjects}
+
+    def _taken_at(
+        self, redraw: int, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int, tries: Sequence[int]
+    ) -> Shot:
+        variation, stock = "", self
         if self.recipe.variations is not None:
             subject, variation = without(subject)
             stock = self._under[variation]
+        stock = stock.redrawn(redraw)
         stock = stock.trying(dict(zip(poses, tries, strict=True))) if any(tries) else stock
         with self.recipe.located():
             made = self.sampler.shot(stock, subject, poses, box_of, key, first)

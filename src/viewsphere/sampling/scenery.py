@@ -291,14 +291,15 @@ def plane_pieces(
     pose: str | None,
     targets: Sequence[Footprint],
     category_id: Naming,
+    redraw: Names = (),
 ) -> Iterator[SceneryPiece]:
-    """The planes of one model, or of one frame, clear of the targets and of one another.
+    """The planes of one model, or of one frame, clear of the targets and of one another; `redraw` names another draw.
 
     Raises RecipeError where that cannot be.
     """
     standing_there = list(targets)
     for i, entry in enumerate(recipe.scene.planes):
-        names = draw_names(entry.draw, model, pose)
+        names = (*draw_names(entry.draw, model, pose), *redraw)
         count = drawn(entry.count, scene_generators(recipe.seed, names), ("planes", str(i), "count"))
         for j in range(count):
             purpose = (*names, str(i), str(j))

@@ -18,6 +18,7 @@ from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.sampling.composition import BoxOf, center, center_of_all, still
 from viewsphere.sampling.motion import Lane, Start, mover
 from viewsphere.sampling.placing import standing
+from viewsphere.sampling.redraws import redraw_names
 from viewsphere.sampling.samplers._moving import Moving
 from viewsphere.sampling.samplers._random import scene_around, scene_distractors, scene_laid, scene_things
 from viewsphere.sampling.samplers._stock import Stock
@@ -77,8 +78,8 @@ def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
     around = stock.scene_pose(start)
     targets = placed_targets(stock, subject, around, box_of)
     focus = middle(targets, box_of)
-    names = (subject, stock.pose_list.place(start))
-    lanes = () if stock.composition is None else stock.composition.lanes(subject, around)
+    names = (subject, stock.pose_list.place(start), *redraw_names(stock.redraw))
+    lanes = () if stock.composition is None else stock.composition.lanes(subject, around, stock.redraw)
 
     pieces: list[Moving | None] = []
 
@@ -88,7 +89,7 @@ def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
 
     things = targets
     if stock.composition is not None:
-        things = stock.composition.things(subject, targets, around, box_of, piece_moved)
+        things = stock.composition.things(subject, targets, around, box_of, piece_moved, stock.redraw)
     ways = target_ways(stock, subject, around, box_of)
     if stock.recipe.scenes is not None:
         among, beneath = scene_distractors(stock, subject, around, box_of), scene_around(stock, subject, around, box_of)
@@ -106,7 +107,8 @@ def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) 
         return scene_things(stock, subject, pose, box_of)
     spec = stock.spec(subject)
     if stock.composition is not None:
-        return stock.composition.targets(spec, pose, box_of, memory=stock.memory)
+        again = redraw_names(stock.redraw)
+        return stock.composition.targets(spec, pose, box_of, again, stock.memory, redraw=stock.redraw)
     return still((spec,), (standing(box_of(spec)),))
 
 
@@ -118,7 +120,9 @@ def target_ways(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> 
     spec = stock.spec(subject)
     company = None
     if stock.composition is not None:
-        company = stock.composition.company(spec, pose, box_of, standing(box_of(spec)), (), stock.memory)
+        company = stock.composition.company(
+            spec, pose, box_of, standing(box_of(spec)), redraw_names(stock.redraw), stock.memory, redraw=stock.redraw
+        )
     if company is None:
         return (None,)
     return (None, *(tuple(way.at for way in company.ways) or (None,) * len(company.members)))
@@ -182,7 +186,7 @@ def _rig(
     """Where the rig is at all instants, None where it stands still."""
     time, views = time_of(stock), stock.sequences_of(subject)
     times = np.array([time.at(i) for i in range(time.count)])
-    names = (subject, stock.pose_list.place(start))
+    names = (subject, stock.pose_list.place(start), *redraw_names(stock.redraw))
     world = World(
         time.fps,
         course.focus,

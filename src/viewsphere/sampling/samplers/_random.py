@@ -11,6 +11,7 @@ from functools import lru_cache, partial
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
+from viewsphere.limits import limits
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
@@ -24,6 +25,7 @@ from viewsphere.sampling.cast import balanced, mixed
 from viewsphere.sampling.composition import BoxOf, still
 from viewsphere.sampling.layouts import Laid, laid, remembered_as
 from viewsphere.sampling.placing import Piece, Room, footprint
+from viewsphere.sampling.redraws import SAME_MODELS, fewer, least_objects, redraw_names, redraws_place
 from viewsphere.sampling.samplers._stock import Stock
 from viewsphere.sampling.scenery import draw_names, place_surfaces, scenery_key
 from viewsphere.sampling.seeds import generator, share, shares
@@ -58,18 +60,20 @@ def scene_cast(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
     """The models of a scene, of one split where splits are by model."""
     recipe, entry = stock.recipe, scenes_entry(stock.recipe)
     models = _models_for(stock, _group(stock, subject))
+    names = (subject, *redraw_names(stock.redraw, SAME_MODELS))
     if entry.balance == "models":
-        return mixed(recipe.seed, models, _size(recipe, subject), (subject,), entry.repeat)
+        return mixed(recipe.seed, models, _size(recipe, subject, stock.redraw), names, entry.repeat)
     cast: list[ModelSpec] = []
-    for category, count in _categories(stock.untried or stock)[subject]:
+    for category, count in _categories(stock.root)[subject]:
         own = tuple(spec for spec in models if spec.category == category)
-        cast += mixed(recipe.seed, own, count, (subject,), entry.repeat)
+        cast += mixed(recipe.seed, own, count, names, entry.repeat)
     return tuple(sorted(cast, key=lambda spec: share(recipe.seed, "slot", subject, spec.key)))
 
 
-def _size(recipe: Recipe, subject: str) -> int:
-    """How many models stand in a scene."""
-    return drawn(scenes_entry(recipe).objects, lambda path: generator(recipe.seed, *path, subject), ("scenes", "objects"))
+def _size(recipe: Recipe, subject: str, redraw: int = 0) -> int:
+    """How many models stand in a scene; late redraws drop some, as far as the recipe allows."""
+    count = drawn(scenes_entry(recipe).objects, lambda path: generator(recipe.seed, *path, subject), ("scenes", "objects"))
+    return max(least_objects(recipe, count), count - fewer(recipe, redraw))
 
 
 def _group(stock: Stock, subject: str) -> str:
@@ -100,22 +104,27 @@ def scene_split(stock: Stock, subject: str) -> str:
     """The split of a scene where splits are by model: it draws its split first, then models of this split; shares follow from
     the numbers of models where some of these are listed.
     """
-    return drawn_split(_shares(stock.untried or stock), stock.recipe.lasting_seed, (subject,))
+    return drawn_split(_shares(stock.root), stock.recipe.lasting_seed, (subject,))
+
+
+def scene_laid(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
+    """The models of a scene as its layout places them; the last ones are kept, whatever the tries of frames."""
+    return _laid(stock.root, stock.redraw, subject, pose, box_of)
 
 
 @lru_cache(maxsize=4)
-def scene_laid(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
-    """The models of a scene as its layout places them; the last ones are kept."""
-    recipe, entry = stock.recipe, scenes_entry(stock.recipe)
+def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
+    stock, recipe, entry = root.redrawn(redraw), root.recipe, scenes_entry(root.recipe)
     models = (*scene_cast(stock, subject), *_distractors(stock, subject))
     stand = surface(stock, subject, pose)
     if stand is None:
-        free = None if stock.composition is None else stock.composition.free_floor(subject, pose)
+        free = None if stock.composition is None else stock.composition.free_floor(subject, pose, redraw)
     else:
         free = footprint(
             box_vertices((-stand.size[0] / 2, -stand.size[1] / 2, 0), (stand.size[0] / 2, stand.size[1] / 2, 0)), IDENTITY
         )
-    names = ("scene", subject) if pose is None else ("scene", subject, pose)
+    again = redraw_names(redraw)
+    names = ("scene", subject, *again) if pose is None else ("scene", subject, pose, *again)
     room = Room(
         free,
         entry.gap,
@@ -127,7 +136,7 @@ def scene_laid(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> L
         moves=recipe.time is not None,
     )
     world_from_room = IDENTITY if stand is None else stand.world_from_surface
-    rng = partial(generator, recipe.seed, "layout", subject)
+    rng = partial(generator, recipe.seed, "layout", subject, *again)
     return laid(entry.layout, entry.orientation, models, room, box_of, rng, world_from_room)
 
 
@@ -149,7 +158,8 @@ def _distractors(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
     if not models:
         return ()
     count = drawn(entry.distractors, lambda path: generator(stock.recipe.seed, *path, subject), ("scenes", "distractors"))
-    return mixed(stock.recipe.seed, models, count, (subject, "distractors"), repeat=True)
+    names = (subject, "distractors", *redraw_names(stock.redraw, SAME_MODELS))
+    return mixed(stock.recipe.seed, models, count, names, repeat=True)
 
 
 def scene_around(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
@@ -179,11 +189,16 @@ def _spec(piece: Piece, seed: int, subject: str) -> ModelSpec:
 
 
 def check_surface(recipe: Recipe) -> None:
-    """Raise RecipeError where models are to stand on a surface that the place does not have."""
+    """Raise RecipeError where models are to stand on a surface that no draw of the place has."""
     on, place = scenes_entry(recipe).surface, recipe.scene.place
     if isinstance(on, str):
         names = () if place is None else draw_names(place.draw, "scene-000000", "")
-        _named(on, place_surfaces(recipe, place, names))
+        draws = limits.MAX_REDRAWS if redraws_place(recipe) else 1
+        surfaces: dict[str, Surface] = {}
+        for redraw in range(draws):
+            if on not in surfaces:
+                surfaces |= {one.name: one for one in place_surfaces(recipe, place, (*names, *redraw_names(redraw)))}
+        _named(on, tuple(surfaces.values()))
 
 
 def surface(stock: Stock, subject: str, pose: str | None) -> Surface | None:
@@ -193,7 +208,7 @@ def surface(stock: Stock, subject: str, pose: str | None) -> Surface | None:
         return None
     if isinstance(on, SurfaceEntry):
         return Surface("on", ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, on.height), (0, 0, 0, 1)), on.size)
-    return _named(on, () if stock.composition is None else stock.composition.surfaces(subject, pose))
+    return _named(on, () if stock.composition is None else stock.composition.surfaces(subject, pose, stock.redraw))
 
 
 def _named(name: str, found: Sequence[Surface]) -> Surface:

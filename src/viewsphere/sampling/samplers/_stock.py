@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import chain
-from typing import Self
+from typing import Any, Self
 
 from pydantic import JsonValue
 
@@ -30,6 +30,7 @@ from viewsphere.sampling.composition import Composition
 from viewsphere.sampling.engine_digest import engine_options
 from viewsphere.sampling.layouts import Remembering, unremembered
 from viewsphere.sampling.pictures import Pictures
+from viewsphere.sampling.redraws import redraw_names
 from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.scenes import Scenes
 from viewsphere.sampling.seeds import Names, generator
@@ -61,6 +62,7 @@ class Stock(Sendable):
     timelines: tuple[Timeline | None, ...] = ()  # of each model, the animation of its file that it plays in sequences
     tries: Mapping[int, int] = field(default_factory=dict[int, int])  # poses of which something is drawn again: the how manieth
     untried: Stock | None = None  # the same without these tries
+    redraw: int = 0  # how often what its scenes leave to chance is drawn again
     distractors: tuple[tuple[ModelSpec, int], ...] = ()  # models that are not labelled, and the numbers of their entries
     memory: Remembering = unremembered  # of what is simulated
     variation: str = ""  # of the recipe's, that this is the light and the finish of
@@ -68,10 +70,22 @@ class Stock(Sendable):
 
     def trying(self, tries: Mapping[int, int]) -> Self:
         """The same stock with poses at these tries; it shares what was computed, none of which follows from tries."""
-        made = replace(self, tries=tries, untried=self.untried or self)
+        return self._sharing(tries=tries)
+
+    def redrawn(self, number: int) -> Self:
+        """The same stock with this redraw of its scenes; it shares what was computed, none of which follows from redraws."""
+        return self if number == self.redraw else self._sharing(redraw=number)
+
+    def _sharing(self, **changes: Any) -> Self:
+        made = replace(self, **changes, untried=self.untried or self)
         known = {field.name for field in fields(self)}
         vars(made).update({name: value for name, value in vars(self).items() if name not in known})
         return made
+
+    @property
+    def root(self) -> Stock:
+        """The same without tries and redraws."""
+        return self.untried or self
 
     @property
     def views(self) -> Poses:
@@ -130,7 +144,7 @@ class Stock(Sendable):
         spec = self.spec(key)
         if self.composition is None or (pose is None and self.recipe.scene.is_moved_each_frame):
             return (spec,)
-        return self.composition.cast(spec, None if pose is None else self.scene_pose(pose))
+        return self.composition.cast(spec, None if pose is None else self.scene_pose(pose), self.redraw)
 
     def spec(self, key: str) -> ModelSpec:
         """The model of this key."""
@@ -166,7 +180,7 @@ class Stock(Sendable):
         """The poses of a subject's sequences."""
         views = self.pose_list.of(subject)
         assert isinstance(views, SequencePoses)
-        return views
+        return views.drawn_for(*redraw_names(self.redraw)) if self.redraw else views
 
     def sequence(self, subject: str, pose: int) -> str:
         """The name of the sequence that a pose belongs to: the subject's, and where it has several the viewpoint's number."""
@@ -220,10 +234,10 @@ class Stock(Sendable):
         return (views.drawn_for(f"try {again}") if again else views)[pose]
 
     def layout_names(self, pose: int) -> Names:
-        """What the placing of company is drawn for, besides what it is always drawn for: a pose's try."""
+        """What the placing of company is drawn for, besides what it is always drawn for: a pose's try, and a redraw."""
         again = self.tries.get(pose)
         is_redrawn = again and self.recipe.scene.company is not None and self.recipe.scene.company.draw == "per_frame"
-        return (f"try {again}",) if is_redrawn else ()
+        return ((f"try {again}",) if is_redrawn else ()) + redraw_names(self.redraw)
 
     def viewpoint(self, subject: str, view: Viewpoint, target: Vector | None) -> Viewpoint:
         """The viewpoint of a subject's frame, jittered; it looks at `target` unless it has a target of its own."""
@@ -265,6 +279,7 @@ class Stock(Sendable):
         """A shot with all that the recipe says alike for every shot."""
         return Shot(
             key=key,
+            redraw=self.redraw,
             things=tuple(things),
             rig=self.rig,
             scene=scene,

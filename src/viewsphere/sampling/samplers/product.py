@@ -15,6 +15,7 @@ from viewsphere.model.thing import Thing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import BoxOf, center
 from viewsphere.sampling.layouts import is_slow
+from viewsphere.sampling.redraws import redraw_names
 from viewsphere.sampling.samplers import Standing, Stock
 from viewsphere.sampling.time_steps import Run, TimedPoses, at_step
 from viewsphere.store import Block
@@ -78,7 +79,7 @@ def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     if company is not None and is_slow(company.layout):
         return
     if stock.composition is not None and not stock.recipe.scene.is_moved_each_frame:
-        things = stock.composition.targets(spec, None, box_of, memory=stock.memory)
+        things = stock.composition.targets(spec, None, box_of, redraw_names(stock.redraw), stock.memory, redraw=stock.redraw)
         target = stock.composition.center(things, box_of)
     for run in stock.schedule(spec).runs:
         at = _target(stock, things[0], run, target, box_of)
@@ -92,8 +93,10 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     if stock.composition is not None:
         again = stock.layout_names(poses[0])
         from_there = _seen_from(stock, subject, poses)
-        targets = stock.composition.targets(spec, stock.scene_pose(poses[0]), box_of, again, stock.memory, from_there)
-        things = stock.composition.things(subject, targets, stock.scene_pose(poses[0]), box_of)
+        targets = stock.composition.targets(
+            spec, stock.scene_pose(poses[0]), box_of, again, stock.memory, from_there, stock.redraw
+        )
+        things = stock.composition.things(subject, targets, stock.scene_pose(poses[0]), box_of, redraw=stock.redraw)
         target = stock.composition.center(targets, box_of)
     things = stock.repainted(things, subject, poses[0])
     run = stock.schedule(spec).run_of(poses[0])

@@ -101,7 +101,7 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     targets = things = scene_things(stock, subject, pose, box_of)
     middle = center_of_all(things, box_of)
     if stock.composition is not None:
-        things = stock.composition.things(subject, things, pose, box_of)
+        things = stock.composition.things(subject, things, pose, box_of, redraw=stock.redraw)
     things += scene_distractors(stock, subject, pose, box_of) + scene_around(stock, subject, pose, box_of)
     views = stock.pose_list.of(subject)
     instants = [

@@ -1,0 +1,90 @@
+"""Frames and scenes of a finished run that no draw made as the recipe asks: warnings and notes with their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from viewsphere.limits import limits
+from viewsphere.model.sample import Sample
+from viewsphere.model.shot import Shot
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.extension import Portion
+from viewsphere.sampling.redraws import fewer, redraws_frames
+from viewsphere.store import Choice, Dataset, Store
+
+
+def left_by_chance(store: Store, portion: Portion) -> Iterator[str]:
+    """Lines about the frames of a run that are not as its recipe asks, and about scenes that lost objects."""
+    part = portion.part
+    tally = _Tally(portion)
+    dataset = Dataset(store.root, Choice(frames=((part.first, part.first + part.frames),)))
+    for key, places in dataset.shots():
+        if shot := dataset.store.labelled(key):
+            tally.add(shot, list(dataset.samples_of(key, places)))
+    yield from tally.lines(len(dataset))
+
+
+@dataclass(eq=False)
+class _Tally:
+    """Counts frames and scenes as their shots are added."""
+
+    portion: Portion
+    hidden: int = 0
+    misses: list[float] = field(default_factory=list[float])
+    empty: int = 0
+    smaller: set[str] = field(default_factory=set[str])
+
+    @property
+    def _recipe(self) -> Recipe:
+        return self.portion.plan.recipe
+
+    def add(self, shot: Shot, samples: Sequence[Sample]) -> None:
+        """Count a shot and its chosen samples."""
+        wanted, least = self._recipe.wanted, self._recipe.min_visibility
+        ids = {thing.id for thing in shot.targets(self._recipe.scenes is not None)}
+        for sample in samples:
+            own = [o for o in sample.objects if o.id in ids]
+            if own and wanted is not None:
+                self.misses.append(wanted.miss(min(o.visibility for o in own), max(o.truncation for o in own)))
+            self.hidden += bool(own) and least is not None and min(o.visibility for o in own) < least
+        if self._recipe.time is None:
+            self.empty += self._empty(samples, len(shot.rig.sensors))
+        if shot.redraw and fewer(self._recipe, shot.redraw):
+            row = self.portion.find(shot.key)
+            if row and len(self.portion.cast(row)) > sum(thing.is_target for thing in shot.things):
+                self.smaller.add(row.subject)
+
+    def _empty(self, samples: Sequence[Sample], sensors: int) -> int:
+        """Pictures of moments at which there are objects, and no sensor sees any."""
+        moments = [samples[i : i + sensors] for i in range(0, len(samples), sensors)]
+        there = [sum((sample.objects for sample in moment), ()) for moment in moments]
+        return sum(len(m) for m, objects in zip(moments, there, strict=True) if objects and not any(o.area for o in objects))
+
+    def lines(self, frames: int) -> Iterator[str]:
+        """The warnings and notes, of so many frames."""
+        best = f"the best of {limits.MAX_REDRAWS} draws each"
+        missed = sum(miss > 0 for miss in self.misses)
+        if missed:
+            yield (
+                f"warning: wanted: {missed:,} of {frames:,} frames are not as wanted, {best}; the farthest is "
+                f"{max(self.misses):.2g} beside: ask for wider shares, or for more that is random"
+            )
+        if self.hidden:
+            yield (
+                f"warning: min_visibility: {self.hidden:,} of {frames:,} frames show less than {self._recipe.min_visibility:g} "
+                f"of their models, {best}: ask for less, or for less around the models"
+            )
+        if self.empty:
+            shows = "picture shows" if self.empty == 1 else "pictures show"
+            drawn = f", the best of {limits.MAX_REDRAWS} draws each" if redraws_frames(self._recipe) else ""
+            yield (
+                f"warning: viewpoints: {self.empty:,} of {frames:,} {shows} no object{drawn}: look at the objects, "
+                "come nearer, or choose another side"
+            )
+        if self.smaller:
+            have = "scene has" if len(self.smaller) == 1 else "scenes have"
+            yield (
+                f"note: scenes.objects: {len(self.smaller):,} of {len(self.portion.plan.taken):,} {have} fewer objects than "
+                f"drawn: after {limits.MAX_REDRAWS} draws not all fitted"
+            )
