@@ -77,8 +77,14 @@ def test_a_camera_in_a_model_is_drawn_again_in_python_and_on_the_command_line(tm
     in_memory = [sample.camera.center for sample in vs.render(recipe)]
     vs.generate(recipe, tmp_path / "out")
     assert np.allclose(in_memory, [sample.camera.center for sample in vs.open(tmp_path / "out")], atol=1e-9)
-    vs.generate(recipe, tmp_path / "two", workers=2)
-    assert tree_hash(tmp_path / "out") == tree_hash(tmp_path / "two")
+
+
+@pytest.mark.slow
+def test_any_number_of_workers_draws_the_same_again(tmp_path):
+    recipe = recipe_of(scenes=scenes_on(0.55, [1, 4]), viewpoints={**LOW, "count": 3}, shot_frames=2)
+    for workers in (0, 2):
+        vs.generate(recipe, tmp_path / str(workers), workers=workers)
+    assert tree_hash(tmp_path / "0") == tree_hash(tmp_path / "2")
 
 
 def test_a_listed_camera_in_a_model_is_refused_by_both(tmp_path):
@@ -96,12 +102,14 @@ def test_a_picture_without_an_object_is_drawn_again_and_else_counted(tmp_path):
     planned, stages = plan(recipe), Stages()
     first = [s for row in planned.rows for s in stages.render(planned.shot(row, stages.box))]
     shown = [sum(bool(sample.objects[0].area) for sample in samples) for samples in (first, list(vs.render(recipe)))]
-    assert shown[0] < 10 < 13 <= shown[1] <= 16
+    assert shown[0] < 10
+    assert 13 <= shown[1] <= 16
     row = {"azimuth": [0, 180], "elevation": 0, "distance": 2, "target": [0, 0, 3]}
     (note,) = vs.generate(recipe_of(viewpoints=row, camera=narrow), tmp_path / "out").notes
     assert note.startswith("warning: viewpoints: 8 of 8 pictures show no object: ")
 
 
+@pytest.mark.slow
 def test_a_surface_that_one_draw_of_the_place_lacks_is_drawn_again():
     place = {"source": "zoo:room", "draw": "per_model"}
     scenes = {"count": 6, "objects": 1, "gap": 0.01, "surface": "shelf_2_board_3"}
@@ -114,6 +122,7 @@ def test_a_surface_that_one_draw_of_the_place_lacks_is_drawn_again():
         plan(recipe_of(models=mugs, scenes={**scenes, "surface": "shelf_9_board_9"}, scene={"place": "zoo:room"}))
 
 
+@pytest.mark.slow
 def test_the_summary_counts_scenes_that_lost_objects(tmp_path):
     notes = vs.generate(recipe_of(scenes=scenes_on(0.55, [1, 4], count=6)), tmp_path / "out").notes
     assert any(note.startswith("note: scenes.objects: ") and "fewer objects than drawn" in note for note in notes)
@@ -132,5 +141,7 @@ def test_appended_viewpoints_keep_the_draw_of_their_scene(tmp_path):
     )
     placed = {}
     for sample in vs.open(tmp_path / "out"):
-        placed.setdefault(sample.taken.shot.key[:12], set()).add(tuple(o.world_from_object.tobytes() for o in sample.objects))
+        scene = vs.open(tmp_path / "out").plan.row_at(sample.index).subject
+        placed.setdefault(scene, set()).add(tuple(o.world_from_object.tobytes() for o in sample.objects))
+    assert len(placed) == 6
     assert all(len(ways) == 1 for ways in placed.values())

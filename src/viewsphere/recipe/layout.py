@@ -19,9 +19,9 @@ ORIENTATION = (
     "on a floor, each way as likely as its hull is to come to rest so"
 )
 LAYOUT = (
-    "scatter: close by, turned at random; row: side by side; grid; fall: dropped; container: into a box; stack; volume: "
-    "in the air; another placer's name; {kind: fall, friction: 0.5}, with options of the placer; or where each stands: "
-    "[x, y, azimuth in degrees]"
+    "scatter: spread over the free floor, turned at random; heap_together: close by; row: side by side; grid; traffic: along "
+    "the place's lanes; fall: dropped; container: into a box; stack; volume: in the air; another placer's name; {kind: fall, "
+    "friction: 0.5}, with options of the placer; or where each stands: [x, y, azimuth in degrees]"
 )
 
 

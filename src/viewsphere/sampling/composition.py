@@ -12,18 +12,20 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Matrix4, Vector
+from viewsphere.model.scene import IDENTITY, Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.cast import companions
+from viewsphere.sampling.filling import shape_of
 from viewsphere.sampling.layouts import BoxOf, Laid, Remembering, laid, remembered_as, shape, unremembered
-from viewsphere.sampling.placing import Footprint, Room, footprint, standing
+from viewsphere.sampling.placing import Footprint, Obstacles, Room, footprint, obstacles, standing
 from viewsphere.sampling.redraws import SAME_MODELS, fewer, least_objects, redraw_names, redraws_place
 from viewsphere.sampling.scenery import (
     SceneryPiece,
+    composed,
     draw_names,
     draw_place,
     free_floor,
@@ -43,6 +45,9 @@ from viewsphere.store import Category
 from viewsphere.zoo.places import Lane, Surface
 
 __all__ = ["BoxOf", "Composition", "Moved", "Numbering", "center", "center_of_all", "compose", "still"]
+
+Built = Callable[[float], Obstacles | None]
+"""Gives what of a place stands up to a height, metres."""
 
 Moved = Callable[[Thing, SceneryPiece], Thing]
 """A piece of scenery with its motion."""
@@ -177,7 +182,8 @@ class Composition(Sendable):
         taken = ((shape(spec, box_of), own),)
         keep = partial(memory, remembered_as(entry, cast, ("company", spec.key, *names)))
         free, moves = self.free_floor(spec.key, pose, redraw), self.recipe.time is not None
-        room = Room(free, entry.gap, entry.spots, taken, "scene.company", seen_from=seen_from, memory=keep, moves=moves)
+        built = self.built(spec.key, pose, redraw, IDENTITY)
+        room = Room(free, entry.gap, entry.spots, taken, seen_from=seen_from, memory=keep, moves=moves, built=built)
         rng = partial(generator, self.recipe.seed, "layout", *names)
         return laid(entry.layout, entry.orientation, cast, room, box_of, rng)
 
@@ -191,6 +197,16 @@ class Composition(Sendable):
         """The floor that the place leaves free, None for all of it."""
         place = self.recipe.scene.place
         return free_floor(self.recipe, place, self.place_names(subject, pose, redraw)) if place else None
+
+    def built(self, subject: str, pose: str | None, redraw: int, world_from_room: Matrix4) -> Built | None:
+        """Gives what of the mesh of a place's file stands up to a height above a floor; None for a zoo's place, whose free
+        floor and surfaces are clear.
+        """
+        place = self.recipe.scene.place
+        if place is None or place.name:
+            return None
+        piece = self._place(self.place_names(subject, pose, redraw))[0]
+        return lambda height: built_of((piece.model, None), composed(_inverse(world_from_room), piece.world_from_piece), height)
 
     def lanes(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
         """The lanes of the place where it stands, world axes; none where it has none."""
@@ -322,6 +338,18 @@ def compose(
     if place is not None:
         place_pieces(recipe, place, draw_names(place.draw, subjects[0], ""), lambda category, labels: 1)
     return made
+
+
+@lru_cache(maxsize=4)
+def built_of(shown: tuple[ModelSpec, None], room_from_piece: Matrix4, height: float) -> Obstacles | None:
+    """What of a model stands up to a height above a room's floor; the last are kept."""
+    mesh = shape_of(shown)
+    return obstacles(transform(np.array(room_from_piece), mesh.vertices), mesh.triangles, height)
+
+
+def _inverse(pose: Matrix4) -> Matrix4:
+    rows: list[list[float]] = np.linalg.inv(np.array(pose)).tolist()
+    return tuple(map(tuple, rows))  # type: ignore[return-value]
 
 
 def still(cast: Sequence[ModelSpec], poses: Sequence[Matrix4]) -> tuple[Thing, ...]:

@@ -55,7 +55,7 @@ from viewsphere.sampling.redraws import scene_draws
 from viewsphere.sampling.rigs import rig_of
 from viewsphere.sampling.samplers import Sampler, Standing, Stock, lens
 from viewsphere.sampling.scenes import check_night, is_night
-from viewsphere.sampling.seeds import share
+from viewsphere.sampling.seeds import Names, share
 from viewsphere.sampling.sequence_checks import check_sequences
 from viewsphere.sampling.sequence_poses import SequencePoses, poses_of
 from viewsphere.sampling.splits import expected, quotas
@@ -280,26 +280,36 @@ class Plan(Shown, Stock):
         """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
         each frame. `first` is the number of its first sample, `tries` and `redraw` as for `shot`.
         """
-        return self._fitting(
-            redraw,
-            lambda number: self._taken_at(number, subject, poses, box_of, key or f"{subject}-{poses[0]:06d}", first, tries),
-        )
+        key = key or f"{subject}-{poses[0]:06d}"
+        names = (self.world(subject), self.scene_pose(poses[0]) or "")
+        return self._fitting(redraw, lambda number: self._taken_at(number, subject, poses, box_of, key, first, tries), names)
 
     def standing(self, subject: str, box_of: BoxOf) -> Sequence[Standing]:
         """What can be known before a frame is rendered of where a subject's objects stand, in the first draw that has room."""
-        return self._fitting(0, lambda number: tuple(self.sampler.standing(self.redrawn(number), subject, box_of)))
+        return self._fitting(
+            0, lambda number: tuple(self.sampler.standing(self.redrawn(number), subject, box_of)), (subject, "")
+        )
 
-    def _fitting(self, redraw: int, make: Callable[[int], Made]) -> Made:
+    def _fitting(self, redraw: int, make: Callable[[int], Made], names: Names = ()) -> Made:
         """What is made of the first draw of a scene, from this number on, that fits; raises the first draw's RecipeError where
-        none does.
+        none does. `names`: of a scene that is asked for again, whose first fitting draw is kept.
         """
         problems: list[RecipeError] = []
-        for number in range(redraw, max(redraw + 1, self.draws)):
+        for number in range(max(redraw, self._fits.get(names, 0)), max(redraw + 1, self.draws)):
             try:
-                return make(number)
+                made = make(number)
             except RecipeError as error:
                 problems.append(error)
+                continue
+            if names and redraw == 0 and number:
+                self._fits[names] = number
+            return made
         raise problems[0]
+
+    @cached_property
+    def _fits(self) -> dict[Names, int]:
+        """The first fitting draw of each scene whose original does not fit, as far as it was looked for."""
+        return {}
 
     @cached_property
     def draws(self) -> int:

@@ -17,6 +17,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import RngOf
 from viewsphere.sampling.placing._footprint import Footprint, Outline, footprint, outline, standing
+from viewsphere.sampling.placing._obstacles import Obstacles, obstacles
 from viewsphere.sampling.placing._room import Memory, Room, Spot, checked, forgetful
 from viewsphere.sampling.placing._shape import Shape
 from viewsphere.sampling.placing._way import Way
@@ -25,6 +26,7 @@ __all__ = [
     "Draws",
     "Footprint",
     "Memory",
+    "Obstacles",
     "Outline",
     "Piece",
     "Placer",
@@ -36,6 +38,7 @@ __all__ = [
     "draws_of",
     "footprint",
     "forgetful",
+    "obstacles",
     "outline",
     "standing",
 ]

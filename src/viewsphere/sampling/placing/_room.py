@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
-from viewsphere.sampling.placing._footprint import Footprint, footprint
+from viewsphere.sampling.placing._footprint import Footprint, Outline, footprint
+from viewsphere.sampling.placing._obstacles import Obstacles
 from viewsphere.sampling.placing._shape import Shape
 
 Spot = tuple[float, float, float]
@@ -34,7 +37,7 @@ class Room:
     `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it; `clearance`: metres
     of air above, None where it has no end; `seen_from`: azimuth and elevation, degrees, of the camera, where one is
     known; `memory`: keeps what is simulated; `moves`: whether it is asked how things came
-    to where they stand, too.
+    to where they stand, too; `built` gives what of the place's mesh stands up to a height above the floor, `blocked` is that.
     """
 
     free: Footprint | None = None
@@ -47,6 +50,21 @@ class Room:
     seen_from: tuple[float, float] | None = None
     memory: Memory = forgetful
     moves: bool = False
+    built: Callable[[float], Obstacles | None] | None = None
+    blocked: Obstacles | None = None
+
+    def obstacles(self, shapes: Sequence[Shape]) -> Room:
+        """The same room, which knows what of its place is in the way of things of these shapes."""
+        if self.built is None or not shapes:
+            return self
+        highest = max(float(np.ptp(shape.box[:, 2])) for shape in shapes)
+        return replace(self, blocked=self.built(highest))
+
+    def is_clear(self, own: Footprint | Outline, others: Sequence[Any]) -> bool:
+        """Whether something that covers so much of the floor is clear of others and of the place, by the gap."""
+        if not all(own.apart(other, self.gap) for other in others):
+            return False
+        return self.blocked is None or not self.blocked.meets(own.corners, self.gap)
 
     @property
     def prints(self) -> tuple[Footprint, ...]:

@@ -1,57 +1,57 @@
-"""Close by, turned at random: one after another, uniform in a circle that grows until there is room."""
+"""Spread over the free floor, turned at random: uniform over all spots that are clear; on an endless floor, and beside a model
+that company joins, close by, as `heap_together`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from viewsphere.errors import RecipeError
-from viewsphere.geometry.hull import convex_hull
 from viewsphere.model.camera import Camera
-from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.numbers import Length
 from viewsphere.model.scene import Matrix4
-from viewsphere.sampling.placing import Draws, Room, Shape, footprint, outline
-from viewsphere.sampling.placing._spot import free_spot
+from viewsphere.recipe.draws import Drawn, drawn
+from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, draws_of
+from viewsphere.sampling.placing._scattered import Gaps, scattered
+from viewsphere.sampling.placing._spot import Cover, free_spot, spread_spot
 
 
-class Options(Frozen):
-    """How near to one another."""
+class Options(Gaps):
+    """How near to one another, and how far from the middle."""
 
-    between: Literal["boxes", "hulls"] = Field(
-        default="boxes",
-        description="what the gap is between: boxes, or hulls, as seen from above, which lets models stand closer together",
+    reach: Drawn[Length] = Field(
+        default=10.0,
+        description="metres from the middle along and across the floor, at most: cameras look at the middle, and a street is "
+        "200 m long",
     )
 
 
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
 ) -> Sequence[Matrix4]:
-    """Poses, no two boxes, or hulls, nearer than the room's gap; raises RecipeError where no spot is found for one.
+    """Poses, no two boxes, or hulls, nearer than the room's gap; raises RecipeError where no spot is found for one."""
+    if room.free is None or room.taken:
+        return scattered(cast, room, shapes, rng, options, free_spot)
+    floor = _within(room.free, drawn(options.reach, draws_of(rng, "reach")))
 
-    Each member's draws are for its slot and its key.
-    """
-    poses: list[Matrix4] = []
-    of_hulls = options.between == "hulls"
-    prints: list[Any] = [outline(shape.vertices(), pose) for shape, pose in room.taken] if of_hulls else list(room.prints)
-    for slot, (spec, shape) in enumerate(zip(cast, shapes, strict=True)):
-        cover = partial(outline, _seen_from_above(shape)) if of_hulls else partial(footprint, shape.box)
-        pose = free_spot(rng(str(slot), spec.key), room, shape.box, prints, cover if of_hulls else None)
-        if pose is None:
-            raise RecipeError(
-                f"{room.field}: expected room for {len(prints) + len(cast) - slot} models; found none for {spec.key}: ask for "
-                "fewer, or for a smaller gap"
-            )
-        poses.append(pose)
-        prints.append(cover(pose))
-    return poses
+    def spot(
+        draws: np.random.Generator, room: Room, box: NDArray[np.float64], others: Sequence[Any], cover: Cover | None
+    ) -> Matrix4 | None:
+        return spread_spot(draws, room, floor, box, others, cover)
+
+    return scattered(cast, room, shapes, rng, options, spot)
 
 
-def _seen_from_above(shape: Shape) -> NDArray[np.float64]:
-    """Points (N, 3) of a model that cover as much of the floor as all of it, however it is turned about the vertical."""
-    return np.insert(convex_hull(shape.vertices()[:, :2]), 2, 0.0, axis=1)
+def _within(floor: Footprint, reach: float) -> Footprint:
+    """The part of a floor that is so near to the origin along its axes; all of one that is wholly farther away."""
+    middle = floor.axes @ floor.center
+    low, high = np.maximum(middle - floor.half, -reach), np.minimum(middle + floor.half, reach)
+    if (high <= low).any():
+        return floor
+    return replace(floor, center=(low + high) / 2 @ floor.axes, half=(high - low) / 2)

@@ -123,6 +123,8 @@ def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxO
         free = footprint(
             box_vertices((-stand.size[0] / 2, -stand.size[1] / 2, 0), (stand.size[0] / 2, stand.size[1] / 2, 0)), IDENTITY
         )
+    world_from_room = IDENTITY if stand is None else stand.world_from_surface
+    built = None if stock.composition is None else stock.composition.built(subject, pose, redraw, world_from_room)
     again = redraw_names(redraw)
     names = ("scene", subject, *again) if pose is None else ("scene", subject, pose, *again)
     room = Room(
@@ -134,8 +136,8 @@ def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxO
         clearance=None if stand is None else stand.clearance,
         memory=partial(stock.memory, remembered_as(entry, models, names)),
         moves=recipe.time is not None,
+        built=built,
     )
-    world_from_room = IDENTITY if stand is None else stand.world_from_surface
     rng = partial(generator, recipe.seed, "layout", subject, *again)
     return laid(entry.layout, entry.orientation, models, room, box_of, rng, world_from_room)
 

@@ -1,0 +1,74 @@
+"""What of a place's mesh is in the way of things on its floor, as a grid seen from above."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+CELLS = 1024
+"""Cells along the longer side of a grid: 1 cm for 10 m, as fine as gaps that recipes ask for."""
+
+REACH = 20.0
+"""Metres from the middle within which the mesh is looked at; things stand nearer."""
+
+STEP = 0.02
+"""Metres above the floor up to which a mesh is floor: carpets, sills and the slope of a floor that is nearly level."""
+
+FREE = 0.01
+"""Share of the grid that has to be free. A mesh that leaves less, such as a hilly ground, says nothing of where things fit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Cells (columns, rows) that a place fills, from a corner (2,) on; metres."""
+
+    corner: Float
+    cell: float
+    filled: NDArray[np.bool_]
+
+    def meets(self, corners: Float, gap: float) -> bool:
+        """Whether a convex polygon (N, 2), counter-clockwise or not, is nearer than a gap to what the place fills."""
+        low, high = ((edge - self.corner) / self.cell for edge in (corners.min(axis=0) - gap, corners.max(axis=0) + gap))
+        x0, y0 = np.maximum(np.floor(low).astype(int), 0)
+        x1, y1 = np.minimum(np.ceil(high).astype(int), self.filled.shape)
+        if x1 <= x0 or y1 <= y0:
+            return False
+        cells = np.argwhere(self.filled[x0:x1, y0:y1])
+        return bool(len(cells)) and _is_near(corners, self.corner + (cells + (x0, y0) + 0.5) * self.cell, gap + self.cell / 2)
+
+
+def _is_near(corners: Float, points: Float, gap: float) -> bool:
+    """Whether one of the points (N, 2) is nearer than a gap to each side of a convex polygon, on the inner side of the gap."""
+    sides = np.roll(corners, -1, axis=0) - corners
+    turn = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
+    lengths = np.maximum(np.linalg.norm(sides, axis=1), 1e-12)
+    outward = np.stack([sides[:, 1], -sides[:, 0]], axis=1) / lengths[:, None] * np.sign(turn or 1.0)
+    beyond = points @ outward.T - (corners * outward).sum(axis=1)
+    return bool((beyond <= gap).all(axis=1).any())
+
+
+def obstacles(vertices: Float, triangles: NDArray[np.int32], height: float) -> Obstacles | None:
+    """The cells over which triangles (M, 3) of vertices (N, 3), in the floor's axes, stand between the floor and a height; None
+    where nothing does.
+    """
+    from PIL import Image, ImageDraw
+
+    corners = vertices[triangles]
+    above = (corners[..., 2].max(axis=1) > STEP) & (corners[..., 2].min(axis=1) < height)
+    near = (np.abs(corners[..., :2]).min(axis=1) <= REACH).all(axis=1)
+    flat = corners[above & near][..., :2].clip(-2 * REACH, 2 * REACH)
+    if not len(flat):
+        return None
+    low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
+    cell = max(float((high - low).max()) / CELLS, 1e-4)
+    columns, rows = (int(n) + 3 for n in np.ceil((high - low) / cell))
+    picture = Image.new("1", (columns, rows))
+    draw = ImageDraw.Draw(picture)
+    for polygon in ((flat - low) / cell + 1).round().astype(int).reshape(-1, 6).tolist():
+        draw.polygon(polygon, fill=1, outline=1)
+    filled = np.asarray(picture).T.copy()
+    return None if (~filled).mean() < FREE else Obstacles(low - 1.5 * cell, cell, filled)

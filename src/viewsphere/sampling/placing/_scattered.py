@@ -1,0 +1,59 @@
+"""Things one after another, each at a spot that is found for it, as several placers scatter them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.hull import convex_hull
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Matrix4
+from viewsphere.sampling.placing import Draws, Room, Shape, footprint, outline
+from viewsphere.sampling.placing._spot import Cover
+
+Spot = Callable[[np.random.Generator, Room, NDArray[np.float64], Sequence[Any], Cover | None], Matrix4 | None]
+"""Finds a pose for a box in a room, clear of what others cover."""
+
+
+class Gaps(Frozen):
+    """How near to one another."""
+
+    between: Literal["boxes", "hulls"] = Field(
+        default="boxes",
+        description="what the gap is between: boxes, or hulls, as seen from above, which lets models stand closer together",
+    )
+
+
+def scattered(
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Gaps, spot: Spot
+) -> Sequence[Matrix4]:
+    """Poses, no two boxes, or hulls, nearer than the room's gap, and none nearer to the place's mesh; raises RecipeError where
+    no spot is found for one. Each member's draws are for its slot and its key.
+    """
+    room = room.obstacles(shapes)
+    poses: list[Matrix4] = []
+    of_hulls = options.between == "hulls"
+    prints: list[Any] = [outline(shape.vertices(), pose) for shape, pose in room.taken] if of_hulls else list(room.prints)
+    for slot, (spec, shape) in enumerate(zip(cast, shapes, strict=True)):
+        cover = partial(outline, _seen_from_above(shape)) if of_hulls else partial(footprint, shape.box)
+        pose = spot(rng(str(slot), spec.key), room, shape.box, prints, cover if of_hulls else None)
+        if pose is None:
+            raise RecipeError(
+                f"{room.field}: expected room for {len(prints) + len(cast) - slot} models; found none for {spec.key}: ask for "
+                "fewer, or for a smaller gap"
+            )
+        poses.append(pose)
+        prints.append(cover(pose))
+    return poses
+
+
+def _seen_from_above(shape: Shape) -> NDArray[np.float64]:
+    """Points (N, 3) of a model that cover as much of the floor as all of it, however it is turned about the vertical."""
+    return np.insert(convex_hull(shape.vertices()[:, :2]), 2, 0.0, axis=1)
