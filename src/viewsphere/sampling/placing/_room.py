@@ -14,6 +14,7 @@ from viewsphere.model.scene import Matrix4
 from viewsphere.sampling.placing._footprint import Footprint, Outline, footprint
 from viewsphere.sampling.placing._obstacles import Obstacles
 from viewsphere.sampling.placing._shape import Shape
+from viewsphere.zoo.places import Lane
 
 Spot = tuple[float, float, float]
 """(x, y) on the floor, metres, and the azimuth that a front faces there, degrees."""
@@ -37,7 +38,8 @@ class Room:
     `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it; `clearance`: metres
     of air above, None where it has no end; `seen_from`: azimuth and elevation, degrees, of the camera, where one is
     known; `memory`: keeps what is simulated; `moves`: whether it is asked how things came
-    to where they stand, too; `built` gives what of the place's mesh stands up to a height above the floor, `blocked` is that.
+    to where they stand, too; `built` gives what of the
+    place's mesh stands up to a height above the floor, `blocked` is that; `lanes`: those of the place.
     """
 
     free: Footprint | None = None
@@ -52,6 +54,7 @@ class Room:
     moves: bool = False
     built: Callable[[float], Obstacles | None] | None = None
     blocked: Obstacles | None = None
+    lanes: tuple[Lane, ...] = ()
 
     def obstacles(self, shapes: Sequence[Shape]) -> Room:
         """The same room, which knows what of its place is in the way of things of these shapes."""

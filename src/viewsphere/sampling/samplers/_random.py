@@ -137,6 +137,7 @@ def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxO
         memory=partial(stock.memory, remembered_as(entry, models, names)),
         moves=recipe.time is not None,
         built=built,
+        lanes=() if stock.composition is None or stand is not None else stock.composition.lanes(subject, pose, redraw),
     )
     rng = partial(generator, recipe.seed, "layout", subject, *again)
     return laid(entry.layout, entry.orientation, models, room, box_of, rng, world_from_room)

@@ -1,0 +1,69 @@
+"""Models spread over the free floor, clear of a file's geometry, or heaped together as close as they go."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.stages import Stages
+from viewsphere.sampling.plan import plan
+
+
+def spots_of(folder, layout="scatter", place=None, count=1, objects=25):
+    weed = trimesh.creation.icosphere(1, 0.04)
+    weed.export(folder / "weed.glb")
+    recipe = Recipe(
+        name="field",
+        models=[{"source": str(folder / "weed.glb"), "category": "weed", "up": "+z", "forward": "-y"}],
+        scenes={
+            "count": count,
+            "objects": objects,
+            "repeat": True,
+            "layout": layout,
+            "gap": 0.01,
+            "surface": {"size": [2, 2], "height": 0.001},
+        },
+        viewpoints={"azimuth": 0, "elevation": 70, "distance": 2.2},
+        camera={"size": [32, 32], "fov_deg": 60},
+        scene={} if place is None else {"place": place},
+        channels=["instances"],
+        formats=[],
+        splits={"by": "scene", "train": 1},
+    )
+    planned, stages = plan(recipe), Stages()
+    shots = [planned.shot(row, stages.box) for row in planned.rows]
+    return np.array([np.array(t.world_from_object)[:2, 3] for s in shots for t in s.things if t.is_target])
+
+
+def test_scatter_is_uniform_over_a_surface(tmp_path):
+    spots = spots_of(tmp_path, count=16)
+    assert (np.abs(spots) <= 0.96 + 1e-9).all()
+    counts, _, _ = np.histogram2d(*spots.T, bins=4, range=[[-0.96, 0.96]] * 2)
+    expected = len(spots) / 16
+    assert ((counts - expected) ** 2 / expected).sum() < 37.7  # chi-square of 15 degrees of freedom, p = 0.001
+
+
+def test_heap_together_is_close_by(tmp_path):
+    assert np.linalg.norm(spots_of(tmp_path, "heap_together"), axis=1).max() < 0.4
+
+
+def test_scatter_keeps_clear_of_a_files_geometry(tmp_path):
+    rows, crops = trimesh.Scene(), []
+    for i in range(4):
+        for j in range(6):
+            crop = trimesh.creation.icosphere(2, 0.06)
+            crop.apply_translation((i * 0.5 - 0.75, j * 0.3 - 0.75, 0.06))
+            crops.append((i * 0.5 - 0.75, j * 0.3 - 0.75))
+            rows.add_geometry(crop, node_name=f"crop_{i}_{j}", geom_name=f"crop_{i}_{j}")
+    rows.export(tmp_path / "rows.glb")
+    place = {"source": str(tmp_path / "rows.glb"), "up": "+z", "forward": "-y", "origin": [0, 0, 0]}
+    spots = spots_of(tmp_path, place=place, count=2)
+    gaps = np.linalg.norm(spots[:, None] - np.array(crops), axis=2).min(axis=1) - 0.06 - 0.04
+    assert gaps.min() > 0
+    free = spots_of(tmp_path, count=2)
+    assert (np.linalg.norm(free[:, None] - np.array(crops), axis=2).min(axis=1) < 0.1).any()  # else nothing is in the way
+
+
+@pytest.mark.parametrize("layout", ["scatter", "heap_together"])
+def test_hulls_are_spread_as_well(layout, tmp_path):
+    assert len(spots_of(tmp_path, {"kind": layout, "between": "hulls"}, objects=5)) == 5
