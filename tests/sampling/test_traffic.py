@@ -49,5 +49,5 @@ def test_parked_cars_stand_beside_the_lane():
 
 
 def test_a_place_without_lanes_is_refused():
-    with pytest.raises(RecipeError, match="needs a scene.place with lanes"):
+    with pytest.raises(RecipeError, match=r"needs a scene\.place with lanes"):
         shots_of(None)
