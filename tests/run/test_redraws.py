@@ -89,9 +89,9 @@ def test_any_number_of_workers_draws_the_same_again(tmp_path):
 
 def test_a_listed_camera_in_a_model_is_refused_by_both(tmp_path):
     recipe = recipe_of(viewpoints={"azimuth": 0, "elevation": 0, "distance": 0.05})
-    with pytest.raises(RecipeError, match="camera outside|is inside the model"):
+    with pytest.raises(RecipeError, match=r"camera outside|is inside the model"):
         list(vs.render(recipe))
-    with pytest.raises(RecipeError, match="camera outside|is inside the model"):
+    with pytest.raises(RecipeError, match=r"camera outside|is inside the model"):
         vs.generate(recipe, tmp_path / "out")
 
 
