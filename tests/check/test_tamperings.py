@@ -15,6 +15,7 @@ from viewsphere.check import check
 from viewsphere.check.claims import left_out, unclaimed
 from viewsphere.check.models import differing
 from viewsphere.check.recomputed import Recomputed
+from viewsphere.check.repair import repair
 from viewsphere.check.sources import Sources
 from viewsphere.labels import channels
 from viewsphere.model.channel import PASSES
@@ -278,3 +279,18 @@ def test_a_model_that_was_left_out_without_a_reason_is_found(copied):
     shutil.rmtree(dataset.store.model_folder(key))
     (copied / "store" / "skipped.json").write_text(json.dumps({key: "no triangles"}))
     assert "skipped" in {finding.check for finding in verdict(copied).findings}
+
+
+@pytest.mark.slow
+def test_what_contradicts_the_recipe_is_made_again(copied):
+    """A model's true size, and the light of a shot; the bytes are then those of before."""
+    dataset = Dataset(copied)
+    model = dataset.store.model_folder(dataset.plan.models[0]) / "model.json"
+    shot = dataset.store.shot_folder(dataset.rows[0].key) / "shot.json"
+    before = [path.read_text() for path in (model, shot)]
+    model.write_text(json.dumps(json.loads(before[0]) | {"real_size": [1.0, 2.0, 3.0]}))
+    shot.write_text(json.dumps(json.loads(before[1]) | {"label_alpha": 0.5}))
+    seal_again(copied)
+    repaired = repair(copied, rays=False)
+    assert repaired.report.ok, repaired.report.findings
+    assert [path.read_text() for path in (model, shot)] == before

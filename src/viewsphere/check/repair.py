@@ -10,6 +10,8 @@ from typing import Any
 from viewsphere.check import Finding, Report, check, exports, lacking_models
 from viewsphere.check.digests import damaged
 from viewsphere.check.models import differing
+from viewsphere.check.recomputed import Recomputed
+from viewsphere.check.sources import Sources
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.limits import limits
 from viewsphere.run.exporting import export
@@ -59,12 +61,13 @@ class _Mending:
         self._tried: set[str] = set()
 
     def damaged_models(self) -> Iterator[str]:
-        """Keys of models that are not as they were written, that are missing, or whose files say different things."""
+        """Keys of models that were changed, are missing, or contradict one another or their source."""
         plan, store = self._dataset.plan, self._dataset.store
         folders = damaged(self._dataset)[1]
         found = {key for key in plan.models if store.model_folder(key) in folders}.union(lacking_models(self._dataset))
         if not found:
             found.update(key for key, _ in differing(self._dataset, []))
+            found.update(key for key, _ in Sources(self._dataset, Recomputed(self._dataset)).contradictions(plan.models))
         return (key for key in plan.models if key in found)
 
     def damaged_shots(self) -> Iterator[str]:
