@@ -9,6 +9,7 @@ import pytest
 
 from quick import quick
 from sealing import seal_again
+from sequence_recipe import eventful_recipe
 from small import small_recipe
 from viewsphere import generate
 from viewsphere.check import check
@@ -16,6 +17,7 @@ from viewsphere.check.claims import left_out, unclaimed
 from viewsphere.check.models import differing
 from viewsphere.check.recomputed import Recomputed
 from viewsphere.check.repair import repair
+from viewsphere.check.report import Finding, Report
 from viewsphere.check.sources import Sources
 from viewsphere.labels import channels
 from viewsphere.model.channel import PASSES
@@ -294,3 +296,37 @@ def test_what_contradicts_the_recipe_is_made_again(copied):
     repaired = repair(copied, rays=False)
     assert repaired.report.ok, repaired.report.findings
     assert [path.read_text() for path in (model, shot)] == before
+
+
+@pytest.mark.slow
+def test_parts_that_were_appended_are_planned_and_painted_again(tmp_path):
+    """Another model, then another viewpoint, then a channel of the frames that are there."""
+    known = {"formats": [], "channels": ["rgb", "depth", "instances"], "splits": {"train": 1}}
+    more = [{"source": "zoo:post_box", "category": "post box", "count": 3, "scale": {"length": 0.18}}]
+    views = {"azimuth": [0, 60, 120, 240], "elevation": [15, 50], "distance": 1.0}
+    generate(small_recipe(**known), tmp_path)
+    for added in ({"models": more}, {"viewpoints": views}, {"channels": ["rgb", "depth", "instances", "normals", "rgba"]}):
+        known |= added
+        generate(small_recipe(**known), tmp_path, append=True)
+    report = check(Dataset(tmp_path), repaint=None, rays=False)
+    assert report.ok and set(report.not_run) == {"surface"}
+    assert report.checked["plan"] == 4 and report.checked["repaint"] == 24
+
+
+@pytest.mark.slow
+def test_sequences_are_composed_and_painted_again(tmp_path):
+    """Of a stereo rig that shakes around things that move; each frame is painted by itself."""
+    generate(eventful_recipe(6), tmp_path)
+    report = check(Dataset(tmp_path), repaint=3, rays=False)
+    assert report.ok and set(report.not_run) == {"surface"}
+    assert "3 of 24 frames painted again" in report.verdict
+
+
+def test_a_verdict_names_every_proof_that_did_not_run():
+    """The number of proofs that hold counts those that looked at anything."""
+    whole = Report({"digests": 9, "depth": 3}, ())
+    assert whole.verdict == "all proofs hold"
+    some = Report({"digests": 9, "depth": 0}, (), not_run={"depth": "no frame has it", "surface": "install viewsphere[check]"})
+    assert some.verdict == "1 proof holds, 2 not run: depth (no frame has it), surface (install viewsphere[check])"
+    failed = Report({"digests": 9}, (Finding("digests", None, "a"),), coverage=((3, 12, "frames painted again"),))
+    assert failed.verdict == "1 finding; 3 of 12 frames painted again"

@@ -149,12 +149,14 @@ def _alone(dataset: Dataset) -> str:
 def _chosen(dataset: Dataset, positions: range, sample: int | None, repaint: int | None, rays: bool | None) -> Chosen:
     """The frames that are computed and painted again, and the shots that are composed again."""
     computed, painted = _spread(positions, sample), _spread(positions, repaint)
-    frames = (index for _, _, index in indices_at(dataset, computed))
-    keys = list(dict.fromkeys(row.key for frame in frames for row in rows_of(dataset.plan, frame)))
-    redrawn = any(part.recipe.get(name) is not None for part in dataset.plan.parts for name in DRAWN_AGAIN)
+    places: dict[str, int] = {}
+    for position, _, frame in indices_at(dataset, computed):
+        for row in rows_of(dataset.plan, frame):
+            places.setdefault(row.key, position)
+    keys, redrawn = list(places), any(part.recipe.get(name) is not None for part in dataset.plan.parts for name in DRAWN_AGAIN)
     if redrawn and sample is not None:
         keys = [keys[i] for i in _spread(range(len(keys)), FEW_SHOTS)]
-    return Chosen(computed, painted, frozenset(keys), rays)
+    return Chosen(computed, painted, {key: places[key] for key in keys}, rays)
 
 
 def _covered(report: Report, dataset: Dataset, chosen: Chosen, read: int) -> Report:

@@ -26,13 +26,13 @@ from viewsphere.store.index import numbers
 
 @dataclass(frozen=True)
 class Chosen:
-    """The positions whose labels are computed again and those painted again, the keys of the shots that are composed again, and
-    whether rays are cast (None: where embreex is installed).
+    """The positions whose labels are computed again and those painted again, the shots that are composed again, each with one
+    of its positions, and whether rays are cast (None: where embreex is installed).
     """
 
     computed: range
     painted: range
-    composed: frozenset[str]
+    composed: Mapping[str, int]
     rays: bool | None
 
 
@@ -60,7 +60,6 @@ class _Proofs:
         self._caster = None if chosen.rays is False else self._make_caster()
         self._recomputed = recomputed
         self._repainted = Repainted(dataset, recomputed)
-        self._composed: set[str] = set()
         names = (*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name)))
         self._checked: dict[str, dict[int, None]] = {name: {} for name in names}
 
@@ -70,7 +69,7 @@ class _Proofs:
         yield "shot", _carried_out(partial(_as_shot, self._dataset, self._scenery, sample))
         if position in self._chosen.computed:
             yield from self._by_models(sample)
-        yield from self._by_recipe(sample)
+        yield from self._by_recipe(position, sample)
         if position in self._chosen.painted:
             yield from self._by_painting(sample)
 
@@ -104,11 +103,10 @@ class _Proofs:
         if self._caster and all(o.is_placed for o in sample.objects) and {"depth", "instances"} <= sample.files.keys():
             yield "surface", _carried_out(partial(self._caster.off_surface, sample))
 
-    def _by_recipe(self, sample: Sample) -> Iterator[tuple[str, list[str]]]:
-        """The shots of a frame, composed again, with the first of their frames."""
+    def _by_recipe(self, position: int, sample: Sample) -> Iterator[tuple[str, list[str]]]:
+        """The shots of a frame, composed again with one of their frames."""
         for row in rows_of(self._dataset.plan, sample.index):
-            if row.key in self._chosen.composed and row.key not in self._composed:
-                self._composed.add(row.key)
+            if self._chosen.composed.get(row.key) == position:
                 messages = _carried_out(partial(self._recomputed.of_shot, row))
                 if self._recomputed.is_composed(row):
                     yield "recipe", messages

@@ -111,7 +111,7 @@ class Recomputed:
 
     def _portion(self, number: int) -> Portion | None:
         part = self._record.parts[number]
-        if part.merged or not part.is_sampled:
+        if not part.is_rendered:
             self.why_not[number] = f"part {number + 1} was rendered elsewhere"
         elif part.version != version("viewsphere"):
             self.why_not[number] = f"made by viewsphere {part.version}"
@@ -179,7 +179,7 @@ def _inside(text: str, record: PlanRecord) -> Iterator[str]:
     """Contradictions of plan.json that need no recipe: between its fields and those that follow from them."""
     found = parsed(text)
     yield from in_words(differences(parsed(record.to_json()), found), "plan.json", "the rest of it")
-    rendered = all(part.is_sampled and not part.merged for part in record.parts)
+    rendered = all(part.is_rendered for part in record.parts)
     merged = [part.merged for part in record.parts]
     if sum(merged) == 1 or merged != sorted(merged, reverse=True):
         yield f"plan.json: expected parts of two merged data sets before all others, or none; found merged: {merged}"

@@ -98,7 +98,7 @@ class Mender:
             return self._replanned.portion(number)
         except UserError as error:
             part = self.record.parts[number]
-            if part.merged or not part.is_sampled:
+            if not part.is_rendered:
                 raise
             problem = "another recipe" if isinstance(error, AnotherPlan) else error
             raise StoreError(

@@ -80,7 +80,7 @@ class Replanned:
 
     def _planned(self, number: int) -> Plan:
         part = self.record.parts[number]
-        if part.merged or not part.is_sampled:
+        if not part.is_rendered:
             raise StoreError(
                 f"{self.store.root}: part {number + 1}: expected one that was rendered here, found another data set's: repair "
                 "that one, then merge or import it anew"

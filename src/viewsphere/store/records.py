@@ -205,6 +205,11 @@ class Part:
         return self.sampler == PRODUCT and bool(self.blocks)
 
     @property
+    def is_rendered(self) -> bool:
+        """Whether the part's recipe rendered its shots into this data set, frames of its own or channels of others."""
+        return self.sampler != IMPORT and not self.merged
+
+    @property
     def is_sampled(self) -> bool:
         """Whether a recipe made it: its subjects, models or scenes, are taken from known poses."""
         return self.sampler != IMPORT and bool(self.blocks)
