@@ -350,6 +350,7 @@ def cycle(root):
 BROKEN = {
     "cycle": (cycle, "cycle"),
     "version": (lambda r: r.update(asset={"version": "1.0"}), "1.0"),
+    "version as a number": (lambda r: r.update(asset={"version": 1}), "expected glTF version 2.0, found 1"),
     "giant count": (lambda r: r["accessors"][0].update(count=10**15), "elements"),
     "giant zeros": (lambda r: r.update(accessors=[{"componentType": 5126, "type": "VEC3", "count": 10**10}]), "at most"),
     "short view": (lambda r: r["bufferViews"][0].update(byteLength=10), "truncated"),

@@ -142,6 +142,8 @@ def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, Fil
     if suffix in BLENDER_SUFFIXES:
         from viewsphere.assets.via_blender import read_via_blender
 
+        if suffix in USD:
+            folder.warn("Blender may lose the transform above a mesh that is below a mesh; pip install 'viewsphere[usd]'")
         return read_via_blender(folder)
     if suffix == "obj":
         from viewsphere.assets.obj import read_obj
