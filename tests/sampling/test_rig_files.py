@@ -10,6 +10,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import project
 from viewsphere.model.rig import Rig
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.rig_files import read_rig as read_rig_file
 from viewsphere.sampling.rigs import rig_of
 
 K1, K2 = np.array([[420.0, 0, 315.5], [0, 425, 239.5], [0, 0, 1]]), np.array([[430.0, 0, 320.0], [0, 431, 242.0], [0, 0, 1]])
@@ -210,6 +211,14 @@ def test_what_cannot_be_read_is_one_line_with_the_file(tmp_path, text, expected)
     with pytest.raises(RecipeError, match=expected) as caught:
         read(tmp_path, text)
     assert str(caught.value).startswith(str(tmp_path)) and "\n" not in str(caught.value)
+
+
+def test_projections_without_a_focal_length_are_refused(tmp_path):
+    flat = np.hstack([K1, np.zeros((3, 1))])
+    text = opencv(K1=K1, K2=K2, R=R, T=T[:, None], P1=flat, P2=flat * [[0, 1, 1, 1], [1, 1, 1, 1], [1, 1, 1, 1]])
+    (tmp_path / "rig.yaml").write_text(text)
+    with pytest.raises(RecipeError, match="expected focal lengths above 0"):
+        read_rig_file([tmp_path / "rig.yaml"], rectified=True)
 
 
 def test_a_file_that_is_not_there(tmp_path: Path):

@@ -32,8 +32,8 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
     extent = _size(found, where)
     if rectified:
         left, right = (matrix(found.get(name), f"{where}: {name}", (3, 4)) for name in ("P1", "P2"))
+        lenses = [(pinhole(one, where), None) for one in (left, right)]  # which refuses focal lengths of 0
         apart = -float(right[0, 3]) / float(right[0, 0])
-        lenses = ((pinhole(one, where), None) for one in (left, right))
         poses = np.eye(4), rigid(np.eye(3), (apart, 0.0, 0.0))
     else:
         turn = rotation(matrix(found.get("R"), f"{where}: R"), f"{where}: R")
