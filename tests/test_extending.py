@@ -5,6 +5,7 @@ import json
 import os
 import pickle
 import re
+import subprocess
 import sys
 import types
 from collections.abc import Callable, Iterator
@@ -16,12 +17,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from deadline import DEADLINE
 from sealing import seal_again
 from sequence_recipe import eventful_recipe
 from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate, labels, plan, plugins, render
 from viewsphere.check import check
-from viewsphere.errors import RecipeError
+from viewsphere.errors import RecipeError, UserError
 from viewsphere.run.exporting import export
 from viewsphere.store.sample_records import from_whole_sample, whole_sample
 
@@ -140,6 +142,85 @@ def test_a_channel_that_needs_its_neighbours_is_refused_for_still_pictures(label
     labelled("borders", code.replace("compute=compute,", "compute=compute, needs=Needs(instants=(-1, 1)),"))
     with pytest.raises(RecipeError, match=r"channels\[1\]: expected time beside borders, .*; found none: set time"):
         plan(small_recipe(channels=["rgb", "borders"]))
+
+
+def test_an_engine_is_one_file(monkeypatch):
+    install(monkeypatch, "flat", "viewsphere.engines", EXAMPLES["flat"])
+    recipe = small_recipe(engine="flat", channels=["rgb", "rgba", "depth", "instances"], formats=[])
+    plain = {sample.index: sample for sample in render(small_recipe(channels=["rgb", "depth", "instances"], formats=[]))}
+    for sample in render(recipe):
+        seen = sample.instances > 0
+        assert len(np.unique(sample.rgb[seen], axis=0)) == 1 and (sample.rgb[seen] != sample.rgb[~seen][0]).any(axis=1).all()
+        assert np.array_equal(sample.channels["rgba"][..., 3] > 0, seen)
+        assert np.array_equal(sample.depth, plain[sample.index].depth)
+    with pytest.raises(UserError, match="engine: flat has no options; found gloss"):
+        next(iter(render(small_recipe(engine={"name": "flat", "gloss": 1}, formats=[]))))
+
+
+GROUPS = {
+    "csv_boxes": ("formats", "One row an object"),
+    "lines": ("formats", "One JSON line a picture"),
+    "borders": ("labels", "borders"),
+    "flat": ("engines", "flat"),
+    "circle": ("placers", "In a circle around the middle, all facing it; where the circle begins is drawn."),
+    "bounce": ("motions", "Falls from a height, and bounces."),
+    "pairs": ("samplers", "Every model beside the next one, from all poses."),
+    "dots": ("materials", "dots"),
+}
+"""The plug-ins of the page: their groups, and how their examples begin."""
+
+INSTALLED = """
+models: [{source: "zoo:mug", count: 3}, {source: "zoo:box", category: box}]
+viewpoints: {azimuth: [0, 40], elevation: 20, distance: 2}
+camera: {size: [96, 72], fov_deg: 40}
+scene: {ground: {material: dots}}
+channels: [rgb, instances, borders]
+formats: [csv_boxes, lines]
+splits: {by: frame, train: 1}
+"""
+RECIPES = {
+    "still": "engine: flat\nscenes: {count: 2, objects: 3, layout: circle}\n",
+    "pairs": "scenes: {sampler: pairs, gap: 0.2}\n",
+    "moving": "time: {frames: 2, fps: 10}\nscenes: {count: 1, objects: 2}\n",
+}
+
+
+@pytest.mark.slow
+def test_the_page_s_plug_ins_work_in_a_package_that_is_installed(tmp_path):
+    """Written as pip writes it: modules, and metadata with entry points; then used by the command line."""
+    site, package = tmp_path / "site", tmp_path / "site" / "my_package"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
+    points = dict[str, list[str]]()
+    for name, (group, begins) in GROUPS.items():
+        (package / f"{name}.py").write_text(next(code for code in EXAMPLES.values() if code.startswith(f'"""{begins}')))
+        points.setdefault(group, []).append(f"{name} = my_package.{name}")
+    about = site / "my_package-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(
+        "\n".join(f"[viewsphere.{group}]\n" + "\n".join(lines) + "\n" for group, lines in points.items())
+    )
+    for name, more in RECIPES.items():
+        moves = ", motion: {kind: bounce, height: 1}}]" if name == "moving" else "}]"
+        (tmp_path / f"{name}.yaml").write_text(INSTALLED.replace("}]", moves, 1) + more)
+        for words in (("render", f"{name}.yaml", "-o", name, "--workers", "0"), ("check", name, "--workers", "0")):
+            run = subprocess.run(
+                [sys.executable, "-m", "viewsphere", *words],
+                cwd=tmp_path,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")])},
+                capture_output=True,
+                text=True,
+                timeout=DEADLINE,
+            )
+            assert run.returncode == 0, run.stdout + run.stderr
+        assert (tmp_path / name / "csv_boxes" / "boxes.csv").stat().st_size > 60
+        assert len(Dataset(tmp_path / name)) > 0
+
+
+def test_every_example_of_the_page_is_used():
+    begins = [*(begins for _, begins in GROUPS.values()), "The same table"]
+    assert all(any(code.startswith(f'"""{one}') for one in begins) for code in EXAMPLES.values())
 
 
 def test_a_material_is_one_file(monkeypatch):
