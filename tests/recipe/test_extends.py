@@ -1,10 +1,12 @@
 """Recipes that extend others, and fields set from outside."""
 
+import json
+
 import pytest
 
 from viewsphere.errors import RecipeError
 from viewsphere.recipe import extends
-from viewsphere.recipe.extends import parse_change
+from viewsphere.recipe.extends import assemble, parse_change
 from viewsphere.recipe.file import read
 from viewsphere.recipe.recipe import Recipe
 
@@ -156,3 +158,29 @@ def test_each_file_is_read_once(write, monkeypatch):
     monkeypatch.setattr(extends, "read", lambda path: found.append(path.name) or read(path))
     assert extends.assemble(write(**files))[0]["name"] == "base"
     assert sorted(found) == sorted(f"{name}.yaml" for name in files)
+
+
+@pytest.mark.parametrize(
+    ("field", "under", "over"),
+    [
+        ("sky", {"daylight": {"turbidity": 3}}, {"hdri": "a.exr"}),
+        ("sky", {"hdri": "a.exr", "strength": 2}, {"night": {"moon": 0.2}}),
+        ("sky", {"night": {"moon": 0.2}}, {"zenith": [0.1, 0.2, 0.3]}),
+        ("background", {"images": "photos", "fit": "crop"}, {"color": [1, 0, 0]}),
+        ("background", {"environment": True}, {"images": "photos"}),
+        ("ground", {"material": "wood"}, {"image": "a.png"}),
+    ],
+)
+def test_kinds_replace_one_another(tmp_path, field, under, over):
+    (tmp_path / "base.yaml").write_text(json.dumps({"scene": {field: under}}))
+    (tmp_path / "top.yaml").write_text(json.dumps({"extends": "base.yaml", "scene": {field: over}}))
+    assert assemble(tmp_path / "top.yaml")[0]["scene"][field] == over
+
+
+def test_a_kind_keeps_its_fields(tmp_path):
+    (tmp_path / "base.yaml").write_text(json.dumps({"scene": {"sky": {"hdri": "a.exr"}}, "rig": {"sensors": {"a": {}}}}))
+    over = {"extends": "base.yaml", "scene": {"sky": {"strength": 2}}, "rig": {"kind": "stereo", "baseline": 0.1}}
+    (tmp_path / "top.yaml").write_text(json.dumps(over))
+    data = assemble(tmp_path / "top.yaml")[0]
+    assert data["scene"]["sky"] == {"hdri": "a.exr", "strength": 2}
+    assert data["rig"] == {"kind": "stereo", "baseline": 0.1}

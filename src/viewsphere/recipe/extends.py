@@ -41,6 +41,14 @@ PATHS: tuple[tuple[str, ...], ...] = (
 WORDS = {"file", "daylight"}
 """Values of these fields that are neither paths nor names of the zoo."""
 
+UNIONS: dict[str, tuple[frozenset[str], ...]] = {
+    "sky": tuple(map(frozenset, (["hdri"], ["daylight"], ["night"], ["zenith", "horizon"]))),
+    "background": tuple(map(frozenset, (["image"], ["images"], ["color"], ["environment"], ["transparent"]))),
+    "ground": (frozenset({"material"}), frozenset(pictures_of(Ground))),
+    "rig": tuple(map(frozenset, (["sensors"], ["file", "path"], ["baseline"], ["count", "radius"]))),
+}
+"""Fields that are one of several kinds, and the fields that only one kind has."""
+
 _STEP = re.compile(r"(?:^|\.)([A-Za-z_][\w-]*)|\[(\d+)\]")
 
 
@@ -56,9 +64,9 @@ def assemble(path: Path, changes: Mapping[str, Any] | None = None) -> tuple[dict
     """The data of a recipe file, merged over the files that it extends, with `changes` (`viewpoints.elevation` -> value), and
     the places of all values.
 
-    A mapping is merged field by field into the one that it extends, unless their `kind` differs; it then replaces the other
-    mapping, as all other values do. null removes a field. Raises RecipeError as `read` does, and for files that extend one
-    another in a circle.
+    A mapping is merged field by field into the one that it extends, unless it is of another kind, by its `kind` or by fields
+    that only one kind has; it then replaces the other mapping, as all other values do. null removes a field. Raises
+    RecipeError as `read` does, and for files that extend one another in a circle.
     """
     layer = _extended(path, (), {})
     for name, value in (changes or {}).items():
@@ -123,7 +131,7 @@ def _merge(under: dict[str, Any], over: dict[str, Any], steps: Steps, forget: Ca
     for name, value in over.items():
         inside = (*steps, name)
         old = result.get(name)
-        if isinstance(old, dict) and isinstance(value, dict) and not _of_other_kind(old, value):
+        if isinstance(old, dict) and isinstance(value, dict) and not _of_other_kind(name, old, value):
             result[name] = _merge(cast(dict[str, Any], old), cast(dict[str, Any], value), inside, forget)
             continue
         forget(inside)
@@ -133,10 +141,23 @@ def _merge(under: dict[str, Any], over: dict[str, Any], steps: Steps, forget: Ca
     return result
 
 
-def _of_other_kind(old: Any, new: Any) -> bool:
+def _of_other_kind(field: str, old: Any, new: Any) -> bool:
+    """Whether a field's new mapping is of another kind than the old one, and so replaces all of it."""
     if not {*KINDS}.isdisjoint({*old, *new}):
         return True  # distributions are replaced whole, not merged
-    return "kind" in new and new["kind"] != old.get("kind", "grid")
+    if "kind" in new:
+        return new["kind"] != old.get("kind", _kind_of(field, old) or "grid")
+    kinds = UNIONS.get(field, ())
+    own, other = ([i for i, names in enumerate(kinds) if not names.isdisjoint(entry)] for entry in (new, old))
+    return bool(own and other) and own != other
+
+
+def _kind_of(field: str, entry: Any) -> str | None:
+    """The kind of a rig that its fields say."""
+    if field != "rig":
+        return None
+    kinds = {"sensors": "sensors", "file": "file", "path": "file"}
+    return next((kind for name, kind in kinds.items() if name in entry), None)
 
 
 def _forget(places: dict[Steps, Place], steps: Steps) -> None:
