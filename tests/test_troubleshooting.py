@@ -50,6 +50,12 @@ FILES = {
     "here/huge.obj": TRIANGLE.replace("1", "900000", 2),
     "here/wide.obj": "v 0 0 0\nv 300 0 0\nv 0 100 40\nf 1 2 3\n",
     "here/points.obj": "v 0 0 0\nv 1 0 0\n",
+    "here/page.glb": "<!DOCTYPE html><html></html>",
+    "here/commas.obj": "v 0,5 0 0\n" + TRIANGLE,
+    "here/clear.obj": "mtllib clear.mtl\nusemtl a\n" + TRIANGLE,
+    "here/clear.mtl": "newmtl a\nd 0\n",
+    "here/gloss.obj": "v 0 0 0\nv 1 0 0\nv 0 1 1\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n",
+    "here/gloss.mtl": "newmtl a\nmap_Kd gloss.png\n",
     "here/thin.obj": TRIANGLE + "f 1 1 2\n",
     "here/empty.glb": "",
     "here/a.step": "ISO-10303-21;",
@@ -80,6 +86,7 @@ def said(tmp_path, monkeypatch):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     Image.new("RGB", (4, 4)).save(tmp_path / "wood.png")
+    Image.new("RGBA", (4, 4), (9, 9, 9, 100)).save(tmp_path / "here" / "gloss.png")
     monkeypatch.chdir(tmp_path)
 
     def run(line):
@@ -126,6 +133,10 @@ COMMANDS = {
     "expected a model file with suffix": "inspect here/a.txt",
     "no such file": "inspect here/gone.obj",
     "the file is empty": "inspect here/empty.glb",
+    "expected a model, found": "inspect here/page.glb",
+    "has a decimal comma": "inspect here/commas.obj",
+    "nothing of the model can be seen": "inspect here/clear.obj",
+    "does not state that the alpha of texture": "inspect here/gloss.obj",
     "no triangles found": "inspect here/points.obj",
     "every triangle has zero area": "inspect here/line.obj",
     "requires the extension": "inspect here/packed.gltf",
