@@ -12,9 +12,11 @@ from viewsphere.engines.raster.samples import edge_samples
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.recipe.lidar import LidarEntry
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import build_geometry, seen_from, with_both_sides
 from viewsphere.truth.point_raster import OCCLUDED, VISIBLE
+from viewsphere.truth.sweeping import Turning, still_hits, swept_hits
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import homogeneous, rasterize
 
@@ -136,6 +138,25 @@ def test_samples_at_edges_show_no_backs(distortion):
         found.append(samples)
     np.testing.assert_array_equal(found[0].pixels, found[1].pixels)
     np.testing.assert_array_equal(np.maximum(found[0].triangle - 2, -1), found[1].triangle)
+
+
+@pytest.mark.parametrize("is_swept", [False, True])
+def test_a_lidar_passes_the_backs_of_walls(is_swept):
+    """The near wall turns its back to the sensor, also while it moves; the far one its front."""
+    own = LidarEntry(rings=8, elevation=(-10, 10), azimuth_step=2, range=(0, 1000), azimuth=(-40, 40)).intrinsics
+    ahead = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    camera = Camera(own, ahead, np.zeros(3))
+    walls = plate(10.0, 100.0, front=1), plate(20.0, 100.0)
+    geometry = geometry_of(*walls)
+    if is_swept:
+        still = np.broadcast_to(ahead, (own.width, 3, 3)), np.zeros((own.width, 3))
+        nearer = np.tile(np.eye(4), (own.width, 1, 1))
+        nearer[:, 1, 3] = -np.linspace(0, 1, own.width)
+        hits = swept_hits(geometry, camera, Turning(*map(np.ascontiguousarray, still), {0: nearer}))
+    else:
+        hits = still_hits(geometry, camera, rasterize(geometry, camera))
+    assert len(hits.distance) == own.width * own.height
+    np.testing.assert_allclose(hits.place[:, 1], 20.0, rtol=1e-5)
 
 
 def test_without_the_option_the_geometry_is_the_same_object():
