@@ -32,6 +32,7 @@ TESTED = {
     "MAX_FETCHED_BYTES": "test_fetched",
     "MAX_MODELS": "test_models",
     "MAX_ENTRIES": "test_entries_walked",
+    "MAX_REDRAWS": "test_framing",
     "MAX_VOXELS": "test_voxels",
     "MAX_LISTED_OBJECTS": "test_listed_sampler",
     "MAX_ANNOTATION_BYTES": "test_kitti_reading",
