@@ -401,7 +401,7 @@ def test_a_jittered_target_lies_around_the_models_centre_or_the_given_one():
 
 
 def test_jitter_into_a_model_is_found_before_rendering():
-    found = planned({"jitter": {"draw": "per_model", "distance": [-0.8, 0], "target": [0, 0, [0, 0.1]]}})
+    found = planned({"jitter": {"draw": "per_model", "distance": [-0.9, -0.89], "target": [0, 0, [0, 0.1]]}})
     problem = Distances(found, box_of).problem("car_001")
     assert problem is not None
     assert str(problem).startswith("viewpoints.distance: expected the camera outside the model; found distance ")

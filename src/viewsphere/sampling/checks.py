@@ -16,10 +16,12 @@ from viewsphere.model.channel import MATERIAL_PASSES, PASSES, PICTURES
 from viewsphere.model.mistakes import nearest, one_of, read_options
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.rig import SensorList
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
+from viewsphere.recipe.weather import FogEntry
 from viewsphere.sampling.layouts import check_layout, check_orientation
 from viewsphere.sampling.models import count_models
 from viewsphere.sampling.redraws import redraws_frames
@@ -224,6 +226,21 @@ def check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
             seen[key] = name
     if all(isinstance(s, tuple) for s in recipe.splits.shares.values()) and keys - seen.keys():
         raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
+
+
+def check_photo(recipe: Recipe) -> None:
+    """A photograph as the background has its own weather and hour: fog and night do not reach it."""
+    scene = recipe.scene
+    if not any(entry.image is not None or entry.images is not None for entry in scene.backgrounds):
+        return
+    is_foggy = any(isinstance(fog, FogEntry) for fog in alternatives(scene.fog))
+    is_dark = any(isinstance(sky, NightSky) for sky in alternatives(scene.sky))
+    if is_foggy or is_dark:
+        field, what = ("scene.fog", "fog") if is_foggy else ("scene.sky", "night")
+        raise RecipeError(
+            f"{field}: {what} does not reach the photographs of `scene.background`, which would stay clear and bright behind "
+            f"the models. Leave out {what}, or use `background: sky` or photographs of such weather with `scene.sun: off`"
+        )
 
 
 def check_shutter(recipe: Recipe) -> None:

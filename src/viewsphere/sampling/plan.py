@@ -35,6 +35,7 @@ from viewsphere.sampling.checks import (
     check_listed,
     check_materials,
     check_names,
+    check_photo,
     check_redraws,
     check_shutter,
     check_sizes,
@@ -401,6 +402,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         for one in recipe.conditions.values():
             check_catcher(one)
             check_shutter(one)
+            check_photo(one)
             check_night(one)
         check_splits(recipe)
         check_redraws(recipe)
