@@ -144,7 +144,7 @@ def test_it_is_the_same_whether_other_labels_compare_pictures_or_not():
     [
         ({"noise": -1}, r"labels\.depth_sensor\.noise: expected"),
         ({"noise": math.nan}, r"labels\.depth_sensor\.noise: expected"),
-        ({"kind": "sonar"}, r"labels\.depth_sensor\.kind: expected"),
+        ({"kind": "sonar"}, r"labels\.depth_sensor\.kind: 'sonar' is unknown"),
         ({"baseline": 0}, r"labels\.depth_sensor\.baseline: expected"),
         ({"failures": 1.0}, r"labels\.depth_sensor\.failures: expected"),
         ({"nois": 1}, r"labels\.depth_sensor"),

@@ -395,7 +395,7 @@ REFUSED = {
     "empty": ({"empty": 0.5, "models": models(3)}, "empty: expected null, as the data set has; found 0.5"),
     "inside the model": (
         {"viewpoints": {"azimuth": 0, "elevation": 0, "distance": 0.05}, "models": models(3)},
-        "camera outside the model",
+        "is inside the model",
     ),
 }
 

@@ -164,7 +164,9 @@ def test_what_cannot_stand_there_is_refused_in_one_line(files, tmp_path):
     assert "company.layout: expected 0.3 m between all" in problem({"company": {"layout": [[0.05, 0, 0]]}})
     picture = str(files / "pictures" / "a.png")
     assert "planes[0].at" in problem({"planes": {"image": picture, "height": 1, "at": [0, 0, 0]}})
-    assert "inside its box" in problem({"company": {"layout": [[2, 0, 0]]}}, {"azimuth": 90, "elevation": 0, "distance": 1})
+    assert "is inside the model" in problem(
+        {"company": {"layout": [[2, 0, 0]]}}, {"azimuth": 90, "elevation": 0, "distance": 1}
+    )
     around = {"azimuth": {"start": 0, "stop": 360, "step": 10}, "elevation": 0, "distance": 0.2}
     company = {"count": 1, "gap": 0.05, "draw": "per_frame"}
     assert "outside of all that is placed; found it at (" in problem({"company": company}, around)

@@ -278,7 +278,7 @@ def test_a_camera_in_company_is_found_whoever_it_is():
     planned = plan(recipe(viewpoints=viewpoints, scene={"company": {"layout": [[4, 0, 0]]}}))
     spec = planned.model_specs[0]
     problem = str(Distances(planned, box_of).problem(spec.key))
-    assert "distance 2 m (pose 1) inside its box" in problem
+    assert "`distance` 2 m is inside the model" in problem and "(pose 1)" in problem
     assert problem.endswith(f"(model {planned.cast(spec.key)[1].key})")
     far = plan(recipe(viewpoints={**viewpoints, "distance": 20}, scene={"company": {"layout": [[4, 0, 0]]}}))
     assert Distances(far, box_of).problem(spec.key) is None

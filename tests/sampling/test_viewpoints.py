@@ -214,7 +214,7 @@ def test_a_camera_inside_the_model_is_a_problem():
 
     found = problem()
     assert found is not None
-    assert "1.5 m (pose 7)" in found
+    assert "`distance` 1.5 m is inside the model" in found and "(pose 7)" in found
     assert problem(distance=2.01) is None
     assert problem(azimuth_deg=90) is None
     assert problem(azimuth_deg=90, distance=0.99) is not None

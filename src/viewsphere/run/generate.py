@@ -141,7 +141,7 @@ def generate(
     notes += (f"note: {left}",) if left else ()
     if append and not rendered and share.is_all:
         notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)
-    notes += tuple(left_by_chance(store, portion))
+    notes += tuple(left_by_chance(dataset, portion))
     misses = unpainted(recipe, [s for s in planned.model_specs if s.key not in skipped], store)
     warnings = _warnings(planned, dataset, misses)
     return Summary(

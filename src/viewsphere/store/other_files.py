@@ -17,7 +17,7 @@ def other_files(then: Sequence[str], now: Sequence[str]) -> str:
         what = f"without {first_few(new)}. Add {'it' if len(new) == 1 else 'them'} with --append"
     else:
         what = "with other files: pictures, poses or scripts that the recipe names. Restore them"
-    return f"this folder was rendered {what}, or choose another folder"
+    return f"this folder was rendered {what}, or choose another output folder"
 
 
 def _without(some: Sequence[str], others: Sequence[str]) -> list[str]:
