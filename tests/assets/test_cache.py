@@ -1,6 +1,7 @@
 """The cache never changes what is loaded, only how long it takes."""
 
 import io
+from importlib.metadata import PackageNotFoundError
 
 import numpy as np
 import pytest
@@ -95,6 +96,23 @@ def test_settings_and_readers_are_part_of_the_key(spec, counted, monkeypatch, tm
     monkeypatch.setattr(cache, "readers_digest", lambda: "other readers")
     load_normalised(spec, folder=folder)
     assert len(counted) == 3
+
+
+@pytest.mark.parametrize("library", ["usd-core", "opengl_basisu", "DracoPy", "meshopt", "lxml"])
+def test_models_are_read_again_once_a_library_is_installed(library, spec, counted, monkeypatch, tmp_path):
+    def version(name):
+        if name == library and not installed:
+            raise PackageNotFoundError
+        return "1.0"
+
+    installed = False
+    monkeypatch.setattr(cache, "version", version)
+    load_normalised(spec, folder=tmp_path / "cache")
+    load_normalised(spec, folder=tmp_path / "cache")
+    assert len(counted) == 1
+    installed = True
+    load_normalised(spec, folder=tmp_path / "cache")
+    assert len(counted) == 2
 
 
 def test_damaged_entries_are_built_again(spec, tmp_path):

@@ -43,6 +43,9 @@ PREFIX = "reading-"
 BATCH = 32
 """Most frames of a file that are read at once."""
 
+LIBRARIES = ("numpy", "lxml", "pillow", "charset-normalizer", "DracoPy", "meshopt", "opengl_basisu", "usd-core")
+"""Packages that parse model files. A model whose reader lacked one of the optional ones is read again once it is installed."""
+
 
 Build = Callable[[ModelSpec], Mesh | Path]
 """Makes the mesh of a source that begins with `zoo:`, or the file of one that moves."""
@@ -214,9 +217,9 @@ def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec, frame: i
 
 
 def readers_digest() -> str:
-    """Digest of this package's and Blender's worker's sources, and the versions of the libraries that parse for it."""
+    """Digest of this package's and Blender's worker's sources, and of the versions of the `LIBRARIES`."""
     digest = hashlib.sha256()
-    for library in ("numpy", "lxml", "pillow"):
+    for library in LIBRARIES:
         try:
             digest.update(f"{library} {version(library)};".encode())
         except PackageNotFoundError:
