@@ -6,6 +6,7 @@ import trimesh
 
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.stages import Stages
+from viewsphere.sampling.placing import obstacles
 from viewsphere.sampling.plan import plan
 
 
@@ -62,6 +63,16 @@ def test_scatter_keeps_clear_of_a_files_geometry(tmp_path):
     assert gaps.min() > 0
     free = spots_of(tmp_path, count=2)
     assert (np.linalg.norm(free[:, None] - np.array(crops), axis=2).min(axis=1) < 0.1).any()  # else nothing is in the way
+
+
+@pytest.mark.parametrize("length", [10, 400])
+def test_a_wall_through_the_middle_is_in_the_way_however_long_it_is(length):
+    corners = np.array([(-length / 2, -0.5, 0), (length / 2, 0.5, 0), (length / 2, 0.5, 3), (-length / 2, -0.5, 3)])
+    wall = obstacles(corners, np.array([(0, 1, 2), (0, 2, 3)], np.int32), 1.0)
+    square = np.array([(0, 0), (0.3, 0), (0.3, 0.3), (0, 0.3)])
+    assert wall.meets(square - 0.15, 0.0)
+    assert not wall.meets(square + (0, 1), 0.1)
+    assert not wall.meets(square - (0, 1), 0.1)
 
 
 @pytest.mark.parametrize("layout", ["scatter", "heap_together"])

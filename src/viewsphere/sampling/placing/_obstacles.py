@@ -59,11 +59,11 @@ def obstacles(vertices: Float, triangles: NDArray[np.int32], height: float) -> O
 
     corners = vertices[triangles]
     above = (corners[..., 2].max(axis=1) > STEP) & (corners[..., 2].min(axis=1) < height)
-    near = (np.abs(corners[..., :2]).min(axis=1) <= REACH).all(axis=1)
-    flat = corners[above & near][..., :2].clip(-2 * REACH, 2 * REACH)
+    near = ((corners[..., :2].min(axis=1) <= REACH) & (corners[..., :2].max(axis=1) >= -REACH)).all(axis=1)
+    flat = corners[above & near][..., :2]
     if not len(flat):
         return None
-    low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
+    low, high = (edge.clip(-2 * REACH, 2 * REACH) for edge in (flat.min(axis=(0, 1)), flat.max(axis=(0, 1))))
     cell = max(float((high - low).max()) / CELLS, 1e-4)
     columns, rows = (int(n) + 3 for n in np.ceil((high - low) / cell))
     picture = Image.new("1", (columns, rows))
