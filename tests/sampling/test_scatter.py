@@ -71,8 +71,9 @@ def test_a_wall_through_the_middle_is_in_the_way_however_long_it_is(length):
     wall = obstacles(corners, np.array([(0, 1, 2), (0, 2, 3)], np.int32), 1.0)
     square = np.array([(0, 0), (0.3, 0), (0.3, 0.3), (0, 0.3)])
     assert wall.meets(square - 0.15, 0.0)
-    assert not wall.meets(square + (0, 1), 0.1)
-    assert not wall.meets(square - (0, 1), 0.1)
+    assert all(wall.meets(np.array([(x, -0.05), (x + 0.02, -0.05), (x, 0.05)]), 0.0) for x in np.linspace(-0.3, 0.3, 25))
+    assert not wall.meets(square + np.array((0, 1)), 0.1)
+    assert not wall.meets(square - np.array((0, 1)), 0.1)
 
 
 @pytest.mark.parametrize("layout", ["scatter", "heap_together"])

@@ -69,6 +69,7 @@ def obstacles(vertices: Float, triangles: NDArray[np.int32], height: float) -> O
     picture = Image.new("1", (columns, rows))
     draw = ImageDraw.Draw(picture)
     for polygon in ((flat - low) / cell + 1).round().astype(int).reshape(-1, 6).tolist():
-        draw.polygon(polygon, fill=1, outline=1)
+        draw.polygon(polygon, fill=1)
+        draw.line([*polygon, *polygon[:2]], fill=1)  # a polygon's outline has holes where the triangle is upright
     filled = np.asarray(picture).T.copy()
     return None if (~filled).mean() < FREE else Obstacles(low - 1.5 * cell, cell, filled)
