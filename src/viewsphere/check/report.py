@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from viewsphere.model.quantity import quantity
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -43,9 +45,9 @@ class Report:
     def verdict(self) -> str:
         """One line: the number of findings, or of proofs that hold, with the proofs that did not run and the frames covered."""
         held = [name for name, count in self.checked.items() if count and name not in self.not_run]
-        text = f"{_count(len(held), 'proof')} hold{'s' if len(held) == 1 else ''}" if self.not_run else "all proofs hold"
+        text = f"{quantity(len(held), 'proof')} hold{'s' if len(held) == 1 else ''}" if self.not_run else "all proofs hold"
         if not self.ok:
-            text = _count(len(self.findings), "finding")
+            text = quantity(len(self.findings), "finding")
         parts = [text, *([f"{len(self.not_run)} not run: {_reasons(self.not_run)}"] if self.not_run else [])]
         return "; ".join([", ".join(parts), *(f"{done:,} of {of:,} {words}" for done, of, words in self.coverage)])
 
@@ -78,7 +80,3 @@ def _reasons(not_run: Mapping[str, str]) -> str:
     for name, reason in not_run.items():
         names_of.setdefault(reason, []).append(name)
     return ", ".join(f"{', '.join(names)} ({reason})" for reason, names in names_of.items())
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -36,10 +36,10 @@ class Room:
     and the recipe's field that asks for all this, which messages begin with.
 
     `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it; `clearance`: metres
-    of air above, None where it has no end; `seen_from`: azimuth and elevation, degrees, of the camera, where one is
-    known; `memory`: keeps what is simulated; `moves`: whether it is asked how things came
-    to where they stand, too; `built` gives what of the
-    place's mesh stands up to a height above the floor, `blocked` is that; `lanes`: those of the place.
+    of air above, None where it has no end; `seen_from`: azimuth and elevation, degrees, of the camera, where one is known;
+    `memory`: keeps what is simulated; `moves`: whether the ways of things to their places are needed, too; `built` gives the
+    parts of the place's mesh up to a height above the floor, `blocked` holds those for the things that are placed; `lanes`:
+    those of the place.
     """
 
     free: Footprint | None = None
@@ -57,7 +57,7 @@ class Room:
     lanes: tuple[Lane, ...] = ()
 
     def obstacles(self, shapes: Sequence[Shape]) -> Room:
-        """The same room, which knows what of its place is in the way of things of these shapes."""
+        """The same room with `blocked`: the parts of its place that are in the way of things of these shapes."""
         if self.built is None or not shapes:
             return self
         highest = max(float(np.ptp(shape.box[:, 2])) for shape in shapes)

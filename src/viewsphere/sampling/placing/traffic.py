@@ -85,8 +85,9 @@ def _free(
     lengths = np.cumsum(steps[:, 2])
     for _ in range(TRIES):
         along, aside, turn = draws.random(3)
-        x, y, step, cos, sin, half = steps[int(np.searchsorted(lengths, along * lengths[-1], side="right"))]
-        back = (lengths[np.searchsorted(lengths, along * lengths[-1], side="right")] - along * lengths[-1]) / step
+        at = int(np.searchsorted(lengths, along * lengths[-1], side="right"))
+        x, y, step, cos, sin, half = steps[at]
+        back = (lengths[at] - along * lengths[-1]) / step
         right = 0.0 if drives else half + near + aside * max(far - near, 0.0)
         if drives and is_parked:
             right = half + max(options.bay, width) / 2 if options.bay else half - width / 2

@@ -14,6 +14,7 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.limits import limits
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.draws import drawn
@@ -252,22 +253,18 @@ def check_scene_models(stock: Stock) -> None:
 
 def _too_few(entry: ScenesEntry, there: int, models: int, split: str) -> str:
     """The problem of scenes that need more models than there are, and what mends it."""
-    wanted = "at least one model" if entry.repeat else f"up to {_models(entry.most_objects)}"
+    wanted = "at least one model" if entry.repeat else f"up to {quantity(entry.most_objects, 'model')}"
     if not split:
         return (
-            f"a scene needs {wanted}, and the recipe has {_models(there)}. Add models, ask for fewer, or set "
+            f"a scene needs {wanted}, and the recipe has {quantity(there, 'model')}. Add models, ask for fewer, or set "
             "`scenes.repeat: true`."
         )
     others = ("set `scenes.repeat: true`", "ask for fewer") if there and not entry.repeat else ()
     remedies = ", ".join(("Set `splits: {by: scene}`", *others, "or add models"))
     return (
         f"splits are by model, so a scene of split {split!r} needs {wanted} of that split, which has {there} of "
-        f"{_models(models)}. {remedies}."
+        f"{quantity(models, 'model')}. {remedies}."
     )
-
-
-def _models(count: int) -> str:
-    return f"{count} model{'' if count == 1 else 's'}"
 
 
 @lru_cache(maxsize=2)
