@@ -176,3 +176,16 @@ def test_new_in_an_empty_folder_starts_from_the_zoo(tmp_path):
     viewsphere("new", tmp_path / "fresh")
     assert tree_hash(tmp_path / "empty") == tree_hash(tmp_path / "fresh")
     assert vs.Recipe.load(tmp_path / "empty" / "recipe.yaml").models[0].source == ("zoo:car",)
+
+
+def test_usd_models_need_blender_only_without_usd_core(folder, monkeypatch):
+    def none():
+        raise MissingExtraError("no Blender here")
+
+    (folder / "house.usda").write_text("#usda 1.0\n")
+    monkeypatch.setattr("viewsphere.sampling.models.find_blender", none)
+    monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: True)
+    assert planned(folder, '"*.obj"', "house.usda").frames == 2
+    monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: False)
+    with pytest.raises(MissingExtraError, match="no Blender here"):
+        planned(folder, '"*.obj"', "house.usda")

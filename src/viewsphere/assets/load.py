@@ -16,10 +16,10 @@ from viewsphere.errors import ModelError
 
 SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")
 BLENDER_SUFFIXES = ("abc", "blend", "fbx", "usd", "usda", "usdc", "usdz")
-"""Suffixes of formats that only Blender reads."""
+"""Suffixes of formats that Blender reads; usd-core reads USD models at rest where it is installed."""
 GLTF = ("glb", "gltf")
 UP = {"glb": "y", "gltf": "y", "obj": "y", "3mf": "z", "ply": "z", "stl": "z", "off": "z"}
-"""The axis that is up in files of each suffix; other formats say it in the file."""
+"""The axis that is up in files of each suffix; files of other formats state their own."""
 USD = ("usd", "usda", "usdc", "usdz")
 ANIMATED_SUFFIXES = (*BLENDER_SUFFIXES, *GLTF)
 PICTURE_SUFFIXES = ("bmp", "jpeg", "jpg", "png", "tif", "tiff", "webp")
@@ -130,21 +130,26 @@ def check_source(path: Path) -> str:
     raise ModelError(f"{path}: expected a model file with suffix {expected}, found {path.suffix or 'none'!r}")
 
 
+def needs_blender(suffix: str) -> bool:
+    """Whether Blender reads a model at rest: USD files only where usd-core is not installed."""
+    return suffix in BLENDER_SUFFIXES and not (suffix in USD and usd.is_available())
+
+
 def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, FileFacts]:
     if suffix in GLTF:
         from viewsphere.assets.gltf import read_gltf
 
         return read_gltf(folder, node)
-    if suffix in USD and usd.is_available():
-        from viewsphere.assets.readers.usd.scene import read_usd
-
-        return read_usd(folder)
-    if suffix in BLENDER_SUFFIXES:
+    if needs_blender(suffix):
         from viewsphere.assets.via_blender import read_via_blender
 
         if suffix in USD:
             folder.warn("Blender may lose the transform above a mesh that is below a mesh; pip install 'viewsphere[usd]'")
         return read_via_blender(folder)
+    if suffix in USD:
+        from viewsphere.assets.readers.usd.scene import read_usd
+
+        return read_usd(folder)
     if suffix == "obj":
         from viewsphere.assets.obj import read_obj
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from viewsphere.assets.inside import split_source
-from viewsphere.assets.load import BLENDER_SUFFIXES, UP, check_source
+from viewsphere.assets.load import BLENDER_SUFFIXES, UP, check_source, needs_blender
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.limits import limits
@@ -148,7 +148,7 @@ def _check_file(entry: ModelEntry, found: _Found) -> None:
         suffix = check_source(path)
     except ModelError as error:
         raise RecipeError(f"{where}.source: {error}") from None
-    if suffix in BLENDER_SUFFIXES:
+    if needs_blender(suffix):
         find_blender()
     up = UP.get(suffix)
     if up and entry.up is None and entry.forward is not None and entry.forward[1] == up:
