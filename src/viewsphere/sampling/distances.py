@@ -49,9 +49,8 @@ class Distances:
     def problem(self, subject: str) -> RecipeError | None:
         """The first pose whose camera would stand inside an object's box, in words; None if there is none.
 
-        Cameras that can be drawn again are left to their shots; room for all is looked for nevertheless. What is drawn for
-        each frame is not looked at, nor what follows from a share of the picture: that is left to whoever
-        renders the frame.
+        Cameras that can be drawn again are left to their shots, and so are draws for each frame and distances by a share of the
+        picture. Room for all objects is looked for in any case.
         """
         subject = self.plan.world(subject)
         for there in self.plan.standing(subject, self.box_of):

@@ -1,7 +1,7 @@
 """The server: it answers browsers that bring its token.
 
-Slow clients keep nobody waiting: a request has a deadline, and the number of connections a limit. Beyond the limit a new
-connection takes the place of the one whose request is awaited for longest.
+Slow clients do not delay others: a request has a deadline, and the number of connections has a limit. Beyond the limit a new
+connection replaces the one whose request is awaited for longest.
 
 A page of a stranger that is open in the same browser is kept out, too: its requests name another host (DNS rebinding) or say
 that they come from elsewhere (Sec-Fetch-Site), no header allows it to read an answer (CORS), and what it embeds of this server
