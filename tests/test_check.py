@@ -680,7 +680,7 @@ def test_frames_of_another_split_than_the_plan_dealt(tmp_path):
             instant["split"] = "val" if instant["split"] == "train" else "train"
 
     edit_json(file, change)
-    assert {name for name, _ in failures(Dataset(tmp_path), rays=False)} == {"shot"}
+    assert {name for name, _ in failures(Dataset(tmp_path), rays=False)} == {"shot", "recipe"}
 
 
 ASKED = tuple(name for name, label in on_request().items() if replace(label.needs, looks=False, chance=False) == Needs())

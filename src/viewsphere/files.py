@@ -53,10 +53,9 @@ def read_bytes(file: Path, limit: str = "MAX_FILE_BYTES") -> bytes:
     if not isinstance(file, Path):
         return _remote_bytes(file, limit)
     with _Bounded(file, limit) as stream:
-        blocks = [stream.read(os.fstat(stream.fileno()).st_size + 1)]
-        while block := stream.read(BLOCK):
-            blocks.append(block)
-    return blocks[0] if len(blocks) == 1 else b"".join(blocks)
+        size = os.fstat(stream.fileno()).st_size
+        first = stream.read(size + 1)
+        return first if len(first) <= size else first + stream.readall()  # it grew, or is of those whose size is told as 0
 
 
 def read_text(file: Path, limit: str = "MAX_FILE_BYTES", encoding: str = "utf-8") -> str:

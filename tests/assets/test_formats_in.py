@@ -213,6 +213,7 @@ def test_no_broken_file_does_harm(forked, monkeypatch, tmp_path):
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", str(float(DEADLINE)))
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
     files = broken_files()
     assert len(files) > 250
     with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as pool:
@@ -226,8 +227,9 @@ def test_no_broken_file_does_harm(forked, monkeypatch, tmp_path):
         assert "its reader failed" not in said
     assert [p.name for p in tmp_path.iterdir()] == ["cache"]
     assert {p.suffix for p in (tmp_path / "cache").iterdir()} == {".json", ".npz"}
-    most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-    assert most < limits.MAX_READ_BYTES
+    most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    larger = most > before  # children of earlier tests count, too
+    assert not larger or most * (1 if sys.platform == "darwin" else 1024) < limits.MAX_READ_BYTES
     rows = broken_rows(zip(files, outcomes, strict=True))
     assert table("| Kind | Loaded | Refused |") == rows
 

@@ -478,7 +478,8 @@ def test_without_blender_the_error_says_how_to_set_it_up(tmp_path, monkeypatch, 
     monkeypatch.delenv(VARIABLE, raising=False)
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     monkeypatch.setattr("viewsphere.blender.environment.home", lambda: tmp_path / "none")
-    (tmp_path / name).write_bytes(b"Ogawa\xff\0\1" + bytes(100))
+    begins = {"a.fbx": b"Kaydara FBX Binary  \0", "a.blend": b"BLENDER-v500", "a.abc": b"Ogawa\xff\0\1"}
+    (tmp_path / name).write_bytes(begins[name] + bytes(100))
     with pytest.raises(ModelError, match=r"files are read by Blender, found none.*viewsphere doctor --setup-blender"):
         load_model(tmp_path / name)
 

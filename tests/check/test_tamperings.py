@@ -132,11 +132,11 @@ def test_every_field_of_a_shot_is_what_the_recipe_gives(copied, share):
 @pytest.mark.parametrize("share", quick([3, 1], 3))
 def test_every_field_of_a_models_record_is_what_its_source_gives(copied, share):
     dataset = Dataset(copied)
-    sources, key = Sources(dataset, Recomputed(dataset)), dataset.plan.models[0]
+    recomputed, key = Recomputed(dataset), dataset.plan.models[0]
     file = dataset.store.model_folder(key) / "model.json"
     value = json.loads(file.read_text())
     assert {"real_size", "keypoints", "digest", "diameter", "credit", "parts"} <= value.keys()
-    assert missed(file, value, json.dumps, lambda: sources.contradictions([key]), share) == []
+    assert missed(file, value, json.dumps, lambda: Sources(Dataset(copied), recomputed).contradictions([key]), share) == []
 
 
 def tops(value):

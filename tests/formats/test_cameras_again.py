@@ -411,7 +411,7 @@ def test_the_command_line_makes_a_recipe_that_can_be_planned_and_shown(tmp_path)
         (("new", tmp_path / "b", "--kind", "poses", "--from", "colmap", tmp_path), "found --kind poses and --from colmap"),
         (("new", "--from", "nerfstudio", tmp_path / "scene"), "scene-again: expected a new folder"),
         (("new", tmp_path / "b", "--from", "colmap", tmp_path / "nothing"), "expected a data set; found no"),
-        (("new", tmp_path / "b", "--from", "kitti", tmp_path), "pascal3d; found 'kitti'"),
+        (("new", tmp_path / "b", "--from", "kitti", tmp_path), "'kitti' is unknown. Valid: bop, colmap, nerfstudio, pascal3d"),
     ):  # fmt: skip
         refused = viewsphere(*words, cwd=tmp_path)
         assert refused.returncode == 2 and message in refused.stderr and len(refused.stderr.splitlines()) == 1

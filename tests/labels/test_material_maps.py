@@ -94,4 +94,4 @@ def test_names_are_in_the_data_set_and_proved(tmp_path):
     told = json.loads(file.read_text())
     file.write_text(json.dumps(told | {"materials": ["wood", *told["materials"][1:]]}))
     seal_again(tmp_path)
-    assert {f.check for f in check(Dataset(tmp_path), rays=False).findings} == {"models"}
+    assert {f.check for f in check(Dataset(tmp_path), rays=False).findings} == {"models", "sources"}

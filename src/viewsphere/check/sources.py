@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
+from functools import cached_property
 from pathlib import Path
 
 from viewsphere.aside import temporary
@@ -15,6 +16,7 @@ from viewsphere.files import read_bytes
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.models import Export, Models
 from viewsphere.store import Dataset, ModelInfo
+from viewsphere.store.credits import credits_problem
 
 Finding = tuple[str, str]
 """A model's key, and its contradiction."""
@@ -32,6 +34,11 @@ class Sources:
     def reasons(self) -> str:
         """Why models could not be made again; empty if all could."""
         return in_short(self.why_not.values())
+
+    @cached_property
+    def _may_be_renewed(self) -> bool:
+        """Whether the file of credits confirms the records: a later run may renew credits without a new plan."""
+        return credits_problem(self._dataset) is None
 
     def contradictions(self, keys: Iterable[str]) -> Iterator[Finding]:
         """Differences of the records of these models from those made again."""
@@ -58,7 +65,8 @@ class Sources:
         if spec is None:
             return
         planned = self._recomputed.replanned
-        credit = planned.portion(number).plan.credits.get(info.key) or info.credit
+        planned_credit = planned.portion(number).plan.credits.get(info.key)
+        credit = info.credit if self._may_be_renewed or planned_credit is None else planned_credit
         try:
             made, export = self._models.made(spec, planned.steps_of(info.key), credit)
         except UserError as error:

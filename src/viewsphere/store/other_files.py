@@ -16,7 +16,7 @@ def other_files(then: Sequence[str], now: Sequence[str]) -> str:
     elif new:
         what = f"without {first_few(new)}. Add {'it' if len(new) == 1 else 'them'} with --append"
     else:
-        what = "with other files: pictures, poses or scripts that the recipe names. Restore them"
+        what = "with other files: pictures, poses or scripts that the recipe names. Restore them, add with --append"
     return f"this folder was rendered {what}, or choose another output folder"
 
 

@@ -21,14 +21,20 @@ from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, draws_of
 from viewsphere.sampling.placing._scattered import Gaps, scattered
 from viewsphere.sampling.placing._spot import Cover, free_spot, spread_spot
 
+NEAR = 10.0
+"""Metres from the middle in which models stand where they have room: cameras look there, and a street is 200 m long."""
+
+LOOSE = 8.0
+"""How many times as large as the models' boxes the floor is: 20 cars in a street with furniture find room at the first draw."""
+
 
 class Options(Gaps):
     """How near to one another, and how far from the middle."""
 
-    reach: Drawn[Length] = Field(
-        default=10.0,
-        description="metres from the middle along and across the floor, at most: cameras look at the middle, and a street is "
-        "200 m long",
+    reach: Drawn[Length] | None = Field(
+        default=None,
+        description="metres from the middle along and across the floor, at most; default: 10, and farther where the models need"
+        " more room, as cameras look at the middle",
     )
 
 
@@ -38,7 +44,10 @@ def place(
     """Poses, no two boxes, or hulls, nearer than the room's gap; raises RecipeError where no spot is found for one."""
     if room.free is None or room.taken:
         return scattered(cast, room, shapes, rng, options, free_spot)
-    floor = _within(room.free, drawn(options.reach, draws_of(rng, "reach")))
+    if options.reach is None:
+        floor = _roomy(room.free, shapes)
+    else:
+        floor = _within(room.free, drawn(options.reach, draws_of(rng, "reach")))
 
     def spot(
         draws: np.random.Generator, room: Room, box: NDArray[np.float64], others: Sequence[Any], cover: Cover | None
@@ -46,6 +55,17 @@ def place(
         return spread_spot(draws, room, floor, box, others, cover)
 
     return scattered(cast, room, shapes, rng, options, spot)
+
+
+def _roomy(free: Footprint, shapes: Sequence[Shape]) -> Footprint:
+    """The part of a floor around the middle that holds the models loosely; all of a smaller floor."""
+    needed = LOOSE * sum(float(np.prod(shape.box[4, :2] - shape.box[2, :2])) for shape in shapes)
+    reach = NEAR
+    floor = _within(free, reach)
+    while 4 * float(np.prod(floor.half)) < needed and (floor.half < free.half).any():
+        reach *= 2
+        floor = _within(free, reach)
+    return floor
 
 
 def _within(floor: Footprint, reach: float) -> Footprint:
