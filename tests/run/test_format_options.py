@@ -176,7 +176,7 @@ def test_a_wrong_option_in_a_recipe_is_one_line_with_its_place(tmp_path):
             "[0].coco.category_ids",
             "'oco' is unknown; did you mean 'coco'? Valid: contiguous, coco",
         ),
-        ("tum: {category_ids: coco}", "[0].tum", "expected no options, format tum has none; found category_ids"),
+        ("opencv: {category_ids: coco}", "[0].opencv", "expected no options, format opencv has none; found category_ids"),
         ("coco: 5", "[0]", r"expected a format's name, or {name: {option: value}}; found a mapping"),
     ):
         file.write_text(text.replace("formats: []\n", "") + f"formats: [{{{entry}}}]\n")

@@ -172,6 +172,9 @@ def test_unknown_engines_and_formats_are_told_with_the_nearest_name():
     assert re.fullmatch(r"engine: 'rastr' is unknown; did you mean 'raster'\? Valid: .*", error(engine="rastr"))
     said = error(channels=["rgb", "dept"])
     assert re.fullmatch(r"channels\[1\]: 'dept' is unknown; did you mean 'depth'\? Valid: rgb, rgba, .*, depth, .*", said)
+    for field in ("annotations", "channels"):
+        said = error(**{field: ["rgb", "bbox"] if field == "channels" else ["bbox"]})
+        assert "'bbox' is unknown; `box2d` is in every data set: leave it out. Valid: " in said
     assert error(formats=["nonesuch"]).startswith("formats[0]: 'nonesuch' is unknown. Valid: ")
 
 

@@ -13,8 +13,9 @@ from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.labels import Needs, channels, labels, on_request
 from viewsphere.model.channel import MATERIAL_PASSES, PASSES, PICTURES
-from viewsphere.model.mistakes import nearest, one_of, read_options
+from viewsphere.model.mistakes import nearest, one_of, read_options, shown
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.suggestions import suggestion
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.recipe import Recipe
@@ -88,7 +89,7 @@ def check_names(recipe: Recipe) -> None:
         if name in on_request():
             raise RecipeError(f"channels[{i}]: expected a channel; found {name}, which is one of annotations")
         if name not in channels():
-            raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
+            raise RecipeError(f"channels[{i}]: {_unknown(name, tuple(channels()))}")
         check_needs(recipe, f"channels[{i}]", name)
         _check_painted(recipe, f"channels[{i}]", name)
     for i, name in enumerate(recipe.annotations):
@@ -105,9 +106,17 @@ def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
         raise RecipeError(f"{where}: expected a label on request; found {name}, which every data set has: leave it out")
     if name not in on_request():
         of = [label.name for label in on_request().values() if name in {field.name for field in label.fields}]
-        known = f"expected a label; found {name}, a field of {of[0]}: name that" if of else one_of(name, tuple(on_request()))
+        known = f"expected a label; found {name}, a field of {of[0]}: name that" if of else _unknown(name, tuple(on_request()))
         raise RecipeError(f"{where}: {known}")
     check_needs(recipe, where, name)
+
+
+def _unknown(name: str, known: tuple[str, ...]) -> str:
+    """The message of a name that is no such label, with a word where a label that every data set has is meant."""
+    meant = None if suggestion(name, known) else suggestion(name, labels())
+    if meant is None or meant in on_request() or meant in channels():
+        return one_of(name, known)
+    return f"{shown(name)} is unknown; `{meant}` is in every data set: leave it out. Valid: {', '.join(known)}"
 
 
 def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) -> None:

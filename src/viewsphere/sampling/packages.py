@@ -12,5 +12,5 @@ def check_packages(packages: Iterable[str], extra: str, what: str) -> None:
     """See that packages of an extra are installed, importing none; raises MissingExtraError that begins with `what`."""
     missing = [name for name in packages if find_spec(name) is None]
     if missing:
-        names = " and ".join(missing)
-        raise MissingExtraError(f"{what} needs {names}, which is not installed: pip install 'viewsphere[{extra}]'")
+        names, are = " and ".join(missing), "is" if len(missing) == 1 else "are"
+        raise MissingExtraError(f"{what} needs {names}, which {are} not installed: pip install 'viewsphere[{extra}]'")
