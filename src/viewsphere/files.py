@@ -32,7 +32,7 @@ KINDS: Mapping[int, str] = {
     S_IFSOCK: f"a socket, {COPY}",
     S_IFDIR: "a folder, not a file. Name a file in it",
 }
-"""What a file is instead of a regular one, and the remedy."""
+"""Kinds of files that are not regular, and the remedy."""
 
 
 class FileError(UserError, OSError):
@@ -46,7 +46,7 @@ class FileError(UserError, OSError):
 
 
 def read_bytes(file: Path, limit: str = "MAX_FILE_BYTES") -> bytes:
-    """All bytes of a regular file, or of one at a URL.
+    """Return all bytes of a regular file, or of one at a URL.
 
     Raises FileError for another kind of file and for one beyond the named limit, OSError as opening does.
     """
@@ -102,7 +102,7 @@ class _Bounded(io.FileIO):
         return block
 
     def readall(self) -> bytes:
-        """All further bytes; raises FileError beyond the limit."""
+        """Return all further bytes; raises FileError beyond the limit."""
         return b"".join(iter(lambda: self.read(BLOCK), b""))
 
     def readinto(self, buffer: Any, /) -> int:

@@ -16,7 +16,7 @@ def printable(text: str) -> str:
 
 
 def is_utf8(text: str) -> bool:
-    """Whether a name is text. The names of files may be any bytes, of which Python makes halves of characters."""
+    """Return whether a name is text. The names of files may be any bytes, of which Python makes halves of characters."""
     try:
         text.encode()
     except UnicodeEncodeError:

@@ -73,7 +73,7 @@ class Finder:
         return found
 
     def holds(self, reference: str, base: Path | None = None) -> bool:
-        """Whether there is a file for a reference."""
+        """Return whether there is a file for a reference."""
         try:
             names = self._names(reference)
         except NotFoundError:
@@ -112,7 +112,7 @@ class Finder:
         return [name for name in dict.fromkeys((name, unquote(name))) if "\0" not in name]
 
     def is_inside(self, path: Path) -> bool:
-        """Whether a path, its links followed, lies in the asset's root."""
+        """Return whether a path, its links followed, lies in the asset's root."""
         real, folder = _real(path), self._root
         if real.is_relative_to(folder):
             return True

@@ -14,7 +14,7 @@ MESSAGE = re.compile(
     rb"(?is)\s*(?:(?:error:? )?[45]\d\d\b|not found\b|access denied\b|forbidden\b|(?:<\?xml[^>]*>\s*)?<error>"
     rb"|\{(?!.*\"asset\")[^{]*\"(?:message|error|detail)\"\s*:)"
 )
-"""What a server sends instead of a file: an HTTP status, a store's XML, or JSON with a message."""
+"""Replies of servers in place of a file: an HTTP status, a store's XML, or JSON with a message."""
 
 ARCHIVES = {
     b"PK\x03\x04": "ZIP",
@@ -37,13 +37,13 @@ PICTURES = {b"\x89PNG": "PNG", b"\xff\xd8\xff": "JPEG", b"RIFF": "WebP", b"GIF8"
 
 
 def impostor(data: bytes) -> str | None:
-    """What a file holds in place of itself, and the remedy: a pointer, or a server's page or message; None for neither."""
+    """The content of a stand-in for a file, and the remedy: a pointer, or a server's page or message; None for neither."""
     head = data[:HEAD].removeprefix(b"\xef\xbb\xbf")
     return _pointer(head) or _from_server(head, len(data))
 
 
 def wrong_kind(data: bytes, suffix: str) -> str | None:
-    """What a file holds that is no model with this suffix, by its first bytes, and the remedy; None for nothing known."""
+    """The content of a file that is no model with this suffix, by its first bytes, and the remedy; None if unknown."""
     kind = next((name for magic, name in ARCHIVES.items() if data.startswith(magic)), None)
     if kind is not None and PACKED.get(suffix) != kind:
         return f"a {kind} archive; unpack it and name the file in it"

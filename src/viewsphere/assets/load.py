@@ -131,7 +131,7 @@ def check_source(path: Path) -> str:
 
 
 def needs_blender(suffix: str) -> bool:
-    """Whether Blender reads a model at rest: USD files only where usd-core is not installed."""
+    """Return whether Blender reads a model at rest: USD files only where usd-core is not installed."""
     return suffix in BLENDER_SUFFIXES and not (suffix in USD and usd.is_available())
 
 

@@ -52,14 +52,14 @@ def _joined(flat: Float, ring: Int, hole: Int, holes: Sequence[Int]) -> Int:
 
 
 def _opens_to(flat: Float, ring: Int, i: int, point: Float) -> bool:
-    """Whether a point lies within the angle at a corner of a counter-clockwise ring."""
+    """Return whether a point lies within the angle at a corner of a counter-clockwise ring."""
     before, corner, after = (flat[ring[k % len(ring)]] for k in (i - 1, i, i + 1))
     sides = _turn(before, corner, point) > 0, _turn(corner, after, point) > 0
     return bool(all(sides) if _turn(before, corner, after) >= 0 else any(sides))
 
 
 def _is_cut(start: Float, end: Float, firsts: Float, seconds: Float) -> bool:
-    """Whether the line from start to end meets any of the edges that do not begin or end there too."""
+    """Return whether the line from start to end meets any of the edges that do not begin or end there too."""
     apart = _turn(start, end, firsts) * _turn(start, end, seconds) <= 0
     across = _turn(firsts, seconds, start) * _turn(firsts, seconds, end) <= 0
     shared: NDArray[np.bool_] = np.zeros(len(firsts), bool)

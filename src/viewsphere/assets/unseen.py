@@ -12,7 +12,7 @@ FAINTEST = 0.01
 
 
 def is_unseen(mesh: Mesh) -> bool:
-    """Whether every triangle is clear all over: by its material, its texels or its vertices' colours."""
+    """Return whether every triangle is clear all over: by its material, its texels or its vertices' colours."""
     return all(_is_clear(mesh, index) for index in np.unique(mesh.triangle_material).tolist())
 
 

@@ -34,14 +34,14 @@ def lacking_models(dataset: Dataset) -> list[str]:
 
 
 def credits(dataset: Dataset) -> Iterator[str]:
-    """What is wrong with the file of credits, which is written when a run ends."""
+    """Problems of the file of credits, which is written when a run ends."""
     problem = credits_problem(dataset)
     if problem:
         yield f"{problem}: render again, or mend it with viewsphere check --repair"
 
 
 def _missing_shots(dataset: Dataset) -> Iterator[str]:
-    """What is missing of each part, and of the channels that each one added to others."""
+    """The missing frames of each part, and of the channels that each one added to others."""
     plan, store = dataset.plan, dataset.store
     for gap in store.gaps(plan):
         what = _factors(plan)
@@ -56,7 +56,7 @@ def _missing_shots(dataset: Dataset) -> Iterator[str]:
 
 
 def _factors(plan: PlanRecord) -> str:
-    """What a plan's frames are the product of, in words."""
+    """The factors of a plan's number of frames, in words."""
     time = next((part.recipe["time"] for part in plan.parts if part.recipe.get("time")), None)
     if time is not None:
         instants = TimeEntry.model_validate(time).count

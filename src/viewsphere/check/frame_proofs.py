@@ -1,4 +1,4 @@
-"""All proofs of frames: against themselves, their shots and plan, the models, and what the recipe gives."""
+"""Return all proofs of frames: against themselves, their shots and plan, the models, and what the recipe gives."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def _proofs(models: Mapping[str, ModelInfo], sample: Sample) -> Iterator[tuple[s
 
 
 def _as_shot(dataset: Dataset, scenery: Scenery, sample: Sample) -> Iterator[str]:
-    """What a frame's record says otherwise than the plan, and than its shot if that is known."""
+    """Differences of a frame's record from the plan, and from its shot if that is known."""
     row = dataset.plan.row_at(sample.index)
     shot, place = scenery.shot(row.key), sample.index - row.first
     if sample.known_pose and dataset.plan.parts[row.part].is_product:
@@ -188,8 +188,9 @@ def _as_shot(dataset: Dataset, scenery: Scenery, sample: Sample) -> Iterator[str
 
 
 def _dealt_split(dataset: Dataset, row: Row, sequence: str) -> tuple[str, str | None]:
-    """Whether a row is dealt its split with its sequence or with its model or scene, and that split: None where splits are
-    drawn otherwise. What an earlier part dealt stays; a merged part knows its own alone.
+    """The name that deals a row its split (its sequence, model or scene), and that split; None where it is drawn otherwise.
+
+    A part keeps the splits of earlier ones; a merged part has its own alone.
     """
     part = dataset.plan.parts[row.part]
     deals = [one.dealt_splits for one in ((part,) if part.merged else dataset.plan.parts[: row.part + 1])]

@@ -66,7 +66,7 @@ class Recomputed:
         self._composed: set[str] = set()
 
     def is_composed(self, row: Row) -> bool:
-        """Whether `of_shot` compared the shot of a row."""
+        """Return whether `of_shot` compared the shot of a row."""
         return row.key in self._composed
 
     @property
@@ -128,7 +128,7 @@ class Recomputed:
         return None
 
     def _lacks_files(self, number: int) -> bool:
-        """Whether a recipe names files that may be gone: others than models', or a model's that is no longer there."""
+        """Return whether a recipe names files that may be gone: others than models', or a model's that is no longer there."""
         recipe, store = self._record.parts[number].recipe, self._dataset.store
         if _names_files({name: value for name, value in recipe.items() if name != "models"}):
             return True
@@ -160,7 +160,7 @@ class Recomputed:
 
 
 def _names_files(recipe: Any) -> bool:
-    """Whether a recipe's plan follows from files beside it."""
+    """Return whether a recipe's plan follows from files beside it."""
     if isinstance(recipe, Mapping):
         return any(_names_files(value) for name, value in recipe.items() if name not in FREE)  # pyright: ignore[reportUnknownVariableType]
     if isinstance(recipe, list | tuple):
@@ -169,7 +169,7 @@ def _names_files(recipe: Any) -> bool:
 
 
 def _reads_tables(planned: Plan) -> bool:
-    """Whether a plan follows from what files say, such as tables of poses and calibrations."""
+    """Return whether a plan follows from what files say, such as tables of poses and calibrations."""
     path = getattr(planned.recipe.viewpoints, "path", None)
     read = (path, planned.blend, planned.own_rig, planned.tracks, script_digest(planned.recipe))
     return any(one is not None for one in read)

@@ -38,7 +38,7 @@ class Report:
 
     @property
     def ok(self) -> bool:
-        """Whether there is no finding."""
+        """Return whether there is no finding."""
         return not self.findings
 
     @property

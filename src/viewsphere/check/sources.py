@@ -37,7 +37,7 @@ class Sources:
 
     @cached_property
     def _may_be_renewed(self) -> bool:
-        """Whether the file of credits confirms the records: a later run may renew credits without a new plan."""
+        """Return whether the file of credits confirms the records: a later run may renew credits without a new plan."""
         return credits_problem(self._dataset) is None
 
     def contradictions(self, keys: Iterable[str]) -> Iterator[Finding]:
@@ -89,7 +89,7 @@ class Sources:
         return 0, None
 
     def _is_same(self, info: ModelInfo, export: Export) -> bool:
-        """Whether a source still gives the GLB of the data set."""
+        """Return whether a source still gives the GLB of the data set."""
         with temporary("check") as aside:
             export(aside)
             return read_bytes(aside / Path(info.glb).name) == read_bytes(self._dataset.path(info.glb))

@@ -427,7 +427,7 @@ def _model_warnings(planned: Plan, quiet: bool) -> tuple[str, ...]:
 
 
 def _kept(output: Path) -> str:
-    """How many frames of a stopped run the data set holds, as `status` counts them."""
+    """The number of frames that the data set holds after a stop, as `status` counts them."""
     from viewsphere.run.status import status
 
     try:

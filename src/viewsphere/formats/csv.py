@@ -62,7 +62,7 @@ HEAD = (*OF_SAMPLE, *OF_OBJECT, *OF_VIEW, *(f"{name}_{part}" for name, parts in 
 
 
 class Options(Frozen):
-    """How texts are written."""
+    """Options of texts in the table."""
 
     safe: bool = Field(default=True, description="`true`: a ' in front of texts that spreadsheets would run as formulas")
 

@@ -18,7 +18,7 @@ SAME = 1 / 3
 """Share of the least angle between two elements within which a product is one of them: below a half, so that it is only one."""
 
 CLOSED = 1e-6
-"""How far the entries of a product may be from those of the listed motion: they are listed with nine digits."""
+"""Largest distance of a product's entries from those of the listed motion: they are listed with nine digits."""
 
 LARGEST = 64
 """Elements of a completed group. The largest ones searched for are the icosahedron's, of 60, and a 16-sided prism's, of 32."""
@@ -48,7 +48,7 @@ def largest_group(motions: Float, holds: Holds, nearly: Holds, axes: Float, snap
 
 
 def is_group(motions: Float) -> bool:
-    """Whether motions (N, 4, 4), the identity among them, hold all their products."""
+    """Return whether motions (N, 4, 4), the identity among them, hold all their products."""
     table, turns = _table(motions), motions[:, :3, :3]
     return bool((table >= 0).all() and np.abs(_products(turns) - turns[table]).max() <= CLOSED)
 

@@ -83,7 +83,7 @@ def check_ids(where: str, ids: Ids | None, has_numbers: bool, example: str = "by
 
 
 def has_whole_numbers(dtype: DTypeLike) -> bool:
-    """Whether arrays of a type hold whole numbers, in a column at least."""
+    """Return whether arrays of a type hold whole numbers, in a column at least."""
     kind = np.dtype(dtype)
     if kind.fields:
         return any(has_whole_numbers(column) for column, *_ in kind.fields.values())
@@ -91,7 +91,7 @@ def has_whole_numbers(dtype: DTypeLike) -> bool:
 
 
 def is_of_numbers(type_: Any) -> bool:
-    """Whether values of a field's type are whole numbers, or dataclasses that hold some."""
+    """Return whether values of a field's type are whole numbers, or dataclasses that hold some."""
     if is_dataclass(type_):
         return any("int" in str(one.type) for one in fields(type_))
     return type_ is int

@@ -158,7 +158,7 @@ class _Restored(ObjectAnnotation):
         return self.__dict__["more"]
 
     def __dir__(self) -> list[str]:
-        """All attributes, also those that are not restored yet."""
+        """Return all attributes, also those that are not restored yet."""
         makers: Makers = self.__dict__["_makers"]
         return sorted({*object.__dir__(self), *_OWN, *filter(makers.has, makers.of)})
 

@@ -142,7 +142,7 @@ def _merge(under: dict[str, Any], over: dict[str, Any], steps: Steps, forget: Ca
 
 
 def _of_other_kind(field: str, old: Any, new: Any) -> bool:
-    """Whether a field's new mapping is of another kind than the old one, and so replaces all of it."""
+    """Return whether a field's new mapping is of another kind than the old one, and so replaces all of it."""
     if not {*KINDS}.isdisjoint({*old, *new}):
         return True  # distributions are replaced whole, not merged
     if "kind" in new:

@@ -22,7 +22,7 @@ DEEPEST = 200
 """Brackets within one another: each takes the YAML reader as long as all those around it."""
 
 FOUND: dict[type | tuple[type, ...], str] = {type(None): "an empty file", list: "a list", str: "a text", object: "a number"}
-"""What a file holds instead of a mapping. The message does not quote the file: it may be a private one that is no recipe."""
+"""The problem of a file that holds no mapping. The message does not quote the file, which may be private and no recipe."""
 
 _HALF = re.compile("[\ud800-\udfff]")
 _INT = re.compile(r"[-+]?[0-9]+\Z")

@@ -142,7 +142,7 @@ Shared = Annotated[
         description="whether all models, or all random scenes, are seen from the same draws; by default each has its own",
     ),
 ]
-"""Whether random viewpoints are drawn once for all."""
+"""True if random viewpoints are drawn once for all."""
 
 
 class Jitter(_Axes):

@@ -10,10 +10,10 @@ from yaml.tokens import FlowMappingEndToken, FlowMappingStartToken, FlowSequence
 from viewsphere.model.mistakes import shown
 
 UNCLOSED = ("while scanning a quoted scalar", "while parsing a flow sequence", "while parsing a flow mapping")
-"""What was being read, in the YAML reader's words, where a quote or a bracket is not closed, and the reader knows its place."""
+"""The YAML reader's contexts of a quote or a bracket that is not closed, and whose place it knows."""
 
 OPENING: dict[str, str] = {"'": "quoted text", '"': "quoted text", "[": "list", "{": "mapping"}
-"""What begins with each sign that has to be closed."""
+"""The kind of value that each opening sign begins."""
 
 ENDS = ("end of stream", "<stream end>")
 """The YAML reader's words for the end of a file."""
@@ -79,7 +79,7 @@ def _explained(problem: str, around: str, mark: yaml.Mark | None) -> str:
 
 
 def _innermost_open(text: str, loader: type[yaml.SafeLoader]) -> yaml.Mark | None:
-    """Where the last bracket stands that is not closed; the YAML reader has come to the end of the text."""
+    """The place of the last bracket that is not closed, for a text that ends within one."""
     opened: list[yaml.Mark] = []
     for token in yaml.scan(text, Loader=loader):
         if isinstance(token, (FlowSequenceStartToken, FlowMappingStartToken)):

@@ -16,7 +16,7 @@ from viewsphere.store import Row
 
 
 class SceneryRecord(Frozen):
-    """What is background in a shot: things of id 0, and the digest of each model's mesh by its key at the time step shown."""
+    """The background of a shot: things of id 0, and the digest of each model's mesh by its key at the time step shown."""
 
     things: tuple[Thing, ...]
     digests: dict[str, str]

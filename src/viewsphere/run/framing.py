@@ -32,10 +32,10 @@ from viewsphere.truth.moving import Ring, shot_floor
 from viewsphere.truth.shot_views import ShotViews
 
 NO_PLACE = -10.0
-"""How good a frame is whose camera cannot stand there: far below any that misses what is wanted."""
+"""Value of a frame whose camera cannot stand there: far below any that misses what is wanted."""
 
 OUT_OF_VIEW = -1.0
-"""How good a frame is in which no object can be seen, where the recipe does not ask for visibility."""
+"""Value of a frame in which no object can be seen, where the recipe does not ask for visibility."""
 
 Take = Callable[[Sequence[int], int], Shot]
 """Makes a shot, each frame at its try, in the first draw of its scene, from a number on, in which all has room."""
@@ -49,7 +49,7 @@ class Source(Protocol):
         ...
 
     def whole(self, row: Row) -> Row | None:
-        """All poses of the row's scene in the plan's numbers; None where the row has them."""
+        """Return all poses of the row's scene in the plan's numbers; None where the row has them."""
         ...
 
 
@@ -126,11 +126,11 @@ class Framing:
 
     @property
     def _enough(self) -> float:
-        """How good a frame is that need not be drawn again."""
+        """Value of a frame that need not be drawn again."""
         return 0.0 if self.plan.recipe.wanted is not None else self.plan.recipe.min_visibility or 0.0
 
     def _problems(self, shot: Shot) -> list[RecipeError | None]:
-        """What is wrong with the cameras of each frame."""
+        """The problems of each frame's cameras."""
         try:
             self.stages.check_shot(shot)
         except RecipeError as error:
@@ -182,7 +182,7 @@ def _content(shot: Shot, instant: int) -> float:
 
 
 def _in_view(box_of: BoxOf, together: bool, shot: Shot, instant: int) -> float:
-    """Whether some object may be in some sensor's picture at an instant, as the corners of its box tell."""
+    """Return whether some object may be in some sensor's picture at an instant, as the corners of its box tell."""
     targets = [now for thing in shot.targets(together) if (now := thing.at(instant)).is_there]
     cameras = (shot.camera(instant, sensor) for sensor in range(len(shot.rig.sensors)))
     seen = not targets or any(_may_show(camera, thing, box_of) for camera in cameras for thing in targets)
@@ -190,7 +190,7 @@ def _in_view(box_of: BoxOf, together: bool, shot: Shot, instant: int) -> float:
 
 
 def _may_show(camera: Camera, thing: Thing, box_of: BoxOf) -> bool:
-    """Whether a camera may show a thing; lenses other than a plain pinhole are taken to show all."""
+    """Return whether a camera may show a thing; lenses other than a plain pinhole are taken to show all."""
     lens = camera.intrinsics
     if lens.distortion is not None or lens.skew:
         return True

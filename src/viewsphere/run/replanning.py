@@ -99,7 +99,7 @@ class Replanned:
         raise problem or StoreError(f"{self.store.root}: expected a folder to plan in, found none")
 
     def _folders(self, number: int) -> Iterator[Path]:
-        """Where the recipe's file may have been: here, or above a model's."""
+        """Folders in which the recipe's file may have been: here, or above a model's."""
         yield Path.cwd()
         for row, _ in zip(self.record.rows_of(number), range(MOST_SHOTS), strict=False):
             try:

@@ -92,8 +92,9 @@ def needs_of(module: Format, entry: FormatEntry) -> tuple[str, ...]:
 
 
 def is_computed(name: str) -> bool:
-    """Whether a label follows from shots and models, so that formats need no recording of it; a pass, which is painted, does
-    not, and neither do point tracks, a LiDAR's points and looks that were drawn.
+    """Return whether a label follows from shots and models, so that formats need no recording of it.
+
+    A painted pass does not, and neither do point tracks, a LiDAR's points and drawn looks.
     """
     needs = labels()[name].needs if name in labels() else Needs()
     return name not in PASSES and not (needs.tracks or needs.lidar or needs.looks)

@@ -188,7 +188,7 @@ class Composition(Sendable):
         return laid(entry.layout, entry.orientation, cast, room, box_of, rng)
 
     def place_names(self, subject: str, pose: str | None, redraw: int = 0) -> Names:
-        """What the place of a scene is drawn for."""
+        """The names that a scene's place is drawn by."""
         place = self.recipe.scene.place
         names = draw_names(place.draw, subject, pose) if place else ()
         return names + redraw_names(redraw) if redraw and redraws_place(self.recipe) else names
@@ -342,7 +342,7 @@ def compose(
 
 @lru_cache(maxsize=4)
 def built_of(shown: tuple[ModelSpec, None], room_from_piece: Matrix4, height: float) -> Obstacles | None:
-    """What of a model stands up to a height above a room's floor; the last are kept."""
+    """The triangles of a model up to a height above a room's floor; the last results are kept."""
     mesh = shape_of(shown)
     return obstacles(transform(np.array(room_from_piece), mesh.vertices), mesh.triangles, height)
 

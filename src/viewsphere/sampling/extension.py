@@ -144,7 +144,7 @@ class Portion(Sendable):
         )
 
     def whole(self, row: Row) -> Row | None:
-        """All poses that the recipe has of a row's scene, in the recipe's numbers, as for `Plan.whole`."""
+        """Return all poses that the recipe has of a row's scene, in the recipe's numbers, as for `Plan.whole`."""
         return self.plan.whole(replace(row, positions=as_ranges(np.array(list(map(self._of_recipe, numbers(row.positions)))))))
 
     def _channels(self, frame: int) -> tuple[str, ...]:

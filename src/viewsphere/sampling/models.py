@@ -133,7 +133,7 @@ def files_below(folder: Path) -> Iterator[tuple[str, int, str]]:
 
 
 def _shown(folder: Path, where: str) -> list[Path]:
-    """All files and folders below a folder that are not hidden."""
+    """Return all files and folders below a folder that are not hidden."""
     return [file for file in below(folder, where) if not any(map(_is_hidden, file.relative_to(folder).parts))]
 
 

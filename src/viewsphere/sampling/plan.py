@@ -286,13 +286,13 @@ class Plan(Shown, Stock):
         return self._fitting(redraw, lambda number: self._taken_at(number, subject, poses, box_of, key, first, tries), names)
 
     def standing(self, subject: str, box_of: BoxOf) -> Sequence[Standing]:
-        """What can be known before a frame is rendered of where a subject's objects stand, in the first draw that has room."""
+        """The places of a subject's objects as far as they are known before rendering, in the first draw that has room."""
         return self._fitting(
             0, lambda number: tuple(self.sampler.standing(self.redrawn(number), subject, box_of)), (subject, "")
         )
 
     def _fitting(self, redraw: int, make: Callable[[int], Made], names: Names = ()) -> Made:
-        """What is made of the first draw of a scene, from this number on, that fits; raises the first draw's RecipeError where
+        """The result of the first draw of a scene, from this number on, that fits; raises the first draw's RecipeError where
         none does. `names`: of a scene that is asked for again, whose first fitting draw is kept.
         """
         problems: list[RecipeError] = []
@@ -314,11 +314,11 @@ class Plan(Shown, Stock):
 
     @cached_property
     def draws(self) -> int:
-        """How many draws each scene has, the original included."""
+        """The number of draws of each scene, the original included."""
         return scene_draws(self.recipe)
 
     def whole(self, row: Row) -> Row | None:
-        """All poses of a row's scene, or sequence, as one row; None where the row has them, or nothing is redrawn for all."""
+        """The poses of a row's scene, or sequence, as one row; None where the row has them, or nothing is redrawn for all."""
         if self.draws == 1 or (self.recipe.time is None and self.recipe.scene.is_moved_each_frame):
             return None
         positions, each = self._positions[row.subject], len(self.rig.sensors)

@@ -25,7 +25,7 @@ SAME_MODELS = 8
 
 
 def redraws_frames(recipe: Recipe) -> bool:
-    """Whether a still frame has a viewpoint, jitter or company of its own that can be drawn again."""
+    """Return whether a still frame has a viewpoint, jitter or company of its own that can be drawn again."""
     if recipe.time is not None:
         return False
     company, jitter = recipe.scene.company, recipe.scene.jitter
@@ -35,7 +35,7 @@ def redraws_frames(recipe: Recipe) -> bool:
 
 
 def redraws_scenes(recipe: Recipe) -> bool:
-    """Whether the recipe draws where its models stand, or the place around them."""
+    """Return whether the recipe draws where its models stand, or the place around them."""
     scene = recipe.scene
     if recipe.scenes is not None and not isinstance(recipe.scenes, ScenesEntry):
         return False
@@ -46,18 +46,18 @@ def redraws_scenes(recipe: Recipe) -> bool:
 
 
 def redraws_place(recipe: Recipe) -> bool:
-    """Whether a scene's redraw changes its place. The categories of a labelled place are planned, so it stays."""
+    """Return whether a scene's redraw changes its place. The categories of a labelled place are planned, so it stays."""
     place = recipe.scene.place
     return place is not None and bool(place.name) and place.draw != "fixed" and place.labels != "own"
 
 
 def is_redrawn(recipe: Recipe) -> bool:
-    """Whether cameras that do not fit can be redrawn: early checks leave them to the shot."""
+    """Return whether cameras that do not fit can be redrawn: early checks leave them to the shot."""
     return redraws_frames(recipe) or redraws_scenes(recipe)
 
 
 def scene_draws(recipe: Recipe) -> int:
-    """How many draws a scene has, the original included; after every `redraws_each` of them it drops one object more."""
+    """The number of draws of a scene, the original included; after every `redraws_each` of them it drops one object more."""
     if not redraws_scenes(recipe):
         return 1
     scenes, company = recipe.scenes, recipe.scene.company
@@ -73,7 +73,7 @@ def redraws_each(recipe: Recipe) -> int:
 
 
 def fewer(recipe: Recipe, redraw: int) -> int:
-    """How many objects a redraw drops from a scene that asks for more than its least."""
+    """The number of objects that a redraw drops from a scene that asks for more than its least."""
     return redraw // redraws_each(recipe) if redraw else 0
 
 

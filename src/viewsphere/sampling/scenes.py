@@ -142,7 +142,7 @@ class Scenes:
         return lambda path: (alone if path[0] in self.drawn_alone else shared)(path)
 
     def _alone(self, names: Names) -> Names:
-        """What is drawn for this variation alone is drawn for."""
+        """The names that draws of this variation alone are keyed by."""
         return (*names, "variation", self.variation)
 
     def _names_of_finish(self, model: str, pose: str | None, place: str) -> tuple[Names, ...]:

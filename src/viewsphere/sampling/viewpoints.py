@@ -97,7 +97,7 @@ class Poses(Sequence[Viewpoint]):
 
     @property
     def are_shared(self) -> bool:
-        """Whether random poses are the same for all subjects."""
+        """Return whether random poses are the same for all subjects."""
         return getattr(self.viewpoints, "shared", False)
 
     def of(self, subject: str) -> Poses:

@@ -206,7 +206,7 @@ class Part:
 
     @property
     def is_rendered(self) -> bool:
-        """Whether the part's recipe rendered its shots into this data set, frames of its own or channels of others."""
+        """Return whether the part's recipe rendered its shots into this data set, frames of its own or channels of others."""
         return self.sampler != IMPORT and not self.merged
 
     @property

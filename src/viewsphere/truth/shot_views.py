@@ -327,7 +327,7 @@ class SampleViews:
 
     @property
     def drawn_as(self) -> tuple[str, ...]:
-        """What randomness in the sample's labels follows from besides a seed: its subject, whatever its variation, its sensor,
+        """The names that, beside a seed, key the randomness in the sample's labels: its subject without variation, its sensor,
         and its instant, which is named by its time and by where the rig is then. Nothing of it depends on how a data set is
         stored, so the same frame has the same draws however it came there.
         """

@@ -93,7 +93,7 @@ class View:
         return seen_from(self.geometry, self.corners)
 
     def is_turned_away(self, triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Whether the camera cannot see these triangles, -1 for none, because they turn their backs to it."""
+        """Return whether the camera cannot see these triangles, -1 for none, because they turn their backs to it."""
         is_gone = self.shown.triangle_cutout != self.geometry.triangle_cutout
         return (triangles >= 0) & is_gone[triangles]
 

@@ -83,7 +83,7 @@ OWN_SITES = ("same-origin", "none")
 
 @dataclass(frozen=True)
 class Address:
-    """Where to listen; `port` 0 is any that is free. Without a token the server makes one."""
+    """The address to listen at; `port` 0 is any that is free. Without a token the server makes one."""
 
     host: str = LOOPBACK
     port: int = PORT
@@ -296,7 +296,7 @@ class _Handler(BaseHTTPRequestHandler):
         super().handle_one_request()
 
     def parse_request(self) -> bool:
-        """Whether there is a request to be answered. Headers are parsed only of requests that hold the token."""
+        """Return whether there is a request to be answered. Headers are parsed only of requests that hold the token."""
         self.request_version, self.requestline = self.protocol_version, ""
         self.command = "HEAD" if self.raw_requestline.startswith(b"HEAD ") else "GET"
         head = self._head()
@@ -325,7 +325,7 @@ class _Handler(BaseHTTPRequestHandler):
         return head
 
     def _holds_token(self, head: bytes) -> bool:
-        """Whether a word of the head is the token, compared in constant time; `_has_token` looks where it stands."""
+        """Return whether a word of the head is the token, compared in constant time; `_has_token` looks where it stands."""
         token = self.server.token.encode()
         return any([hmac.compare_digest(word, token) for word in WORD.findall(head)])
 

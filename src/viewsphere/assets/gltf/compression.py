@@ -28,7 +28,7 @@ FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
 
 
 def is_readable(extension: str) -> bool:
-    """Whether the package that decodes an extension's data is installed."""
+    """Return whether the package that decodes an extension's data is installed."""
     return find_spec(PACKAGES[extension]) is not None
 
 

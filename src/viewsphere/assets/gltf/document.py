@@ -139,7 +139,7 @@ class Document:
         return memoryview(self._views[index]), stride
 
     def _has_plain_copy(self, entry: Field) -> bool:
-        """Whether the buffer of a compressed bufferView holds the plain data, too."""
+        """Return whether the buffer of a compressed bufferView holds the plain data, too."""
         index = entry.integer("buffer")
         return "uri" in self.root.at("buffers", index) or (index == 0 and self.binary is not None)
 

@@ -20,7 +20,7 @@ IMAGE_EXTENSIONS = ("EXT_texture_webp", "MSFT_texture_dds")
 
 
 def read_materials(document: Document, used: Collection[int]) -> list[Material]:
-    """All materials in file order (unused ones plain, but for their sides), then the default for primitives without a material.
+    """Return the materials in file order (unused ones plain, but for their sides), then the default of primitives without one.
 
     Primitives without material are plain white plastic rather than the specification's mirror-like metal.
     """

@@ -85,7 +85,7 @@ class _Scene:
             self._elements.setdefault((element.tag, str(element.get("id"))), element)
 
     def pieces(self) -> Iterator[Primitive]:
-        """All faces of the scene where its nodes put them; of a file without a scene each geometry once."""
+        """Return all faces of the scene where its nodes put them; of a file without a scene each geometry once."""
         instance = self.root.find("scene/instance_visual_scene")
         scene = None if instance is None else self._target("visual_scene", instance)
         if scene is None:

@@ -12,11 +12,11 @@ from viewsphere.assets.primitive import Float
 from viewsphere.assets.text import decode
 
 NO_NUMBER = re.compile(rb"[-+]?(?:nan\S*|1\.#\S+)", re.IGNORECASE)
-"""What C libraries write for NaN and infinity."""
+"""Spellings of NaN and infinity in C libraries."""
 
 
 def numbers_in(folder: ModelFolder, text: bytes, lines_before: int) -> Float:
-    """All numbers of a text between blanks. Raises ModelError for a word that is none, with its line in the file."""
+    """Return all numbers of a text between blanks. Raises ModelError for a word that is none, with its line in the file."""
     for words in (text, None):
         try:
             return _parsed(NO_NUMBER.sub(b"nan", text) if words is None else words)

@@ -32,7 +32,7 @@ def read_off(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
 
 @dataclass(frozen=True, eq=False)
 class _Off:
-    """All numbers of a file behind its counts, and of each line that holds any its first number and how many."""
+    """Return all numbers of a file behind its counts, and of each line that holds any its first number and how many."""
 
     folder: ModelFolder
     has: dict[str, bool]

@@ -63,7 +63,7 @@ Columns = dict[str, "NDArray[np.generic] | Lists"]
 
 @dataclass(frozen=True, eq=False)
 class PlyFile:
-    """What a file holds: tables by name, in the order of the file, their columns, and the file's comments."""
+    """The content of a file: tables by name, in the order of the file, their columns, and the file's comments."""
 
     elements: dict[str, Element]
     columns: dict[str, Columns]
@@ -71,7 +71,7 @@ class PlyFile:
 
 
 def read_elements(folder: ModelFolder, data: bytes) -> PlyFile:
-    """All elements of a PLY file; of two with one name the first. Raises ModelError for files that are none, or damaged."""
+    """The elements of a PLY file; of two with one name the first. Raises ModelError for files that are none, or damaged."""
     head, body = _split(folder, data)
     order, elements, comments = _header(folder, head)
     if order:
@@ -135,7 +135,7 @@ def _trusted(folder: ModelFolder, element: Element, lines: Sequence[tuple[int, l
 
 
 def _width(element: Element, words: Sequence[bytes]) -> int:
-    """How many numbers a row has whose lists are as long as these words say."""
+    """The number of words in a row whose lists have these lengths."""
     at = 0
     for column in element.properties:
         at += 1 + (int(float(words[at])) if column.count and at < len(words) else 0)
@@ -312,7 +312,7 @@ class _Table:
 
 
 def _walk(data: bytes, at: int, rows: int, steps: Sequence[_Step], tail: int) -> int:
-    """Where the rows end that begin here; each list's place and length are added to its step."""
+    """The ends of the rows that begin here; each list's place and length are added to its step."""
     for _ in range(rows):
         for before, unpack, head, size, places, lengths in steps:
             at += before

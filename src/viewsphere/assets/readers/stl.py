@@ -45,7 +45,7 @@ def _facts(folder: ModelFolder) -> FileFacts:
 
 
 def _is_text(data: bytes) -> bool:
-    """Whether the file is text; many binary files begin with "solid", too."""
+    """Return whether the file is text; many binary files begin with "solid", too."""
     head = data[:LOOKED_AT].removeprefix(BOM)
     return START.match(head) is not None and b"\0" not in head
 

@@ -107,7 +107,7 @@ def _pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
 
 
 def _viewpoint(sample: Sample) -> dict[str, Any]:
-    """Where a frame was taken from."""
+    """The viewpoint of a frame."""
     viewpoint = sample.pose
     return {
         "distance": viewpoint.distance,

@@ -1,4 +1,4 @@
-"""What of a place's mesh is in the way of things on its floor, as a grid seen from above."""
+"""Obstacles on a place's floor, from its mesh, as a grid seen from above."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Obstacles:
     filled: NDArray[np.bool_]
 
     def meets(self, corners: Float, gap: float) -> bool:
-        """Whether a convex polygon (N, 2), counter-clockwise or not, is nearer than a gap to what the place fills."""
+        """Return whether a convex polygon (N, 2), counter-clockwise or not, is nearer than a gap to what the place fills."""
         low, high = ((edge - self.corner) / self.cell for edge in (corners.min(axis=0) - gap, corners.max(axis=0) + gap))
         x0, y0 = np.maximum(np.floor(low).astype(int), 0)
         x1, y1 = np.minimum(np.ceil(high).astype(int), self.filled.shape)
@@ -42,7 +42,7 @@ class Obstacles:
 
 
 def _is_near(corners: Float, points: Float, gap: float) -> bool:
-    """Whether one of the points (N, 2) is nearer than a gap to each side of a convex polygon, on the inner side of the gap."""
+    """Return whether one of the points (N, 2) lies on the inner side of each side of a convex polygon moved out by a gap."""
     sides = np.roll(corners, -1, axis=0) - corners
     turn = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
     lengths = np.maximum(np.linalg.norm(sides, axis=1), 1e-12)

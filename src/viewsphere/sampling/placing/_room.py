@@ -64,7 +64,7 @@ class Room:
         return replace(self, blocked=self.built(highest))
 
     def is_clear(self, own: Footprint | Outline, others: Sequence[Any]) -> bool:
-        """Whether something that covers so much of the floor is clear of others and of the place, by the gap."""
+        """Return whether something that covers so much of the floor is clear of others and of the place, by the gap."""
         if not all(own.apart(other, self.gap) for other in others):
             return False
         return self.blocked is None or not self.blocked.meets(own.corners, self.gap)

@@ -23,7 +23,7 @@ Spot = Callable[[np.random.Generator, Room, NDArray[np.float64], Sequence[Any], 
 
 
 class Gaps(Frozen):
-    """How near to one another."""
+    """Options of how closely models stand."""
 
     between: Literal["boxes", "hulls"] = Field(
         default="boxes",

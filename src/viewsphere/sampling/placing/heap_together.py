@@ -13,7 +13,7 @@ from viewsphere.sampling.placing._spot import free_spot
 
 
 class Options(Gaps):
-    """How near to one another."""
+    """Options of how closely models stand."""
 
 
 def place(

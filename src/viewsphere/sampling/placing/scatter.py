@@ -25,11 +25,11 @@ NEAR = 10.0
 """Metres from the middle in which models stand where they have room: cameras look there, and a street is 200 m long."""
 
 LOOSE = 8.0
-"""How many times as large as the models' boxes the floor is: 20 cars in a street with furniture find room at the first draw."""
+"""Ratio of the floor's area to that of the models' boxes: 20 cars in a street with furniture find room at the first draw."""
 
 
 class Options(Gaps):
-    """How near to one another, and how far from the middle."""
+    """Options of how closely models stand, and how far from the middle."""
 
     reach: Drawn[Length] | None = Field(
         default=None,

@@ -30,7 +30,7 @@ VEHICLE = 1.2
 
 
 class Options(Frozen):
-    """Who drives, who parks, and where others walk."""
+    """Options of traffic: vehicles that drive or park, and walkers."""
 
     parked: Drawn[Portion] = Field(default=0.35, description="the chance that a vehicle is parked beside its lane")
     bay: Drawn[Strength] = Field(

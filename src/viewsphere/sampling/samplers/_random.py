@@ -72,7 +72,7 @@ def scene_cast(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
 
 
 def _size(recipe: Recipe, subject: str, redraw: int = 0) -> int:
-    """How many models stand in a scene; late redraws drop some, as far as the recipe allows."""
+    """The number of models in a scene; late redraws drop some, as far as the recipe allows."""
     count = drawn(scenes_entry(recipe).objects, lambda path: generator(recipe.seed, *path, subject), ("scenes", "objects"))
     return max(least_objects(recipe, count), count - fewer(recipe, redraw))
 

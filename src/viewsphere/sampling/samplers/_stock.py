@@ -234,7 +234,7 @@ class Stock(Sendable):
         return (views.drawn_for(f"try {again}") if again else views)[pose]
 
     def layout_names(self, pose: int) -> Names:
-        """What the placing of company is drawn for, besides what it is always drawn for: a pose's try, and a redraw."""
+        """Further names that the placing of company is drawn by: a pose's try, and a redraw."""
         again = self.tries.get(pose)
         is_redrawn = again and self.recipe.scene.company is not None and self.recipe.scene.company.draw == "per_frame"
         return ((f"try {again}",) if is_redrawn else ()) + redraw_names(self.redraw)

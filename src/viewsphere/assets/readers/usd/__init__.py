@@ -6,5 +6,5 @@ from importlib.util import find_spec
 
 
 def is_available() -> bool:
-    """Whether the package that reads USD is installed."""
+    """Return whether the package that reads USD is installed."""
     return find_spec("pxr") is not None

@@ -12,7 +12,7 @@ from viewsphere.errors import ModelError
 from viewsphere.limits import limits
 
 REASON = re.compile(r" : '([^\n]*)")
-"""What follows the place in the source of USD that each of its errors names."""
+"""The message behind the place in USD's source that each of its errors names."""
 
 PATH = re.compile(r"@?/\S*/([^/\s]*?)[@:]+")
 
@@ -68,7 +68,7 @@ def _absolute(layer: str, path: str) -> str:
 
 
 def _is_readable(folder: ModelFolder, name: str) -> bool:
-    """Whether a layer is a regular file that may be read; warns or raises where it is not."""
+    """Return whether a layer is a regular file that may be read; warns or raises where it is not."""
     path = _file_of(name)
     is_within = _may_read(folder, path)
     if path.is_absolute() and is_within:

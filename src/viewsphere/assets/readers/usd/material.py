@@ -30,7 +30,7 @@ class Look:
 
 
 UNBOUND = Look(Material(name="default"), ("st",), "displayColor")
-"""What shows prims without a material: their display colours on white."""
+"""The material of prims without one: their display colours on white."""
 
 
 @dataclass(eq=False)

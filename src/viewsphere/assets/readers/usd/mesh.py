@@ -17,12 +17,12 @@ from viewsphere.assets.skin import strongest
 
 PER_CORNER = "faceVarying"
 ROWS = {"constant": "one", "uniform": "face", "vertex": "point", "varying": "point", PER_CORNER: "corner"}
-"""What each interpolation has a value for."""
+"""The elements that each interpolation has a value for."""
 
 
 @dataclass(frozen=True, eq=False)
 class Influences:
-    """What a skin says of a mesh's points: joints (V, K) of `names`, and their weights (V, K)."""
+    """The skin of a mesh's points: joints (V, K) of `names`, and their weights (V, K)."""
 
     names: tuple[str, ...]
     joints: Int
@@ -98,7 +98,7 @@ def _polygons(folder: ModelFolder, prim: Any, time: Any) -> tuple[Float, Int, In
 
 
 def _is_kept(mesh: Any, counts: Int, time: Any) -> Any:
-    """Which faces are polygons and no holes, (F,) bool."""
+    """Return which faces are polygons and no holes, (F,) bool."""
     kept = counts > 2
     holes = _array(mesh.GetHoleIndicesAttr().Get(time), np.int64)
     kept[holes[(holes >= 0) & (holes < len(kept))]] = False
@@ -106,7 +106,7 @@ def _is_kept(mesh: Any, counts: Int, time: Any) -> Any:
 
 
 def _kept_corners(folder: ModelFolder, prim: Any, time: Any) -> Any:
-    """Which corners of the file belong to kept faces; None where all do."""
+    """Return which corners of the file belong to kept faces; None where all do."""
     if not prim.IsA(UsdGeom.Mesh):
         return None
     mesh = UsdGeom.Mesh(prim)

@@ -67,7 +67,7 @@ class _Scene:
     _names: dict[str, int] = field(default_factory=dict[str, int])
 
     def below(self, prim: Any, world: Float, depth: int, above: int | None = None) -> Iterator[Primitive]:
-        """All that a render shows below a prim, whose matrix in the world is given."""
+        """Return all that a render shows below a prim, whose matrix in the world is given."""
         self.folder.check("MAX_NESTING", depth, "prims within one another")
         for child in prim.GetFilteredChildren(Usd.TraverseInstanceProxies()):
             yield from self._prim(child, self._matrix(child, world), depth, above)
@@ -87,7 +87,7 @@ class _Scene:
         yield from self.below(prim, world, depth + 1, above)
 
     def _is_shown(self, prim: Any) -> bool:
-        """Whether a prim is not hidden itself; those above it are known to be shown."""
+        """Return whether a prim is not hidden itself; those above it are known to be shown."""
         hidden = prim.GetVisibilityAttr().Get(self.time) == UsdGeom.Tokens.invisible
         return not hidden and prim.GetPurposeAttr().Get() not in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 

@@ -14,7 +14,7 @@ from viewsphere.assets.readers.usd.mesh import Influences
 
 
 def skins_of(stage: Any, time: Any) -> tuple[dict[str, Influences], list[NamedPoint]]:
-    """What skins say of meshes, by the meshes' paths, and the skeletons' joints in the world; then meshes stand as skinned.
+    """The skins of meshes, by the meshes' paths, and the skeletons' joints in the world; then meshes stand as skinned.
 
     The stage's session layer receives the skinned points.
     """

@@ -25,7 +25,7 @@ WRAPS: dict[str, Wrap] = {"repeat": "repeat", "mirror": "mirror", "clamp": "clam
 CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2), "rgba": (0, 1, 2)}
 NO_SCALE, NO_BIAS = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0)
 NORMAL_SCALE, NORMAL_BIAS = (2.0, 2.0, 2.0), (-1.0, -1.0, -1.0)
-"""What turns a normal map's colours into a direction."""
+"""Scale and bias that turn a normal map's colours into a direction."""
 
 Color = tuple[float, float, float]
 
@@ -38,7 +38,7 @@ class Producer:
 
     @property
     def is_output(self) -> bool:
-        """Whether a shader computes the value."""
+        """Return whether a shader computes the value."""
         return str(self.attribute.GetName()).startswith("outputs:")
 
     def value(self, time: Any) -> Any:
@@ -59,7 +59,7 @@ class Producer:
 
 
 def producer(entry: Any) -> Producer | None:
-    """What gives an input its value; None where nothing does."""
+    """The source of an input's value; None without one."""
     attributes = UsdShade.Utils.GetValueProducingAttributes(entry) if entry else ()
     return Producer(attributes[0]) if attributes else None
 
@@ -82,7 +82,7 @@ class Sampled:
     bias: tuple[float, ...]
 
     def as_is(self, channels: tuple[int, ...]) -> bool:
-        """Whether the picture's own texels are the values."""
+        """Return whether the picture's own texels are the values."""
         rows = [*channels]
         return self.channels == channels and all(self.scale[i] == 1 and self.bias[i] == 0 for i in rows)
 
@@ -115,7 +115,7 @@ def network_texture(folder: ModelFolder, source: Producer | None, time: Any, wha
 
 
 def _is_srgb(space: str, channels: tuple[int, ...], folder: ModelFolder, index: int) -> bool:
-    """Whether colours are encoded; `auto` means sRGB for pictures of 8 bits and three or four channels, of which all are."""
+    """Return whether colours are encoded; `auto` means sRGB, as all pictures have 8 bits and three or four channels."""
     if space != "auto":
         return space.lower().startswith("srgb")
     pixels = folder.images[index].pixels
