@@ -8,6 +8,7 @@ import pytest
 
 import viewsphere.check
 from cube_dataset import FEW, LENS, make
+from json_leaves import leaves
 from quick import quick
 from sealing import seal_again
 from small import small_recipe
@@ -542,15 +543,6 @@ def test_labels_of_frames_without_their_shots_are_not_run(spelled):
 
 
 # the fields of records, generated from the tables of labels
-
-
-def leaves(value, where=()):
-    """Places of all numbers, texts and truths in a value of JSON."""
-    if isinstance(value, dict | list) and value:
-        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from leaves(item, (*where, key))
-    else:
-        yield where
 
 
 def another(value):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from json_leaves import leaves
 from quick import quick
 from sealing import seal_again
 from sequence_recipe import eventful_recipe
@@ -45,15 +46,6 @@ def whole(tmp_path_factory):
 @pytest.fixture
 def copied(whole, tmp_path):
     return shutil.copytree(whole, tmp_path / "out")
-
-
-def leaves(value, where=()):
-    """The places of all numbers, texts and truths in a value of JSON, and of empty lists and objects."""
-    if isinstance(value, dict | list) and value:
-        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from leaves(item, (*where, key))
-    else:
-        yield where
 
 
 def another(value):
