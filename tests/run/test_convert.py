@@ -149,6 +149,19 @@ def test_what_stops_half_way_leaves_nothing(error, photos, tmp_path, monkeypatch
     assert names_in(tmp_path) == []
 
 
+def test_a_run_that_was_killed_between_two_folders_can_be_repeated(photos, tmp_path):
+    vs.convert("coco", photos, ["voc", "yolo"], tmp_path / "whole")
+    vs.convert("coco", photos, ["voc"], tmp_path / "out")  # as far as the killed run came
+    before = tree_hash(tmp_path / "out" / "voc")
+    vs.convert("coco", photos, ["voc", "yolo"], tmp_path / "out")
+    assert tree_hash(tmp_path / "out") == tree_hash(tmp_path / "whole") and names_in(tmp_path / "out") == ["voc", "yolo"]
+    label = next((tmp_path / "out" / "voc").rglob("*.xml"))
+    label.write_bytes(label.read_bytes().replace(b"<", b" <", 1))
+    with pytest.raises(StoreError, match="voc: this folder holds another data set"):
+        vs.convert("coco", photos, ["voc"], tmp_path / "out")
+    assert tree_hash(tmp_path / "out" / "voc") != before and names_in(tmp_path / "out") == ["voc", "yolo"]
+
+
 def test_other_files_stay_and_are_named(photos, tmp_path):
     (tmp_path / "out" / "yolo").mkdir(parents=True)
     (tmp_path / "out" / "yolo" / "mine.txt").write_text("mine")

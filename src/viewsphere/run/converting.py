@@ -13,12 +13,14 @@ from pathlib import Path
 
 from viewsphere.aside import aside
 from viewsphere.errors import StoreError, UserError
+from viewsphere.files import read_bytes
 from viewsphere.recipe.formats import Formats, read_formats
 from viewsphere.run.exporting import linked, writable, write
 from viewsphere.run.importing import put_in_store, read_dataset
 from viewsphere.run.progress import Listener, unheard
 from viewsphere.run.scope import refuse, scope_of_foreign
 from viewsphere.store import Dataset, located, new_folder
+from viewsphere.store.checksums import CHECKSUMS, damaged_files
 from viewsphere.store.foreign import ForeignDataset
 
 
@@ -44,7 +46,8 @@ def convert(
     """Write a data set of another tool, of the format `kind`, in these formats, each to OUT/<format>, as `export` does. The
     files there are hard links to the source's or copies of them: it may go.
 
-    Nothing is written unless all of it is. Raises UserError for formats that are not known or do not hold what was read,
+    Nothing is written unless all of it is. A folder that an earlier run put in place, with the same files, stays: a run that was
+    killed between two folders can be repeated. Raises UserError for formats that are not known or do not hold what was read,
     StoreError for a data set that is broken, unless `keep_going` leaves that out, and for folders that hold other files.
     """
     entries = read_formats(formats)
@@ -57,13 +60,32 @@ def convert(
     foreign = read_dataset(kind, source, keep_going=keep_going, field="--from")
     refuse(entries, scope_of_foreign(foreign), source)
     with ExitStack() as whole:
-        folders = [(entry, whole.enter_context(new_folder(located(out) / entry.name))) for entry in entries]
+        folders = [(entry, whole.enter_context(_folder(located(out) / entry.name))) for entry in entries]
         store = whole.enter_context(aside(folders[0][1].parent)) / "store"  # on the same disk, for links
         with _told_of(store, foreign, source, located(out)):
             put_in_store(foreign, store, listener)
             dataset = Dataset(store)
             notes = write(dataset, folders, listener or unheard, workers)
         return Converted(len(dataset), foreign.left_out, tuple(dict.fromkeys(notes)) + tuple(linked(dataset, out)))
+
+
+@contextmanager
+def _folder(target: Path) -> Generator[Path]:
+    """A folder to write into that becomes `target`, or goes where `target` has the same files already.
+
+    Raises StoreError where other files lie there.
+    """
+    if not (target / CHECKSUMS).is_file():
+        with new_folder(target) as folder:
+            yield folder
+        return
+    with aside(target.parent) as own:
+        folder = own / target.name
+        folder.mkdir()
+        yield folder
+        is_same = read_bytes(folder / CHECKSUMS, "MAX_STREAMED_BYTES") == read_bytes(target / CHECKSUMS, "MAX_STREAMED_BYTES")
+        if not is_same or any(damaged_files(target)):
+            raise StoreError(f"{target}: this folder holds another data set. Choose another folder, or delete it")
 
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
