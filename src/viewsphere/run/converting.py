@@ -46,9 +46,11 @@ def convert(
     """Write a data set of another tool, of the format `kind`, in these formats, each to OUT/<format>, as `export` does. The
     files there are hard links to the source's or copies of them: it may go.
 
-    Nothing is written unless all of it is. A folder that an earlier run put in place, with the same files, stays: a run that was
-    killed between two folders can be repeated. Raises UserError for formats that are not known or do not hold what was read,
-    StoreError for a data set that is broken, unless `keep_going` leaves that out, and for folders that hold other files.
+    Nothing is written unless all of it is. A folder that an earlier run put in place, with the same files, stays: a run
+    that was killed between two folders can be repeated.
+
+    Raises UserError for formats that are not known or do not hold what was read, StoreError for a data set that is broken,
+    unless `keep_going` leaves that out, and for folders that hold other files.
     """
     entries = read_formats(formats)
     for entry in entries:
