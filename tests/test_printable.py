@@ -43,6 +43,7 @@ def test_no_command_prints_control_characters(tmp_path, words):
     assert answer.returncode == 2
 
 
+@pytest.mark.slow
 def test_one_function_prints():
     """All else is packages' own programs, and the server's line."""
     allowed = {"cli/terminal.py", "cli/completion.py"}
