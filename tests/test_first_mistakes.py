@@ -183,7 +183,10 @@ def test_fields_that_differ_are_named(small_run):
             ["plan", "x.yaml", "--workers", "-1"],
             "plan: --workers: expected a number greater than or equal to 0; found '-1': see",
         ),
-        (["plam"], "no such command 'plam'"),
+        (["plan", "x.yaml", "-z"], "plan: -z is no option: see viewsphere plan -h"),
+        (["plan", "x.yaml", "--zzz"], "plan: --zzz is no option: see viewsphere plan -h"),
+        (["plam"], "no such command 'plam'; did you mean 'plan'? See viewsphere -h"),
+        (["zzzzzz"], "no such command 'zzzzzz': see viewsphere -h"),
         (["plan", "a", "b"], "plan: got unexpected extra argument"),
     ],
 )

@@ -31,14 +31,18 @@ def said(error: Any) -> str:
     context: Any = error.ctx
     name = "" if context is None or context.parent is None else context.info_name
     command, where = (f"viewsphere {name}", f"{name}: ") if name else ("viewsphere", "")
-    option = getattr(error, "option_name", None)
-    if option and getattr(error, "possibilities", None) is not None:
+    if type(error).__name__ == "NoSuchOption":
         options = [name for p in error.ctx.command.params for name in p.opts]
-        return f"{where}{option} is no option{nearest(option, options) or ':'} See {command} -h"
+        return _with_help(f"{where}{error.option_name} is no option{nearest(error.option_name, options)}", command)
     if isinstance(error.__cause__, ValidationError) and _option(error):
-        return f"{where}{_option(error)}: {first_of(error.__cause__)}: see {command} -h"
-    message = " ".join(error.format_message().split()).removesuffix(".")
-    return f"{where}{message[0].lower()}{message[1:]}: see {command} -h"
+        return _with_help(f"{where}{_option(error)}: {first_of(error.__cause__)}", command)
+    message = " ".join(error.format_message().split()).removesuffix(".").replace(". Did", "; did")
+    return _with_help(f"{where}{message[0].lower()}{message[1:]}", command)
+
+
+def _with_help(message: str, command: str) -> str:
+    """The message and the command that shows help, joined as the message's last character asks."""
+    return f"{message} See {command} -h" if message.endswith("?") else f"{message}: see {command} -h"
 
 
 def _option(error: Any) -> str:
