@@ -4,7 +4,8 @@ import pytest
 
 from viewsphere.errors import RecipeError
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.models import categories, count_models, model_specs
+from viewsphere.sampling import models
+from viewsphere.sampling.models import categories, count_models, left_out, model_specs
 from viewsphere.zoo import things
 
 
@@ -76,6 +77,25 @@ def test_files_of_one_name_get_their_ending_or_folder(build):
     files = ["p/x/v1/model.obj", "p/y/v1/model.obj"]
     assert keys(build([entry("p/*/v1/model.obj")], files)) == ["model-x-v1", "model-y-v1"]
     assert keys(build([entry("q/Car.obj"), entry("r/car.obj")], ["q/Car.obj", "r/car.obj"])) == ["Car-q", "car-r"]
+
+
+def test_keys_of_many_files_of_one_name_are_made_once_each(build, monkeypatch):
+    made = []
+    variant = models._variant
+    monkeypatch.setattr(models, "_variant", lambda *args, **options: made.append(args) or variant(*args, **options))
+    files = [f"m/{name:03d}/model.obj" for name in range(100)]
+    assert keys(build([entry("m/*/model.obj")], files))[::99] == ["model-000", "model-099"]
+    assert len(made) == 2 * 3 * 100  # for two plans: without a folder, with its ending, with a folder
+
+
+def test_keys_differ_by_the_nearest_folder_that_helps(build):
+    files = ["one.obj", "m/one.obj", "m/n/one.obj", "k/n/one.obj"]
+    assert keys(build([entry(["*.obj", "*/*.obj", "*/*/*.obj"])], files))[:2] == ["one-k-n", "one-m-n"]
+
+
+def test_patterns_of_one_ending_leave_nothing_to_blender(build):
+    recipe = build([entry("m/*.obj"), entry("n/*")], ["m/a.obj", "m/b.fbx", "n/c.obj", "n/d.FBX"])
+    assert [*left_out(recipe)] == ["models[1].source: 1 file that Blender reads left out: name it, e.g. n/*.FBX"]
 
 
 def test_the_same_model_twice_needs_names(build):

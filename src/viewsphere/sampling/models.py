@@ -7,7 +7,7 @@ import math
 import os
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Collection, Iterator, Mapping, Set
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cache
 from glob import has_magic
@@ -292,16 +292,23 @@ def _matching(folder: Path, source: str, where: str) -> list[Path]:
         endings, unread = ", ".join(sorted(MODEL_SUFFIXES)), _unread(folder, source, where)
         hint = f"; {_naming(folder, unread)}" if unread else ""
         raise RecipeError(f"{where}.source: expected model files ({endings}); {source!r} gives none in {folder}{hint}")
-    return [named(Path(os.path.normpath(f)), f"{where}.source") for f in matches]
+    return [named(_normal(f), f"{where}.source") for f in matches]
+
+
+def _normal(path: Path) -> Path:
+    """Return the path without `..`; the same object where it has none, as most of many thousands have not."""
+    return Path(os.path.normpath(path)) if ".." in path.parts else path
 
 
 def _unread(folder: Path, source: str, where: str) -> set[Path]:
     """Files that only Blender reads, which a folder or a pattern means but leaves out."""
     path = _path(folder, source)
-    found = _candidates(folder, source, where)
     others = frozenset(f".{suffix}" for suffix in BLENDER_SUFFIXES) - _wanted(path)
+    if has_magic(source) and path.suffix.lower() in MODEL_SUFFIXES:
+        return set()  # every file that such a pattern means ends as it does
+    found = _candidates(folder, source, where)
     unread = () if found == [path] else (f for f in found if f.suffix.lower() in others and f.is_file())
-    return {Path(os.path.normpath(f)) for f in unread}
+    return {_normal(f) for f in unread}
 
 
 def _naming(folder: Path, unread: Collection[Path]) -> str:
@@ -346,7 +353,8 @@ def _with_unique_keys(found: list[_Found]) -> list[_Found]:
     groups: defaultdict[str, list[_Found]] = defaultdict(list)
     for item in found:
         groups[item.key.casefold()].append(item)
-    renamed = [replace(item, key=_longer_key(item, groups[item.key.casefold()])) for item in found]
+    keys = {item: key for group in groups.values() for item, key in zip(group, _longer_keys(group), strict=True)}
+    renamed = [replace(item, key=keys[item]) for item in found]
     first: dict[str, _Found] = {}
     for item in renamed:
         other = first.setdefault(item.key.casefold(), item)
@@ -358,21 +366,23 @@ def _with_unique_keys(found: list[_Found]) -> list[_Found]:
     return renamed
 
 
-def _longer_key(item: _Found, group: list[_Found]) -> str:
-    if len(group) == 1 or any(other.in_zoo for other in group):
-        return item.key
-    for folders in range(max(len(Path(other.source).parts) for other in group)):
+def _longer_keys(group: Sequence[_Found]) -> list[str]:
+    """Return the keys of all models that would like the same one, in their order."""
+    keys = [item.key for item in group]
+    if len(group) == 1 or any(item.in_zoo for item in group):
+        return keys
+    paths = [Path(item.source) for item in group]
+    for folders in range(max(len(path.parts) for path in paths)):
         for ending in (False, True):
-            variants = [_variant(other, folders, ending=ending) for other in group]
+            variants = [_variant(key, path, folders, ending=ending) for key, path in zip(keys, paths, strict=True)]
             if len({v.casefold() for v in variants}) == len(group):
-                return _variant(item, folders, ending=ending)
-    return item.key
+                return variants
+    return keys
 
 
-def _variant(item: _Found, folders: int, *, ending: bool) -> str:
-    path = Path(item.source)
-    names = path.parent.parts[len(path.parent.parts) - folders :] if folders else ()
-    return _short("-".join([item.key, *map(_as_key, names), *([path.suffix[1:]] if ending else [])]))
+def _variant(key: str, path: Path, folders: int, *, ending: bool) -> str:
+    names = path.parts[-1 - folders : -1]
+    return _short("-".join([key, *map(_as_key, names), *([path.suffix[1:]] if ending else [])]))
 
 
 def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes]) -> Size | Literal["file"] | None:
