@@ -44,7 +44,7 @@ def models_built_once():
 @pytest.mark.slow
 @pytest.mark.usefixtures("models_built_once")
 def test_readme_s_commands_and_code_run(tmp_path, monkeypatch):
-    monkeypatch.setattr("viewsphere.cli.making.cores", lambda: 0)
+    monkeypatch.setattr("viewsphere.run.generate.default_workers", lambda work: 0)
     monkeypatch.setattr("viewsphere.cli.datasets.cores", lambda: 1)
     commands = re.findall(r"^viewsphere ([^#\n]+)", README, re.MULTILINE)
     assert len(commands) >= 5

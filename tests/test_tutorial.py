@@ -95,7 +95,7 @@ def test_the_page_has_what_it_promises():
 @pytest.mark.slow
 def test_from_top_to_bottom(empty_folder, monkeypatch):
     """Frames are rendered and proved by commands in a shell, by as many workers as it has cores; the rest in this process."""
-    monkeypatch.setattr("viewsphere.cli.making.cores", lambda: 0)
+    monkeypatch.setattr("viewsphere.run.generate.default_workers", lambda work: 0)
     monkeypatch.setattr("viewsphere.cli.datasets.cores", lambda: 1)
     monkeypatch.setenv("PATH", os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]]))  # noqa: PTH120
     assert {block.text for block in blocks()} >= IN_A_SHELL

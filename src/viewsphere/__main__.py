@@ -1,6 +1,6 @@
 """`python -m viewsphere`."""
 
-from viewsphere.cli import main
+from viewsphere.cli import program
 
 if __name__ == "__main__":
-    main()
+    program()

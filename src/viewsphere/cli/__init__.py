@@ -15,6 +15,19 @@ from typing import NoReturn
 from viewsphere.errors import CheckFailedError, UserError, ViewsphereError
 
 
+def program() -> NoReturn:
+    """Run the command line as the whole of a process, which ends at once."""
+    from viewsphere.run.exit_at_once import exit_at_once
+
+    try:
+        main()
+    except SystemExit as end:
+        if isinstance(end.code, str):  # which Python prints
+            raise
+        exit_at_once(end.code or 0)
+    exit_at_once(0)
+
+
 def main() -> None:
     """Run the command line; the user's mistakes are one line and exit status 2, never a traceback."""
     import typer

@@ -154,8 +154,3 @@ def with_options(names: Sequence[str], options: Sequence[str] | None) -> tuple[F
         entries[name] = FormatEntry(name=name, options={option: value}).over(entries[name].options)
         entries[name].arguments(f"--format-option {name}")
     return tuple(entries.values())
-
-
-def cores() -> int:
-    """How many processes may run at once."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

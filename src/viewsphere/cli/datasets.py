@@ -17,12 +17,12 @@ from viewsphere.cli.arguments import (
     Workers,
     asked_formats,
     at,
-    cores,
     split,
     with_options,
 )
 from viewsphere.cli.terminal import ProgressBar, print_formats, print_json, print_report, print_status, say
 from viewsphere.errors import UserError
+from viewsphere.run.crew_size import cores
 
 if TYPE_CHECKING:
     from viewsphere.report import Proof

@@ -13,9 +13,10 @@ from typing import Annotated, Any
 
 import typer
 
-from viewsphere.cli.arguments import AsJson, cores
+from viewsphere.cli.arguments import AsJson
 from viewsphere.cli.terminal import print_json, say
 from viewsphere.errors import UserError
+from viewsphere.run.crew_size import cores
 
 LEFT = 12
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, Workers, asked_formats, at, cores, with_options
+from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, Workers, asked_formats, at, with_options
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json, say
 from viewsphere.errors import UserError
 from viewsphere.model.quantity import quantity
+from viewsphere.run.crew_size import cores
 
 if TYPE_CHECKING:
     from viewsphere.recipe.formats import FormatEntry

@@ -22,7 +22,6 @@ from viewsphere.cli.arguments import (
     RecipeFile,
     asked_formats,
     at,
-    cores,
     load_recipe,
     with_options,
 )
@@ -39,6 +38,7 @@ from viewsphere.cli.terminal import (
 from viewsphere.errors import StoreError, UserError
 from viewsphere.model.quantity import quantity
 from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
+from viewsphere.run.crew_size import cores
 
 if TYPE_CHECKING:
     from viewsphere.recipe.recipe import Recipe
@@ -349,7 +349,7 @@ def render(
         int | None,
         typer.Option(
             min=0,
-            help="Processes; default: one a core. 0: this one. With --ray: CPUs at most; default: all.",
+            help="Processes; default: one a core, none for short work. 0: this one. With --ray: CPUs at most; default: all.",
             show_default=False,
         ),
     ] = None,
@@ -394,14 +394,13 @@ def render(
         print_plan(planned)
         if addition is not None and any(Store(output).gaps(addition.record)):
             say(f"{output}: {addition}")
-    everybody = cores() if ray is None else 0
     aside = redirect_stdout(sys.stderr) if json_ else nullcontext()  # what libraries print is no JSON
     with ProgressBar(quiet=json_) as bar, aside:
         try:
             summary = generate(
                 loaded,
                 output,
-                workers=everybody if workers is None else workers,
+                workers=workers,
                 formats=formats,
                 keep_going=keep_going,
                 append=append,

@@ -19,6 +19,7 @@ from viewsphere.model.share import ALL
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.chance import left_by_chance
+from viewsphere.run.crew_size import cores, default_workers
 from viewsphere.run.executors import Crew, Job, Listed, Outcome, hired
 from viewsphere.run.exporting import export, is_out_of_date, is_written
 from viewsphere.run.opening import check_formats, commit, prepare, to_append, to_render
@@ -72,7 +73,7 @@ def generate(
     recipe: Recipe | str | PathLike[str],
     out: Path | str,
     *,
-    workers: int = 0,
+    workers: int | None = 0,
     formats: Formats | None = None,
     keep_going: bool = False,
     append: bool = False,
@@ -90,9 +91,10 @@ def generate(
     `out`, in any order, several at once, together render everything. The run after which nothing is missing writes the
     formats; others write none.
 
-    `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. `ray` is the address of a
-    Ray cluster whose CPUs render instead, such as "auto" (the one that this machine is of), "host:6379" or "ray://host:10001":
-    at most `workers` of them, 0 for all; `out` is where all its machines see it.
+    `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. None starts one a core, and
+    none where one shot or less than three seconds of work are left. `ray` is the address of a Ray cluster whose CPUs render
+    instead, such as "auto" (the one that this machine is of), "host:6379" or "ray://host:10001": at most `workers` of them, 0
+    or None for all; `out` is where all its machines see it.
 
     A model that cannot be used is an error before rendering starts, or with `keep_going` left out and reported. Raises
     UserError for the user's mistakes, and WorkerDied, when all others are made, for shots that were lost with their workers
@@ -105,9 +107,9 @@ def generate(
     planned = prepare(recipe)
     wanted = _asked(recipe, formats)
     store = Store(located(out))
-    if workers and not store.place.is_shared():
+    if workers != 0 and not store.place.is_shared():
         raise UserError(
-            f"{store.root}: expected workers 0, as other processes do not see this process's memory; found {workers}"
+            f"{store.root}: expected workers 0, as other processes do not see this process's memory; found {workers or cores()}"
         )
     portion = replace(to_append(planned, store) if append else to_render(planned, store), share=share).remembering(store)
     wanted += _others(wanted, store) if portion.number else ()
@@ -117,7 +119,8 @@ def generate(
         notes: tuple[str, ...] = ()
         rendered, skipped = 0, dict[str, str]()
         work = Missing(portion, store)
-        with hired(store.root, portion, workers, ray) as crew:
+        many = default_workers(work) if workers is None and ray is None else workers or 0
+        with hired(store.root, portion, many, ray) as crew:
             if portion.adds_nothing:
                 _compare_models(portion, store, crew)
             else:
@@ -131,7 +134,7 @@ def generate(
         left_over = None if share.is_all else status(store.root)
         if left_over is None or left_over.complete:
             wanted = tuple(_due(wanted, portion, rendered > 0, store))
-            notes += export(store.root, wanted, workers=0 if ray else workers, listener=tell)
+            notes += export(store.root, wanted, workers=0 if ray else cores() if workers is None else workers, listener=tell)
             store.forget_failures()
     if left_over is not None and not left_over.complete:
         warnings, notes = _warnings(planned, dataset), (*notes, _left_to_others(portion, left_over))

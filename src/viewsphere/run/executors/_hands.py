@@ -14,6 +14,8 @@ from threading import Thread, current_thread, main_thread
 from types import FrameType
 from typing import Any
 
+from viewsphere.run.exit_at_once import exit_at_once
+
 OUT_OF_MEMORY = 77
 """Exit code of a worker that was refused memory."""
 
@@ -27,7 +29,7 @@ class Hand:
     def __init__(self, serve: Callable[..., None], *told: Any) -> None:
         context = get_context("spawn")
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=serve, args=(theirs, *told), daemon=True)
+        self.process = context.Process(target=_live, args=(serve, theirs, *told), daemon=True)
         self.process.start()
         theirs.close()
 
@@ -47,6 +49,12 @@ class Hand:
         """The exit code of one whose pipe is closed."""
         self.process.join(DYING_S)
         return self.stop()
+
+
+def _live(serve: Callable[..., None], *told: Any) -> None:
+    """The whole of a worker process, which ends at once."""
+    serve(*told)
+    exit_at_once(0)
 
 
 def end_of(code: int | None, advice: str) -> str:

@@ -1,0 +1,26 @@
+"""The end of a process without the third of a second in which Python and LLVM take apart what they hold."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import sys
+import threading
+from typing import NoReturn
+
+UNWRITTEN = 2
+"""Exit status where standard output does not take its last bytes, as on a full disk."""
+
+
+def exit_at_once(status: int) -> NoReturn:
+    """End this process as Python would: wait for its threads, call the functions of `atexit`, flush the output, and leave the
+    memory to the system.
+    """
+    threading._shutdown()  # pyright: ignore # Python's own end calls the same two functions first
+    atexit._run_exitfuncs()  # pyright: ignore
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError, AttributeError):  # full, closed, or none
+            status = status or UNWRITTEN
+    os._exit(status)
