@@ -1,6 +1,6 @@
 """Truth on every release of numba that viewsphere allows, with its quicker compiler and without.
 
-    scripts/numba_releases [RELEASE ...]    # default: 0.66 0.67 0.68, or whatever `kernel_cache.QUICKER` names
+    scripts/numba_releases [RELEASE ...]    # default: 0.66 0.67 0.68, or whatever `build.QUICKER` names
 
 Digests of truth over random scenes (`tests/truth/truth_digest.py`) have to be equal everywhere, and the tests of truth and of
 kernels to pass on the oldest release without the quicker compiler. Releases that are not installed come into `.venv/numba`.
@@ -23,12 +23,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from viewsphere.kernels.kernel_cache import NUMBA, QUICKER
+from viewsphere.kernels.build import NUMBA, QUICKER
 
 ROOT = Path(__file__).resolve().parents[1]
 TESTS = ROOT / "tests"
 DIGESTS = TESTS / "truth" / "truth_digest.py"
-OF_THE_QUICKER = "tests/kernels/test_fence.py", "tests/kernels/test_lowering.py"
+OF_THE_QUICKER = "tests/kernels/test_fence.py", "tests/kernels/test_compiler.py"
 """Tests of the quicker compiler and of when it is loaded, which say nothing of an older numba without it."""
 
 

@@ -31,7 +31,7 @@ from figures import BLUE, GREEN, INK, PALE, RED, line, polygon, svg, words
 from PIL import Image
 
 import viewsphere as vs
-from viewsphere.kernels.kernel_cache import kernel_folder
+from viewsphere.kernels.entries import kernel_folder
 from viewsphere.run.progress import Progress
 
 KINDS = ("stills", "sequences", "memory")

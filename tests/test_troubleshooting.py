@@ -359,6 +359,6 @@ def test_the_first_run_says_why_it_takes_longer(monkeypatch, tmp_path, capsys):
     folder.mkdir(parents=True)
     _announce_compilation()
     assert_shown("compiling kernels", capsys.readouterr().err)
-    (folder / "compiled.nbi").touch()
+    (folder / "compiled.kernel").touch()
     _announce_compilation()
     assert capsys.readouterr().err == ""

@@ -1,4 +1,4 @@
-"""Who knows what of numba: its internals are `compiler`'s and `lowering`'s, which are loaded beside a numba that they know."""
+"""Which modules use numba's internals: `numba_target` always, `compiler` beside a numba that it is tested with."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 import viewsphere
-from viewsphere.kernels.kernel_cache import NUMBA, QUICKER
+from viewsphere.kernels.build import NUMBA, QUICKER
 
 PACKAGE = Path(viewsphere.__file__).parent
-INSIDERS = {"kernels/compiler.py", "kernels/lowering.py"}
+INSIDERS = {"kernels/compiler.py", "kernels/numba_target.py"}
 PUBLIC = {"numba", "numba.extending", "numba.core.config", "numba.core.cgutils"}
 """What numba documents: `config` for its settings, `cgutils` for the code of intrinsics."""
 
@@ -26,7 +26,7 @@ importlib.metadata.version = lambda name: numba if name == "numba" else found(na
 import numpy as np
 from viewsphere.geometry.kernels_lens import radial_fisheye
 assert radial_fisheye(np.zeros(4), 0.5)[0] == 0.5
-print(*(name for name in ("compiler", "lowering", "stock") if f"viewsphere.kernels.{name}" in sys.modules))
+print(*(name for name in ("compiler", "stock") if f"viewsphere.kernels.{name}" in sys.modules))
 """
 
 
@@ -50,7 +50,7 @@ def test_only_the_compiler_knows_numba_from_within():
 @pytest.mark.parametrize(
     ("numba", "asked", "loaded"),
     [
-        (f"{QUICKER[-1]}.7", "0", "compiler lowering"),
+        (f"{QUICKER[-1]}.7", "0", "compiler"),
         (f"{QUICKER[-1]}.7", "1", "stock"),
         ("0.660.1", "0", "stock"),
         ("1.0.0rc1", "0", "stock"),
@@ -63,5 +63,5 @@ def test_internals_are_loaded_where_they_are_known(tmp_path, numba, asked, loade
 
 
 def test_the_installed_numba_is_a_known_one():
-    """A newer minor version: run `scripts/numba_releases` with it, name it in `kernel_cache.QUICKER`."""
+    """A newer minor version: run `scripts/numba_releases` with it, name it in `build.QUICKER`."""
     assert NUMBA.rpartition(".")[0] in QUICKER

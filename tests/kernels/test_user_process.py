@@ -8,8 +8,6 @@ import sys
 
 import pytest
 
-from viewsphere.kernels import jit
-
 THEIRS = """
 import numba
 
@@ -46,13 +44,51 @@ def test_own_functions_are_cached_where_they_were(tmp_path, stock, said):
         assert folder.startswith(own)
     else:
         assert folder == str(tmp_path / "__pycache__")
-        assert [file.name.split(".")[1].split("-")[0] for file in ours.rglob("*.nbi")] == ["radial_fisheye"]
+        assert [file.name.split(".")[1].split("-")[0] for file in ours.rglob("*.kernel")] == ["radial_fisheye"]
 
 
-def test_the_setting_is_the_users_again_when_a_kernel_cannot_be_made():
-    before = jit.config.CACHE_DIR
-    with pytest.raises(ZeroDivisionError), jit._cached_in("elsewhere"):
-        assert jit.config.CACHE_DIR == "elsewhere"
-        assert 1 / 0
-    assert before == jit.config.CACHE_DIR
-    assert not jit._configuring.locked()
+TARGETS = """
+import threading
+import numba
+import numpy as np
+from numba.core.registry import cpu_target
+from viewsphere.kernels.build import TARGET
+from viewsphere.kernels.jit import njit
+
+HOST = (cpu_target.target_context.codegen()._get_host_cpu_name(), cpu_target.target_context.codegen()._tm_features)
+settings = {name: value for name, value in vars(numba.config).items() if name.isupper()}
+
+def of(library):
+    return library._codegen._get_host_cpu_name(), library._codegen._tm_features
+
+def made(function):
+    function(np.arange(4.0))
+    (compiled,) = function.overloads.values()
+    is_ours = type(function).__name__ == "KernelDispatcher"
+    assert type(compiled.target_context).__name__ == ("_Context" if is_ours else "CPUContext")
+    return of(compiled.library)
+
+def theirs_meanwhile():
+    for _ in range(5):
+        seen.append(made(numba.njit(lambda x: min(x[0], x[2]) + np.sum(x))))
+
+seen = []
+before = made(numba.njit(lambda x: min(x[0], x[1]) + np.sum(x)))
+thread = threading.Thread(target=theirs_meanwhile)
+thread.start()
+ours = [made(njit(lambda x: min(x[0], x[1]) + np.sum(x), _nrt=True)) for _ in range(5)]
+thread.join()
+after = made(numba.njit(lambda x: max(x[0], x[1]) + np.sum(x)))
+assert {before, *seen, after} == {HOST}, (before, seen, after)
+assert set(ours) == {(TARGET.cpu, TARGET.features)}, ours
+assert settings == {name: value for name, value in vars(numba.config).items() if name.isupper()}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stock", ["0", "1"])
+def test_own_functions_are_compiled_for_their_processor(tmp_path, stock):
+    """Those that were compiled before ours, those after, and those of another thread at the same time."""
+    environment = {**os.environ, "VIEWSPHERE_CACHE": str(tmp_path), "VIEWSPHERE_STOCK_NUMBA": stock}
+    (tmp_path / "script.py").write_text(TARGETS)
+    subprocess.run([sys.executable, str(tmp_path / "script.py")], env=environment, check=True)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from threading import Barrier
 
 import numpy as np
@@ -16,7 +16,8 @@ import pytest
 from shots import unit_box
 from viewsphere import Recipe, plan
 from viewsphere.geometry.mask import decode_rle, encode_rle
-from viewsphere.kernels.kernel_cache import sources_digest
+from viewsphere.kernels import entries
+from viewsphere.kernels.digests import package_digest
 from viewsphere.run import warm
 
 RUN = """
@@ -58,7 +59,7 @@ def test_of_processes_that_need_kernels_at_once_one_compiles_them(monkeypatch, t
     def compile_one(shot):
         compiled.append(shot)
         time.sleep(0.3)  # which leaves the other time to begin, too
-        (tmp_path / "kernel.nbi").touch()
+        entries.save("digest/a.kernel", b"")
 
     def worker():
         both.wait()
@@ -66,7 +67,7 @@ def test_of_processes_that_need_kernels_at_once_one_compiles_them(monkeypatch, t
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(warm, "_render", compile_one)
-    monkeypatch.setattr(warm, "_caches", lambda: {str(tmp_path)})
+    monkeypatch.setattr(warm, "_names", lambda: {"digest/a.kernel"})
     shot = next(iter(plan(RECIPE).shots(unit_box)))
     with ThreadPoolExecutor(2) as workers:  # locks are those of open files: threads are to them as processes are
         for done in [workers.submit(worker) for _ in range(2)]:
@@ -99,57 +100,50 @@ def test_a_mark_is_of_what_a_shot_uses_and_about_how_much_of_it():
     assert len(set(marks)) == len(marks)
 
 
-def test_a_mark_is_void_when_a_source_changes(tmp_path):
-    (tmp_path / "inside").mkdir()
-    source = tmp_path / "inside" / "kernels.py"
+def test_a_mark_is_void_when_a_source_changes_wherever_it_lies(tmp_path):
+    (tmp_path / "one" / "inside").mkdir(parents=True)
+    source = tmp_path / "one" / "inside" / "kernels.py"
 
-    def digest():
-        sources_digest.cache_clear()
-        return sources_digest(tmp_path)
+    def digest(folder=tmp_path / "one"):
+        package_digest.cache_clear()
+        return package_digest(folder)
 
     source.write_text("x = 1")
-    digests = [digest()]
-    source.write_text("x = 2")
-    digests.append(digest())
+    first = digest()
     os.utime(source, (1, 1))
-    digests.append(digest())
-    source.rename(tmp_path / "kernels.py")
-    digests.append(digest())
-    assert digest() == digests[-1]
-    assert len(set(digests)) == len(digests)
+    assert digest() == first
+    shutil.copytree(tmp_path / "one", tmp_path / "other")
+    assert digest(tmp_path / "other") == first
+    source.write_text("x = 2")
+    second = digest()
+    source.rename(tmp_path / "one" / "kernels.py")
+    assert len({first, second, digest()}) == 3
 
 
 def test_a_mark_is_void_when_a_kernel_is_gone(tmp_path, monkeypatch):
     shot = next(iter(plan(RECIPE).shots(unit_box)))
-    rendered = []
+    rendered, names = [], {"digest/a.kernel", "digest/b.kernel"}
 
     def render(small):
         rendered.append(small)
-        for name in ("a.nbi", "b.nbi"):
-            (tmp_path / "kernels" / "digest").mkdir(parents=True, exist_ok=True)
-            (tmp_path / "kernels" / "digest" / name).touch()
+        for name in names:
+            entries.save(name, b"")
 
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(warm, "_render", render)
-    monkeypatch.setattr(warm, "_caches", lambda: {str(tmp_path / "kernels" / "digest")})
+    monkeypatch.setattr(warm, "_names", lambda: names)
     warm.compile_kernels(shot)
     warm.compile_kernels(shot)
     assert len(rendered) == 1
-    (tmp_path / "kernels" / "digest" / "b.nbi").unlink()
+    (tmp_path / "kernels" / "digest" / "b.kernel").unlink()
     warm.compile_kernels(shot)
     warm.compile_kernels(shot)
     assert len(rendered) == 2
 
 
 @pytest.mark.slow
-def test_a_mark_lists_kernels_of_this_process_and_none_of_other_versions(tmp_path, monkeypatch):
+def test_a_mark_lists_kernels_of_this_process():
     decode_rle(2, 2, encode_rle(np.ones((2, 2), bool)))
-    (of_mask,) = (folder for folder in map(Path, warm._caches()) if list(folder.glob("kernels_mask.*.nbi")))
-    folder = of_mask.parent.parent
-    assert {f"{of_mask.relative_to(folder)}/{file.name}" for file in of_mask.glob("*.nbi")} <= set(warm._kernels(folder))
-    for digest in ("own", "old"):
-        (tmp_path / digest).mkdir()
-        (tmp_path / digest / "kernel.nbi").touch()
-    monkeypatch.setattr(warm, "_caches", lambda: {str(tmp_path / "own"), str(of_mask)})
-    assert warm._kernels(tmp_path) == ["own/kernel.nbi"]
+    names = [name for name in warm._names() if "/kernels_mask." in name]
+    assert names and all(map(entries.has, names))

@@ -16,7 +16,7 @@ from numba.core import event
 
 import viewsphere as vs
 from truth_scenes import LENSES, cube, lens, orbit_camera, placed, random_soup, silhouette, sphere
-from viewsphere.kernels.kernel_cache import IS_STOCK, NUMBA
+from viewsphere.kernels.build import IS_STOCK, NUMBA
 from viewsphere.labels import channel_labels, observe
 from viewsphere.truth.visibility import rasterize
 

@@ -13,7 +13,7 @@ from viewsphere.check.again import unequal
 from viewsphere.check.recomputed import CONTRADICTED, Recomputed, rows_of
 from viewsphere.check.report import in_short
 from viewsphere.errors import BlenderDied, BlenderError, UserError
-from viewsphere.kernels.kernel_cache import PAINTER
+from viewsphere.kernels.build import PAINTER
 from viewsphere.labels import channels
 from viewsphere.model.channel import PASSES
 from viewsphere.model.files import LOSSY, Files

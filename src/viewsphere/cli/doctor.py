@@ -86,11 +86,11 @@ def _processor() -> dict[str, Any]:
 
 def _kernels() -> dict[str, Any]:
     """The folder of compiled kernels, whether it is writable, and whether it holds any."""
-    from viewsphere.kernels.kernel_cache import kernel_folder
+    from viewsphere.kernels.entries import SUFFIX, kernel_folder
 
     folder = kernel_folder()
     there = next(place for place in (folder, *folder.parents) if place.exists())
-    compiled = any(folder.glob("*/**/*.nbi"))
+    compiled = any(folder.glob(f"*/*{SUFFIX}"))
     return {"folder": str(folder), "writable": there.is_dir() and os.access(there, os.W_OK), "compiled": compiled}
 
 

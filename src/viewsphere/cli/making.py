@@ -445,7 +445,7 @@ def _estimate(recipe: Recipe, workers: int | None) -> Estimate:
 
 def _announce_compilation() -> None:
     """Say why the first picture on a machine takes longer."""
-    from viewsphere.kernels.kernel_cache import kernel_folder
+    from viewsphere.kernels.entries import SUFFIX, kernel_folder
 
-    if not any(kernel_folder().rglob("*.nbi")):  # imports alone make its folders
+    if not any(kernel_folder().glob(f"*/*{SUFFIX}")):
         say("compiling kernels, once on this machine: about 20 seconds", err=True)

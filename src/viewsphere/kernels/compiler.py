@@ -12,20 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
-import llvmlite.binding
-import numba
 from numba import _dynfunc
 from numba.core import types
-from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.postproc import PostProcessor, VariableLifetime
-from numba.core.runtime.nrt import rtsys
 from numba.core.targetconfig import ConfigStack
 from numba.core.transforms import canonicalize_cfg
 from numba.core.typed_passes import (
@@ -49,6 +45,7 @@ from numba.core.untyped_passes import (
 )
 
 from viewsphere.kernels.garbage import pause_collection
+from viewsphere.kernels.numba_target import jit
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -60,20 +57,6 @@ class Lifetimes(IRLegalization):
     def run_pass(self, state: Any) -> Any:
         """Returns whether anything changed."""
         return state.flags.nrt and super().run_pass(state)
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class KernelLowering(NativeLowering):
-    """Lowers statements to LLVM's language by `lowering.KernelLower`."""
-
-    _name = "kernel_lowering"
-
-    @property
-    def lowering_class(self) -> Any:
-        """Returns the class that lowers; imported here, since it takes long to load and only processes that compile need it."""
-        from viewsphere.kernels.lowering import KernelLower
-
-        return KernelLower
 
 
 PASSES = (
@@ -88,7 +71,7 @@ PASSES = (
     PreLowerStripPhis,
     Lifetimes,
     AnnotateTypes,
-    KernelLowering,
+    NativeLowering,
     NoPythonBackend,
 )
 """numba's passes, without those for closures, `with`, `literally`, raising computed errors, and whole-array expressions."""
@@ -112,8 +95,8 @@ def _resolve_once(function: Any, context: Any, args: tuple[Any, ...], kws: dict[
 
 
 def _as_part(**options: Any) -> Any:
-    """`numba.jit` for numba's own functions that kernels call, such as `min` or `np.empty`."""
-    return numba.jit(**{**options, **PART})
+    """`jit` for numba's own functions that kernels call, such as `min` or `np.empty`."""
+    return jit(**{**options, **PART})
 
 
 def _decorator(_: Any) -> Any:
@@ -205,63 +188,17 @@ class Part(Kernel):
         return made._replace(entry_point=key)
 
 
-class _Cached(JITCodeLibrary):
-    """Code from the cache. Its bitcode is parsed only when others link it, and its symbols are not listed: half the time."""
-
-    def __init__(self, codegen: Any, name: str, bitcode: bytes) -> None:
-        super().__init__(codegen, name)
-        self._bitcode = bitcode
-
-    @classmethod
-    def _unserialize(cls, codegen: Any, state: Any) -> Any:
-        name, _, (machine_code, bitcode) = state
-        self = cls(codegen, name, bitcode)
-        self.enable_object_caching()
-        self._set_compiled_object(machine_code)
-        self._finalize_final_module()
-        return self
-
-    def _get_module_for_linking(self) -> Any:
-        if self._shared_module is None:
-            self._shared_module = llvmlite.binding.parse_bitcode(self._bitcode)
-        return self._shared_module
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """Returns the address of the function of this name, which must be in this code."""
-        return self._codegen._engine.get_function_address(name)
-
-
-class KernelCache(FunctionCache):
-    """numba's cache of a function that looks for an entry before it prepares to compile, which would take a second."""
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function for these types, None if the cache has none."""
-        rtsys.initialize(target_context)
-        codegen = target_context.codegen()
-        codegen.unserialize_library = partial(_Cached._unserialize, codegen)
-        try:
-            with self._guard_against_spurious_io_errors():
-                return self._load_overload(sig, target_context)
-        except (AttributeError, ImportError):  # another version's entries, of classes that have other names now
-            self.flush()
-            return None
-        finally:
-            del codegen.unserialize_library
-
-
 PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Part}
 """Options of `Part`'s compilation."""
 
 
 def whole(function: Callable[..., Any], **options: Any) -> Any:
-    """The kernel that compiles a function, cached where numba's configuration says now; allocates no arrays unless `_nrt`."""
+    """The kernel that compiles a function, cached; allocates no arrays unless `_nrt`."""
     how: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": Kernel, "_nrt": False, **options}
-    made = numba.njit(**how)(function)
-    setattr(made, "_cache", KernelCache(function))  # noqa: B010, not in its stubs
-    return made
+    return jit(**how, cache=True)(function)
 
 
 def part(function: Callable[..., Any], **options: Any) -> Any:
     """The part of kernels that compiles a function; it allocates no arrays unless `_nrt`, and Python cannot call it."""
     how: dict[str, Any] = {**PART, "_nrt": False, **options}
-    return numba.njit(**how)(function)
+    return jit(**how)(function)

@@ -1,4 +1,4 @@
-"""Kernels compiled by any numba, through its documented functions alone.
+"""Kernels compiled by any numba's own passes.
 
 `compiler` is three times as fast; its code computes the same results, to the bit.
 """
@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numba
+from viewsphere.kernels.numba_target import jit
 
 
 def whole(function: Callable[..., Any], **options: Any) -> Any:
-    """The kernel that compiles a function, cached where numba's configuration says now."""
+    """The kernel that compiles a function, cached."""
     return _compiled(function, {**options, "cache": True})
 
 
@@ -23,4 +23,4 @@ def part(function: Callable[..., Any], **options: Any) -> Any:
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """The function compiled by numba. References to arrays are always counted: the option behind `_nrt` is not documented."""
-    return numba.njit(**{name: value for name, value in options.items() if name != "_nrt"})(function)
+    return jit(**{name: value for name, value in options.items() if name != "_nrt"})(function)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from viewsphere.kernels.kernel_cache import PAINTER
+from viewsphere.kernels.build import PAINTER
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample

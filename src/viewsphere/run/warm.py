@@ -18,10 +18,10 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.files import read_text
 from viewsphere.geometry.box import box_vertices
+from viewsphere.kernels import entries
+from viewsphere.kernels.digests import package_digest
 from viewsphere.kernels.garbage import pause_collection
-from viewsphere.kernels.kernel_cache import kernel_folder, sources_digest
 from viewsphere.labels import channels
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.exposure import Exposure, Sweep
@@ -46,6 +46,9 @@ SIZE = 16
 BESIDE: Matrix4 = ((1.0, 0.0, 0.0, 0.1), *IDENTITY[1:])
 FLOOR: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, -1.0, 0.0, -1.0), IDENTITY[3])
 ROOF: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 1.0), IDENTITY[3])
+MARKS = "marks"
+"""The folder of lists of kernels."""
+
 PACKAGE = Path(plugins.__file__).parent
 
 
@@ -53,36 +56,27 @@ def compile_kernels(shot: Shot) -> None:
     """See to it that the kernels a shot needs are compiled.
 
     The first time on a machine this takes some 20 CPU-seconds of one process; others wait for it. It leaves a mark beside the
-    kernels, the list of their files. Later nothing is loaded, as long as these are there, and viewsphere, numba, Python, the
+    kernels, the list of their entries. Later nothing is loaded, as long as these are there, and viewsphere, numba, Python, the
     processor and what the shot uses, about as strongly, are the same.
     """
     small = _small(shot)
     mark = _mark(small)
     if _is_true(mark):
         return
-    with _alone(mark.parent):
+    with _alone(entries.kernel_folder()):
         if _is_true(mark):
             return
         _render(small)
-        with suppress(OSError):  # a folder that others may not write
-            mark.write_text("\n".join(_kernels(mark.parent)), "utf-8", newline="\n")
+        entries.save(mark, "\n".join(sorted(_names())).encode())
 
 
-def _kernels(folder: Path) -> list[str]:
-    """Files below a folder of the kernels that this process has; those of other versions, thousands after some years, are none
-    of its business.
-    """
-    own = (kept for kept in map(Path, _caches()) if kept.is_relative_to(folder))
-    return sorted(file.relative_to(folder).as_posix() for kept in own for file in kept.glob("*.nbi"))
-
-
-def _caches() -> set[str]:
-    """Folders that hold the kernels of the modules which this process has imported."""
+def _names() -> set[str]:
+    """The entries of all kernels that this process has loaded or compiled."""
     from numba.extending import is_jitted  # takes long to load; who renders has it
 
     modules = [vars(module) for module in list(sys.modules.values()) if isinstance(module, ModuleType)]
-    known = (value for names in modules for value in list(names.values()) if is_jitted(value))
-    return {path for kernel in known if (path := kernel.stats.cache_path)}
+    kernels = (value for names in modules for value in list(names.values()) if is_jitted(value))
+    return {name for kernel in kernels for name in getattr(getattr(kernel, "_cache", None), "names", ())}
 
 
 @contextmanager
@@ -144,23 +138,19 @@ def _sequence(shot: Shot, first: Instant, things: tuple[Thing, ...]) -> dict[str
     return {"sequence": "tiny", "things": (moved, *things[1:]), "instants": instants, "tracks": tracks, "exposures": exposures}
 
 
-def _mark(small: Shot) -> Path:
-    """The file that is there when this shot's kernels are: named by what they are compiled from and by what it uses."""
+def _mark(small: Shot) -> str:
+    """The entry that is there when this shot's kernels are: named by what they are compiled from and by what it uses."""
     scene = _outline(small.model_dump(mode="json", exclude={"engine_options"}))
     used = json.dumps([scene, small.engine_options], sort_keys=True)
     engine = engine_digest(small.engine)
-    named = hashlib.sha256("\0".join((sources_digest(PACKAGE), engine, used)).encode()).hexdigest()[:16]
-    return kernel_folder() / f"{named}.compiled"
+    named = hashlib.sha256("\0".join((package_digest(PACKAGE), engine, used)).encode()).hexdigest()[:16]
+    return f"{MARKS}/{named}{entries.SUFFIX}"
 
 
-def _is_true(mark: Path) -> bool:
-    """Whether the kernels it lists are there, where this user's workers look for them."""
-    try:
-        kernels = read_text(mark).splitlines()
-    except OSError:
-        return False
-    folder = f"{mark.parent}"  # of hundreds of files: a Path of each would take a tenth of a second
-    return bool(kernels) and os.access(folder, os.W_OK) and all(os.access(f"{folder}/{file}", os.F_OK) for file in kernels)
+def _is_true(mark: str) -> bool:
+    """Whether the kernels it lists are there."""
+    listed = entries.load(mark)
+    return listed is not None and all(map(entries.has, listed.decode().splitlines()))
 
 
 def _outline(value: JsonValue) -> JsonValue:

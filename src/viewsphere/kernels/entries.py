@@ -1,0 +1,154 @@
+"""Files of compiled kernels, found by what they were compiled from: neither the place nor the time of a source matters.
+
+    <kernels>/<digest of sources and build>/<kernel>-<digest of its types>.kernel
+
+An entry holds a pickle, which could run any program. So entries are loaded from the package itself, and from folders that no
+other user can write. A digest at an entry's head finds those that are not whole; they are compiled anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import os
+import secrets
+import sys
+import tempfile
+import time
+import zlib
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from stat import S_ISREG, S_IWGRP, S_IWOTH
+
+from viewsphere.aside import STALE_S
+from viewsphere.caches import cache_of
+
+SHIPPED = Path(__file__).with_name("shipped")
+"""Entries that wheels bring; sources have none."""
+
+SUFFIX = ".kernel"
+_DIGEST = hashlib.sha256().digest_size
+_OPEN = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
+_LEVEL = 6  # 4.1 MB of a frame's kernels become 1.5; a faster level saves nothing beside compiling
+
+
+def kernel_folder() -> Path:
+    """Where compiled kernels are kept: `$NUMBA_CACHE_DIR`, `$VIEWSPHERE_CACHE/kernels`, or in the user's cache folder."""
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(os.environ["NUMBA_CACHE_DIR"])
+    return cache_of("kernels")
+
+
+def folders() -> tuple[Path, ...]:
+    """The folders where entries are looked for and written: a temporary one, too, where the first one cannot be written."""
+    first = kernel_folder()
+    if _make(first):
+        return (first,)
+    return first, Path(tempfile.gettempdir()) / f"viewsphere-{_user()}" / "kernels"
+
+
+def load(name: str) -> bytes | None:
+    """The content of the entry of this name, None where there is none that is whole and can be trusted."""
+    for folder in (SHIPPED, *folders()):
+        data = _read(folder, name)
+        if data is not None and hashlib.sha256(data[_DIGEST:]).digest() == data[:_DIGEST]:
+            return zlib.decompress(data[_DIGEST:])
+    return None
+
+
+def save(name: str, content: bytes) -> None:
+    """Keep an entry where that is possible; others see it whole or not at all, however many write it at once."""
+    packed = zlib.compress(content, _LEVEL)
+    data = hashlib.sha256(packed).digest() + packed
+    for folder in folders():
+        if _make(folder) and _make((folder / name).parent):
+            with suppress(OSError):  # full
+                _write(folder / name, data)
+                return
+
+
+def has(name: str) -> bool:
+    """Whether there is an entry of this name, whole or not, where it would be loaded from."""
+    return any((folder / name).is_file() and _is_trusted(folder, name) for folder in (SHIPPED, *folders()))
+
+
+def is_private(about: os.stat_result) -> bool:
+    """Whether only this user and root can write a file or folder, as far as the system knows owners."""
+    if not hasattr(os, "geteuid"):
+        return True
+    return about.st_uid in (0, os.geteuid()) and not about.st_mode & (S_IWGRP | S_IWOTH)
+
+
+def _read(folder: Path, name: str) -> bytes | None:
+    """The bytes of a file that can be trusted. Owner and mode are those of the open file, so that nobody can exchange it."""
+    try:
+        if not _is_trusted(folder, name):
+            return None
+        with os.fdopen(os.open(folder / name, _OPEN), "rb") as file:
+            about = os.fstat(file.fileno())
+            return file.read() if S_ISREG(about.st_mode) and (folder == SHIPPED or is_private(about)) else None
+    except OSError:
+        return None
+
+
+def _is_trusted(folder: Path, name: str) -> bool:
+    """Whether the folders of an entry are this user's alone. A package is as trustworthy as the code beside it."""
+    return folder == SHIPPED or (_is_own(folder) and _is_own((folder / name).parent))
+
+
+@cache
+def _is_own(folder: Path) -> bool:
+    try:
+        about = folder.lstat() if folder != kernel_folder() else folder.stat()  # users may link their cache elsewhere
+    except OSError:
+        return False
+    if not is_private(about):
+        _warn(folder)
+        return False
+    return True
+
+
+def _warn(folder: Path) -> None:
+    """Say once, in a run's first process, that a folder's kernels are not loaded."""
+    if multiprocessing.parent_process() is None:
+        problem = f"{folder}: others can write this folder, so that kernels in it are not used and are compiled elsewhere"
+        sys.stderr.write(f"warning: {problem}. Allow it to yourself alone: chmod 700 {folder}\n")
+
+
+def _make(folder: Path) -> bool:
+    """Whether there is such a folder, which only this user can write, after an attempt to make it."""
+    try:
+        if not folder.is_dir():
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, exist_ok=True)
+            _is_own.cache_clear()
+            _sweep(folder.parent)
+    except OSError:
+        return False
+    return _is_own(folder) and os.access(folder, os.W_OK)
+
+
+def _write(file: Path, data: bytes) -> None:
+    half = file.with_name(f".{file.name}.{secrets.token_hex(8)}")
+    try:
+        descriptor = os.open(half, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0), 0o600)
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(data)
+        half.replace(file)
+    except BaseException:
+        with suppress(OSError):
+            half.unlink()
+        raise
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what killed processes were writing long ago."""
+    for left in folder.glob(f"*/.*{SUFFIX}.*"):
+        with suppress(OSError):
+            if left.stat().st_mtime < time.time() - STALE_S:
+                left.unlink()
+
+
+def _user() -> str:
+    return str(os.geteuid()) if hasattr(os, "geteuid") else Path.home().name
