@@ -1,5 +1,6 @@
 import itertools
 import json
+import pickle
 from dataclasses import fields
 
 import numpy as np
@@ -85,6 +86,19 @@ def test_a_cube_seen_head_on():
     np.testing.assert_allclose(cube.box3d_pixels[1], (80 + half, 60 + half))  # front, left of the object, bottom
     assert cube.box3d_in_front.all()
     assert cube.quaternion == pytest.approx((np.sqrt(0.5), np.sqrt(0.5), 0, 0))  # z up to y down
+
+
+def test_labels_of_placements_are_computed_when_read():
+    (cube,), *_ = scene([UNIT], [at(x=0.2, turn=0.3)], asked=("birds_eye", "occlusion_level"))
+    waiting = ("box3d", "box3d_pixels", "view", "pose_category", "size", "quaternion", "category", "hull")
+    held = vars(cube)
+    assert not [name for name in waiting if name in held]
+    assert {"rle", "box2d", "box2d_projected", "visibility", "birds_eye", "occlusion_level"} <= held.keys()
+    assert cube.view.distance > 0 and "view" in held and "box3d" not in held
+    there = pickle.loads(pickle.dumps(cube))  # other processes get all fields
+    np.testing.assert_array_equal(there.box3d, cube.box3d)
+    assert (there.view, there.quaternion, there.occlusion_level) == (cube.view, cube.quaternion, cube.occlusion_level)
+    assert len(cube.hull) and not hasattr(cube, "amodal")
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -17,7 +17,7 @@ from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.visibility import rasterize
 
 HELD = [field.name for field in dataclasses.fields(Geometry) if field.name not in ("cutouts", "meshes", "facing", "spare")]
-ARRAYS = [*HELD, "vertices", "normals", "triangle_normals", "triangle_side"]
+ARRAYS = [*HELD, "vertices", "normals", "triangle_normals", "triangle_side", "triangle_tops"]
 
 
 def pose(rng):

@@ -30,6 +30,7 @@ from viewsphere.labels._label import (
     ObjectLabel,
     Picture,
     SampleLabel,
+    later,
 )
 from viewsphere.labels._passes import DRAWINGS
 from viewsphere.labels._placement import Placement, view_of
@@ -142,12 +143,6 @@ def makers() -> dict[str, ObjectLabel]:
 
 
 @cache
-def _following() -> dict[str, ObjectLabel]:
-    """Labels on request that are there whether they were asked for or not, by the names of their fields."""
-    return {name: label for name, label in makers().items() if label.on_request and label.follows}
-
-
-@cache
 def channels() -> dict[str, Channel]:
     """All channels that a recipe's `channels` may name: first the passes, then the labels of pixels."""
     return PASSES | {name: label.channel for name, label in channel_labels().items()}
@@ -255,9 +250,10 @@ def annotated(sight: Sight) -> tuple[ObjectAnnotation, ...]:
     """Annotations of the objects that are placed in a sight, visible or not, in the order of their ids. An object that covers
     no pixel has an empty mask, no `box2d` and visibility 0.
     """
-    known, following = labels_of(sight.asked), _following()
+    seen = [label for label in labels_of(sight.asked) if label.compute is not later]
+    every = Makers(makers(), sight.asked, "this frame")
     return tuple(
-        computed(i + 1, [label.compute(sight, i) for label in known], place, known, following)
+        computed(i + 1, [label.compute(sight, i) for label in seen], place, every)
         for i, place in enumerate(sight.placements)
         if place
     )

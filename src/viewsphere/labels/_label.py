@@ -154,7 +154,7 @@ class ChannelLabel(Label):
 
 
 def later(sight: Sight, i: int) -> Mapping[str, Any]:
-    """The `compute` of labels that follow from others: `restore` gives their fields."""
+    """The `compute` of labels that follow from placements or from other labels: `restore` gives their fields."""
     return {}
 
 
@@ -208,7 +208,6 @@ class ObjectLabel(Label):
             meaning=meaning,
             fields=tuple(fields),
             axes=axes,
-            compute=lambda sight, i: of(sight.placement(i)),
             restore=lambda kept, placement, o: of(placement),
             prove=prove,
             drawing=drawing,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 from viewsphere.errors import StoreError
@@ -27,44 +28,16 @@ def annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: M
     return ObjectAnnotation(id=object_id, source=source, more=more, **own)
 
 
-def computed(
-    object_id: int,
-    values: Iterable[Mapping[str, Any]],
-    placement: Placement,
-    labels: Iterable[ObjectLabel],
-    following: Mapping[str, ObjectLabel],
-) -> ObjectAnnotation:
-    """The annotation with these fields, and with those of `labels` that follow from them. The fields of labels that nobody
-    asked for, but that follow, too, are computed when they are first asked for.
+def computed(object_id: int, values: Iterable[Mapping[str, Any]], placement: Placement, makers: Makers) -> ObjectAnnotation:
+    """The rendered object with these fields. All others follow from them and from the placement: those that a recipe's
+    `annotations` name are computed here, the rest when first read.
     """
-    made: ObjectAnnotation = annotation_of(object_id, values)
-    more = _More(made.more)
-    more.follow(made, placement, following)
-    object.__setattr__(made, "more", more)
-    for label in labels:
-        if label.compute is later:
-            more.update(label.restore(None, placement, made))
+    made = from_short_record({"id": object_id}, placement, makers)
+    for some in values:
+        made.__dict__.update(some)
+    for field in makers.requested:
+        getattr(made, field)
     return made
-
-
-class _More(dict[str, Any]):
-    """Fields of an annotation, and those that follow from them and are computed when they are first asked for."""
-
-    def follow(self, o: ObjectAnnotation, placement: Placement, following: Mapping[str, ObjectLabel]) -> None:
-        """Say what the others follow from."""
-        self._of, self._known = (o, placement, following), dict[str, Any]()
-
-    def __missing__(self, name: str) -> Any:
-        if not hasattr(self, "_of"):
-            raise KeyError(name)
-        o, placement, following = self._of
-        if name not in self._known:
-            self._known.update(following[name].restore(None, placement, o))
-        return self._known[name]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Other processes get what was computed, without the shot that it follows from."""
-        return dict, (dict(self),)
 
 
 def whole_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str, Any]:
@@ -106,6 +79,11 @@ class Makers:
     of: Mapping[str, ObjectLabel]
     asked: Container[str]
     where: str
+
+    @cached_property
+    def requested(self) -> tuple[str, ...]:
+        """The fields of labels that were asked for and follow from others."""
+        return tuple(name for name, label in self.of.items() if label.on_request and label.compute is later and self.has(name))
 
     def has(self, field: str) -> bool:
         """Whether an object is told to have a field."""

@@ -116,6 +116,11 @@ class Geometry:
         """
         return self.facing.of_triangles(self)[1][: len(self.triangle_object)]
 
+    @property
+    def triangle_tops(self) -> NDArray[np.float64]:
+        """World z (T,) of each triangle's highest corner, metres; written to as `normals` is."""
+        return self.facing.tops(self)[: len(self.triangle_object)]
+
     def places(self, i: int) -> NDArray[np.float64]:
         """World vertices of thing i (n, 3); the ground's come after those of the last thing."""
         from viewsphere.truth import kernels_place as kernels
@@ -154,6 +159,7 @@ class Facing:
 
     _vertices: NDArray[np.float32] | None = None
     _triangles: tuple[NDArray[np.float32], NDArray[np.int8]] | None = None
+    _tops: NDArray[np.float64] | None = None
     _shown: dict[str, _Shown] = field(default_factory=dict[str, "_Shown"])
 
     def of_vertices(self, geometry: Geometry) -> NDArray[np.float32]:
@@ -187,6 +193,19 @@ class Facing:
             _turn(geometry, i, turned)
             kernels.face(geometry.places(i), turned, geometry.triangles[first:stop], base, normals, side)
         return self._triangles
+
+    def tops(self, geometry: Geometry) -> NDArray[np.float64]:
+        """The height of each triangle's highest corner."""
+        if self._tops is None or len(self._tops) < len(geometry.triangles):
+            self._tops = np.empty(len(geometry.triangles))
+            self._shown.pop("tops", None)
+        for i in self._elsewhere("tops", geometry):
+            first, stop, base = *geometry.triangle_start[i : i + 2], geometry.vertex_start[i]
+            heights = geometry.places(i)[:, 2]
+            np.max(heights[geometry.triangles[first:stop].T - base], axis=0, out=self._tops[first:stop])
+        if geometry.ground_z is not None:
+            self._tops[geometry.triangle_start[-1] :] = geometry.ground_z
+        return self._tops
 
     def _elsewhere(self, name: str, geometry: Geometry, things: Iterable[int] | None = None) -> list[int]:
         """Which things, of these if any are given, have moved, or deformed, since these arrays were written."""

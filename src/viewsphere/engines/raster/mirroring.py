@@ -37,15 +37,7 @@ class Mirrored(NamedTuple):
 
 def lying(geometry: Geometry, height: float) -> NDArray[np.bool_]:
     """Which triangles (T,) lie below a height altogether."""
-    found = np.zeros(len(geometry.triangles), np.bool_)
-    low, high = geometry.bounds[..., 2].T
-    found[geometry.triangle_start[-1] :] = geometry.ground_z is not None and geometry.ground_z < height
-    for i in np.flatnonzero(low < height).tolist():
-        first, stop = geometry.triangle_start[i : i + 2]
-        is_below = geometry.places(i)[:, 2] < height if high[i] >= height else None
-        own = geometry.triangles[first:stop] - np.int32(geometry.vertex_start[i])
-        found[first:stop] = True if is_below is None else is_below[own].all(axis=1)
-    return found
+    return geometry.triangle_tops < height
 
 
 def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> tuple[Float, Float]:
