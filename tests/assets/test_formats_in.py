@@ -5,18 +5,16 @@
 
 import os
 import re
-import signal
-import subprocess
 import sys
-import threading
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from deadline import DEADLINE
-from viewsphere.assets import isolated
+from viewsphere.assets import reader_process
 from viewsphere.assets.cache import load
 from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.load import BLENDER_SUFFIXES, KNOWN, PICTURE_SUFFIXES, SUFFIXES, load_model
@@ -119,7 +117,7 @@ def test_known_kinds_that_are_not_read_say_what_to_do(suffix, tmp_path):
 
 @corpus
 @pytest.mark.slow
-@pytest.mark.usefixtures("forked")
+@pytest.mark.usefixtures("apart")
 def test_awkward_files_become_what_the_page_says(monkeypatch, tmp_path):
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
     rows = awkward_rows()
@@ -135,79 +133,18 @@ def test_awkward_files_become_what_the_page_says(monkeypatch, tmp_path):
             assert quoted[1] in error
 
 
-FORKS = """
-import json, os, sys
-from viewsphere.assets import load, mesh_file, normalise, reader
-for line in sys.stdin:
-    job = json.loads(line)
-    child = os.fork()
-    if not child:
-        log = os.open(os.path.join(job["folder"], "log.txt"), os.O_WRONLY | os.O_CREAT)
-        open_end, kept = os.pipe()
-        for new, old in ((open_end, 0), (log, 1), (log, 2)):
-            os.dup2(new, old)
-        os.environ.update(dict.fromkeys(("TMPDIR", "TEMP", "TMP"), job["folder"]))
-        sys.argv[1:] = [json.dumps(job | {"parent": os.getppid()})]
-        try:
-            reader.main()
-        finally:
-            os._exit(1)
-    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
-"""
-
-
-class Forks:
-    """Readers that are forked from a process in which everything is imported: to import takes longer than to read a file."""
-
-    def __init__(self):
-        environment = os.environ | isolated.SINGLE_THREADED | {"PYTHONPATH": os.pathsep.join(sys.path)}
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-        self._process = subprocess.Popen([sys.executable, "-P", "-c", FORKS], env=environment, **pipes)
-        self.is_reading = False
-
-    def start(self, job):
-        self._process.stdin.write(job.to_json() + "\n")
-        self._process.stdin.flush()
-        self.is_reading = True
-        return self, os.open(os.devnull, os.O_RDONLY)
-
-    def wait(self):
-        if self.is_reading:
-            self.code, self.is_reading = int(self._process.stdout.readline() or -signal.SIGKILL), False
-        return self.code
-
-    def kill(self):
-        if self.is_reading:
-            self._process.kill()  # the reader dies with it
-
-    def end(self):
-        self._process.communicate()
-
-
 @pytest.fixture
-def forked(monkeypatch):
-    """Files are read by `Forks`, each thread's own; a function that ends them."""
-    forks, crew = threading.local(), []
-
-    def start(job):
-        if not hasattr(forks, "own"):
-            forks.own = Forks()
-            crew.append(forks.own)
-        return forks.own.start(job)
-
-    def end():
-        while crew:
-            crew.pop().end()
-
-    monkeypatch.setattr(isolated, "_started", start)
+def apart(monkeypatch):
+    """Files are read in processes of their own; a function that ends those that wait for a file."""
     monkeypatch.delenv(READ_HERE)
+    end = partial(reader_process._close_all, reader_process._idle_readers(os.getpid()), os.getpid())
     yield end
     end()
 
 
 @corpus
 @pytest.mark.slow
-def test_no_broken_file_does_harm(forked, monkeypatch, tmp_path):
+def test_no_broken_file_does_harm(apart, monkeypatch, tmp_path):
     """Each in a process of its own: loaded, or one line that names the file; quick, small, and nothing written elsewhere."""
     import resource
 
@@ -218,7 +155,7 @@ def test_no_broken_file_does_harm(forked, monkeypatch, tmp_path):
     assert len(files) > 250
     with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as pool:
         outcomes = list(pool.map(lambda path: read_apart(path, tmp_path / "cache"), files))
-    forked()
+    apart()
     for path, said in zip(files, outcomes, strict=True):
         assert "MAX_READ_SECONDS" not in said
         assert "\n" not in said

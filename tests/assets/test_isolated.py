@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +12,13 @@ import pytest
 
 from deadline import DEADLINE, until
 from viewsphere.aside import aside, of_this_process
-from viewsphere.assets import isolated
 from viewsphere.assets import reader as reader_program
+from viewsphere.assets import reader_process
 from viewsphere.assets.cache import PREFIX, cache_folder, load, load_normalised
 from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.mesh_file import ARRAYS
 from viewsphere.assets.reader import Job
+from viewsphere.assets.reader_process import ReaderProcess, Setting
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 
@@ -33,6 +35,18 @@ if "-m" in sys.orig_argv and "viewsphere.assets.reader" in sys.orig_argv:
 """A `sitecustomize` that puts another reader into the child."""
 
 
+IDLE = """
+import sys
+if "-m" in sys.orig_argv and "viewsphere.assets.reader" in sys.orig_argv:
+    import select
+    wait = select.select
+    select.select = lambda *files: wait(*files[:3], min(files[3], 0.05))
+"""
+"""A `sitecustomize` by which a reader soon stops waiting for jobs."""
+
+forks = pytest.mark.skipif(sys.platform != "linux", reason="a program reads one file there")
+
+
 def alive(pid: int) -> bool:
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
@@ -46,6 +60,8 @@ def apart(monkeypatch, tmp_path):
     """Models are read in processes of their own, and cached below the test's folder."""
     monkeypatch.delenv(READ_HERE)
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    yield
+    reader_process._close_all(reader_process._idle_readers(os.getpid()), os.getpid())
 
 
 @pytest.fixture
@@ -163,15 +179,16 @@ def test_processor_time_is_bounded_by_the_cores_that_a_reader_uses(monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: 8)
     seconds: list[int] = []
     for by_blender in (False, True):
-        reader_program._limit(Job({}, "", 10.0, 1 << 30, 0, by_blender))
+        reader_program._limit(Job({}, "", 10.0, 1 << 30, by_blender))
         seconds.append(given[resource.RLIMIT_CPU])
     assert seconds == [21, 161]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not enforce it")
-def test_too_little_memory_to_start_is_said(spec, monkeypatch):
+def test_too_little_memory_for_the_reader_itself_is_said(spec, reader, monkeypatch):
+    reader("import numpy; numpy.ones(1 << 24)")
     monkeypatch.setenv("VIEWSPHERE_MAX_READ_BYTES", str(1 << 24))
-    assert "the process that reads it failed" in refusal(spec) or "crashed" in refusal(spec)
+    assert "limit MAX_READ_BYTES" in refusal(spec)
 
 
 def test_without_processes_the_error_says_so(spec, monkeypatch):
@@ -232,17 +249,132 @@ def test_no_child_outlives_its_parent(spec, reader, tmp_path, how):
 
 
 @pytest.mark.slow
-def test_a_child_ends_when_its_standard_input_does(spec, reader, tmp_path):
-    reader("while True: pass")
-    job = Job(spec.model_dump(mode="json"), str(tmp_path), 2.0 * DEADLINE, 1 << 32, os.getpid())
-    process, lifeline = isolated._started(job)
+def test_a_reader_and_its_child_end_when_standard_input_does(spec, reader, tmp_path):
+    pid_file = tmp_path / "pid"
+    reader(
+        "import os, pathlib, re",
+        f"pathlib.Path({str(pid_file)!r}).write_text(str(os.getpid()))",
+        "re.match(r'(a+)+b', 'a' * 60)",
+    )
+    job = Job(spec.model_dump(mode="json"), str(tmp_path), 2.0 * DEADLINE, 1 << 32)
+    started = ReaderProcess.start(Setting.current(), tmp_path / "log.txt")
     try:
-        with pytest.raises(subprocess.TimeoutExpired):
-            process.wait(1.0)
-        os.close(lifeline)
-        assert process.wait(DEADLINE) == 1
+        started.process.stdin.write(job.to_json().encode() + b"\n")
+        started.process.stdin.flush()
+        assert until(lambda: pid_file.exists() and pid_file.read_text())
+        started.process.stdin.close()
+        assert started.process.wait(DEADLINE) == 1
+        assert until(lambda: not alive(int(pid_file.read_text())))
     finally:
-        process.kill()
+        started.close()
+
+
+def waiting():
+    """The readers of this process that wait for a job."""
+    return reader_process._idle_readers(os.getpid())
+
+
+@forks
+def test_a_reader_reads_many_files(spec, write):
+    load_normalised(spec)
+    (kept,) = waiting()
+    other = write("models/other.obj", CUBE.replace("v 1", "v 9"))
+    assert load_normalised(spec.model_copy(update={"source": str(other)})).vertices.max() == 4.5
+    assert waiting() == [kept]
+    assert kept.process.poll() is None
+
+
+STATE = """
+import hashlib, os, resource, signal, sys, threading
+import numpy
+state = [
+    *(getattr(module, "left", None) for module in (load, numpy, sys)),
+    *(os.environ.get("LEFT"), os.getcwd(), os.umask(0o77), sorted(sys.modules), sys.path, sys.getrecursionlimit()),
+    *(signal.getsignal(kind) for kind in (signal.SIGUSR1, signal.SIGCHLD, signal.SIGINT)),
+    *(resource.getrlimit(kind) for kind in (resource.RLIMIT_NOFILE, resource.RLIMIT_AS, resource.RLIMIT_CPU)),
+    *([file for file in range(64) if os.path.exists(f"/proc/self/fd/{file}")], os.readlink("/proc/self/fd/0")),
+    *(numpy.geterr(), threading.active_count(), load.SUFFIXES, os.getpgid(0) == os.getppid()),
+]
+""".strip().splitlines()
+"""What a file could leave behind for the next, as a reader sees it."""
+
+SPOIL = """
+load.left = numpy.left = sys.left = os.environ["LEFT"] = "left"
+load.SUFFIXES = ()
+os.chdir("/")
+sys.path.append("/left")
+sys.setrecursionlimit(400)
+signal.signal(signal.SIGUSR1, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_NOFILE, (50, 50))
+numpy.seterr(all="raise")
+import wave
+for file in range(64):
+    try:
+        os.write(file, b"0\\n1\\n")
+    except OSError:
+        pass
+os.dup2(0, 40)
+""".strip().splitlines()
+
+
+@forks
+@pytest.mark.parametrize(
+    "end",
+    ["os._exit(0)", *(pytest.param(end, marks=pytest.mark.slow) for end in ("raise ValueError", "os.kill(os.getpid(), 9)"))],
+)
+def test_a_file_leaves_nothing_for_the_next(spec, write, reader, end):
+    answer = "raise ValueError(hashlib.sha256(repr(state).encode()).hexdigest())"
+    reader(*STATE, "if folder.model.name == 'cube.obj':", *(f"    {line}" for line in (*SPOIL, end)), answer)
+    other = spec.model_copy(update={"source": str(write("models/other.obj", CUBE))})
+    before = refusal(other)
+    (kept,) = waiting()
+    assert "its reader failed (ValueError" in before
+    assert refusal(spec) != before
+    assert refusal(other) == before
+    assert waiting() == [kept]
+
+
+@forks
+@pytest.mark.slow
+def test_a_reader_that_was_killed_harms_no_other_file(spec, write):
+    load_normalised(spec)
+    waiting()[0].process.kill()
+    waiting()[0].process.wait()
+    other = write("models/other.obj", CUBE)
+    assert len(load_normalised(spec.model_copy(update={"source": str(other)})).triangles) == 6
+
+
+@forks
+@pytest.mark.slow
+def test_a_child_that_kills_its_reader_costs_one_message(spec, write, reader):
+    reader("import os", "os.kill(os.getppid(), 9)", "import time; time.sleep(60)")
+    for _ in range(2):
+        assert "it was killed (SIGKILL)" in refusal(spec)
+    assert waiting() == []
+
+
+@forks
+@pytest.mark.slow
+def test_an_idle_reader_ends_and_the_next_file_starts_another(spec, write, monkeypatch, tmp_path):
+    write("patch/sitecustomize.py", IDLE)
+    monkeypatch.syspath_prepend(tmp_path / "patch")
+    load_normalised(spec)
+    (first,) = waiting()
+    assert first.process.wait(DEADLINE) == 0
+    other = write("models/other.obj", CUBE)
+    assert len(load_normalised(spec.model_copy(update={"source": str(other)})).triangles) == 6
+    assert waiting() != [first]
+
+
+@forks
+@pytest.mark.slow
+def test_threads_read_side_by_side(spec, write):
+    sources = [write(f"models/m{i}.obj", CUBE.replace("v 1", f"v {i + 1}")) for i in range(6)]
+    specs = [spec.model_copy(update={"source": str(source)}) for source in sources]
+    with ThreadPoolExecutor(3) as pool:
+        widths = [mesh.vertices[:, 0].max() for mesh in pool.map(load_normalised, specs)]
+    assert widths == sorted(set(widths))
+    assert 1 <= len(waiting()) <= 3
 
 
 @pytest.mark.slow
@@ -269,4 +401,4 @@ def test_the_reader_writes_nothing_elsewhere(spec, tmp_path, monkeypatch):
     load_normalised(spec)
     assert {p for p in tmp_path.rglob("*") if "cache" not in p.parts} == before
     assert {p.suffix for p in cache_folder().iterdir()} == {".json", ".npz"}
-    assert isolated.LOG not in {p.name for p in cache_folder().rglob("*")}
+    assert reader_program.LOG not in {p.name for p in cache_folder().rglob("*")}

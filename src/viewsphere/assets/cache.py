@@ -15,6 +15,7 @@ import os
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -216,6 +217,7 @@ def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec, frame: i
     return digest.hexdigest()
 
 
+@cache
 def readers_digest() -> str:
     """Digest of this package's and Blender's worker's sources, and of the versions of the `LIBRARIES`."""
     digest = hashlib.sha256()
