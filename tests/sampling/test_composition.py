@@ -51,7 +51,7 @@ def tiny(monkeypatch):
     monkeypatch.setattr(
         plugins, "place", lambda name: SimpleNamespace(tiny_random=tiny_random) if name == "tiny" else real(name)
     )
-    from viewsphere.sampling.scenery import draw_place
+    from viewsphere.sampling.scenery import _drawn_place as draw_place
 
     draw_place.cache_clear()
     yield "zoo:tiny"

@@ -9,8 +9,10 @@ from viewsphere.run.stages import Stages
 from viewsphere.sampling.placing import obstacles
 from viewsphere.sampling.plan import plan
 
+TABLE = {"size": [2, 2], "height": 0.001}
 
-def spots_of(folder, layout="scatter", place=None, count=1, objects=25):
+
+def spots_of(folder, layout="scatter", place=None, count=1, objects=25, surface=TABLE):
     weed = trimesh.creation.icosphere(1, 0.04)
     weed.export(folder / "weed.glb")
     recipe = Recipe(
@@ -22,7 +24,7 @@ def spots_of(folder, layout="scatter", place=None, count=1, objects=25):
             "repeat": True,
             "layout": layout,
             "gap": 0.01,
-            "surface": {"size": [2, 2], "height": 0.001},
+            "surface": surface,
         },
         viewpoints={"azimuth": 0, "elevation": 70, "distance": 2.2},
         camera={"size": [32, 32], "fov_deg": 60},
@@ -74,6 +76,33 @@ def test_a_wall_through_the_middle_is_in_the_way_however_long_it_is(length):
     assert all(wall.meets(np.array([(x, -0.05), (x + 0.02, -0.05), (x, 0.05)]), 0.0) for x in np.linspace(-0.3, 0.3, 25))
     assert not wall.meets(square + np.array((0, 1)), 0.1)
     assert not wall.meets(square - np.array((0, 1)), 0.1)
+
+
+@pytest.mark.parametrize("reach", [20, 60, 300])
+def test_a_fence_is_in_the_way_as_far_as_a_layout_reaches(reach):
+    corners = [(reach - 5, y, z) for y, z in ((-4, 0), (4, 0), (4, 1), (-4, 1))]
+    fence = obstacles(np.array(corners, np.float64), np.array([(0, 1, 2), (0, 2, 3)], np.int32), 1.0, reach)
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) + np.array((reach - 5.5, 0))
+    assert fence.meets(square, 0.0)
+    assert not fence.meets(square - np.array((3, 0)), 0.5)
+    assert not fence.meets(square + np.array((3, 0)), 0.5)
+
+
+def test_a_scatter_over_60_m_keeps_clear_of_a_whole_street(tmp_path):
+    street, walls = trimesh.Scene(), []
+    street.add_geometry(trimesh.creation.box((130, 130, 0.01)), node_name="Floor", geom_name="Floor")
+    for x in np.arange(-55, 56, 10.0):
+        boards = [trimesh.creation.box((0.05, 100, 3)) for _ in range(51)]
+        for i, board in enumerate(boards):
+            board.apply_translation((x + 0.1 * i - 2.5, 0, 1.5))
+        street.add_geometry(trimesh.util.concatenate(boards), node_name=f"wall_{x}", geom_name=f"wall_{x}")
+        walls.append(x)
+    street.export(tmp_path / "street.glb")
+    place = {"source": str(tmp_path / "street.glb"), "up": "+z", "forward": "-y", "origin": [0, 0, 0]}
+    spots = spots_of(tmp_path, {"kind": "scatter", "reach": 60}, place, count=2, objects=40, surface=None)
+    assert (np.abs(spots).max(axis=0) > 40).all()
+    beside = np.abs(spots[np.abs(spots[:, 1]) < 50][:, :1] - np.array(walls)).min(axis=1)
+    assert beside.min() > 2.5
 
 
 @pytest.mark.parametrize("layout", ["scatter", "heap_together"])

@@ -3,15 +3,20 @@
 import numpy as np
 import pytest
 
-from viewsphere.errors import RecipeError
+from viewsphere.errors import RecipeError, UserError
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import plan
+from viewsphere.zoo.townscape.street_life import stretches
 
 CAMERA = {"size": [32, 32], "fov_deg": 70}
 
 
 def shots_of(place="zoo:neighbourhood", count=6, **options):
+    return planned_shots(place, count, **options)[1]
+
+
+def planned_shots(place, count, **options):
     recipe = Recipe(
         name="street",
         models=[{"source": ["zoo:car", "zoo:person"], "count": 3}],
@@ -24,7 +29,7 @@ def shots_of(place="zoo:neighbourhood", count=6, **options):
         splits={"by": "frame", "train": 1},
     )
     planned, stages = plan(recipe), Stages()
-    return [planned.shot(row, stages.box) for row in planned.rows]
+    return planned, [planned.shot(row, stages.box) for row in planned.rows], stages.box
 
 
 def spots(shots, category):
@@ -51,3 +56,49 @@ def test_parked_cars_stand_beside_the_lane():
 def test_a_place_without_lanes_is_refused():
     with pytest.raises(RecipeError, match=r"needs a scene\.place with lanes"):
         shots_of(None)
+
+
+@pytest.mark.parametrize("place", ["zoo:neighbourhood", "zoo:town"])
+def test_vehicles_park_in_the_places_bays_and_walkers_are_on_its_pavements(place):
+    planned, shots, box_of = planned_shots(
+        {"source": place, "turn": 30, "parked": 0.5, "walkers": 30}, count=4, parked=1, reach=25
+    )
+    bays = np.array([bay.world_from_bay for bay in planned.composition.bays("scene-000000", None)])
+    ways = planned.composition.pavements("scene-000000", None)
+    lanes = planned.composition.lanes("scene-000000", None)
+    pieces = [t for t in shots[0].things if not t.is_target]
+    cars = 0
+    for thing in (t for s in shots for t in s.things if t.is_target):
+        pose = np.array(thing.world_from_object)
+        height = pose[2, 3] + box_of(thing.model)[:, 2].min()
+        if thing.model.category == "car":
+            bay = bays[np.linalg.norm(bays[:, :2, 3] - pose[:2, 3], axis=1).argmin()]
+            if np.linalg.norm(bay[:2, 3] - pose[:2, 3]) > 0.3:  # no bay within reach is free
+                assert min(_away(pose, part) for lane in lanes for part in stretches(lane)) < 0.3
+                continue
+            cars += 1
+            assert np.allclose(bay[:3, :3], pose[:3, :3])
+            assert height == pytest.approx(bay[2, 3], abs=1e-9)
+            assert all(_apart(pose, t) > 1.5 for t in pieces if t.model.category in ("car", "person"))
+        else:
+            assert min(_away(pose, part) for way in ways for part in stretches(way)) < 0.55
+            assert height == pytest.approx(0.1, abs=1e-9)
+            assert all(
+                _apart(pose, t) > 0.3 for t in pieces if t.model.category in ("bench", "lamp post", "lamp_post", "person")
+            )
+    assert cars >= 3
+
+
+def test_a_place_without_roads_has_no_traffic_of_its_own():
+    with pytest.raises(UserError, match=r"`walkers` needs a place with roads, and zoo:room has none\. Use zoo:neighbourhood"):
+        shots_of({"source": "zoo:room", "walkers": 2})
+
+
+def _apart(pose, thing):
+    return np.linalg.norm(pose[:2, 3] - np.array(thing.world_from_object)[:2, 3])
+
+
+def _away(pose, part):
+    start, end = np.array(part[:2]), np.array(part[3:5])
+    way = (end - start) / np.linalg.norm(end - start)
+    return np.linalg.norm(pose[:2, 3] - start - np.clip((pose[:2, 3] - start) @ way, 0, np.linalg.norm(end - start)) * way)

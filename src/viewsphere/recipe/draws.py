@@ -28,7 +28,7 @@ from pydantic_core import CoreSchema, core_schema
 from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, nearest, shown
-from viewsphere.model.numbers import Count, Metres, Number
+from viewsphere.model.numbers import Count, Metres, Natural, Number
 from viewsphere.recipe.values import OrShort
 
 if TYPE_CHECKING:
@@ -373,6 +373,12 @@ CountDrawn = Annotated[
     OrShort({"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 2, "maxItems": 2}),
 ]
 """A whole number above 0; [low, high] is short for a uniform one."""
+
+CountOrNone = Annotated[
+    Drawn[Natural],
+    BeforeValidator(ranged),
+    OrShort({"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 2, "maxItems": 2}),
+]
 
 Coordinate = Drawn[Number]
 PointDrawn = Drawn[tuple[Drawn[Metres], Drawn[Metres], Drawn[Metres]]]

@@ -12,8 +12,8 @@ from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.model_spec import Axis
-from viewsphere.model.numbers import FARTHEST, Length, Number
-from viewsphere.recipe.draws import CountDrawn, Drawn, is_random, span
+from viewsphere.model.numbers import FARTHEST, Length, Number, Portion
+from viewsphere.recipe.draws import CountDrawn, CountOrNone, Drawn, is_random, span
 from viewsphere.recipe.layout import LAYOUT, ORIENTATION, Layout, Orientation, Spot, placer_of, spots_of
 from viewsphere.recipe.models import ZOO, Unit
 from viewsphere.recipe.motion import MOTION, MotionField, MotionsField
@@ -30,7 +30,7 @@ OF_FILES = ("origin", "up", "forward", "unit", "category")
 class PlaceEntry(Brief):
     """Where the targets stand."""
 
-    UNSAID = ("motion",)
+    UNSAID = ("parked", "walkers", "motion")
 
     source: str = Field(min_length=1, description="zoo:<place>, such as zoo:neighbourhood, or a model file")
     draw: Draw = Field(default="fixed", description=f"of a zoo's place and of the turn: {DRAWS}")
@@ -41,6 +41,14 @@ class PlaceEntry(Brief):
     forward: Axis | None = Field(default=None, description="of a file: its axis that becomes -Y")
     unit: Unit | None = Field(default=None, description="of a file: m, cm, mm, in, ft or the metres in one unit")
     category: str = Field(default="", max_length=200, description="of a file with labels: own")
+    parked: Drawn[Portion] | None = Field(
+        default=None,
+        description="of a zoo's place with roads: the share of its parking bays and driveways with a car; default: 0.4 in "
+        "zoo:town, 0 in zoo:neighbourhood",
+    )
+    walkers: CountOrNone | None = Field(
+        default=None, description="of a zoo's place with roads: how many people are on its pavements, none by default"
+    )
     motion: Annotated[dict[Annotated[str, Field(min_length=1)], MotionsField], Field(min_length=1)] | None = Field(
         default=None, description="under time, how pieces move, by patterns of their names: {tree_*: {kind: oscillate, ...}}"
     )
@@ -54,6 +62,21 @@ class PlaceEntry(Brief):
     def is_room(self) -> bool:
         """Whether it is a place of the zoo whose module says INDOORS."""
         return self.name in plugins.places() and getattr(plugins.place(self.name), "INDOORS", False)
+
+    @property
+    def has_roads(self) -> bool:
+        """Whether it is a place of the zoo whose module says ROADS."""
+        return self.name in plugins.places() and getattr(plugins.place(self.name), "ROADS", False)
+
+    @model_validator(mode="after")
+    def _check_traffic(self) -> PlaceEntry:
+        given = [name for name in ("parked", "walkers") if getattr(self, name) is not None]
+        if given and not self.has_roads:
+            raise ValueError(
+                f"`{given[0]}` needs a place with roads, and {self.source} has none. Use zoo:neighbourhood or zoo:town, or "
+                f"remove `{given[0]}`"
+            )
+        return self
 
     @model_validator(mode="after")
     def _check(self) -> PlaceEntry:

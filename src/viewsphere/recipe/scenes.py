@@ -7,16 +7,10 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Count, Natural, Number
-from viewsphere.recipe.draws import CountDrawn, Distribution, Drawn, ranged, span
+from viewsphere.model.numbers import Count, Number
+from viewsphere.recipe.draws import CountDrawn, CountOrNone, Distribution, span
 from viewsphere.recipe.layout import LAYOUT, ON, ORIENTATION, Layout, OnField, Orientation, Spot, placer_of, spots_of
 from viewsphere.recipe.values import OrShort
-
-CountOrNone = Annotated[
-    Drawn[Natural],
-    BeforeValidator(ranged),
-    OrShort({"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 2, "maxItems": 2}),
-]
 
 
 class ScenesEntry(Frozen):

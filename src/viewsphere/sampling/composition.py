@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
@@ -29,7 +30,9 @@ from viewsphere.sampling.scenery import (
     draw_names,
     draw_place,
     free_floor,
+    place_bays,
     place_lanes,
+    place_pavements,
     place_pieces,
     place_surfaces,
     plane_images,
@@ -42,12 +45,15 @@ from viewsphere.sampling.sequence_poses import SequencePoses
 from viewsphere.sampling.time_steps import Schedule, TimedPoses
 from viewsphere.sampling.viewpoints import Poses
 from viewsphere.store import Category
-from viewsphere.zoo.places import Lane, Surface
+from viewsphere.zoo.places import Bay, Lane, Surface
 
 __all__ = ["BoxOf", "Composition", "Moved", "Numbering", "center", "center_of_all", "compose", "still"]
 
-Built = Callable[[float], Obstacles | None]
-"""Gives what of a place stands up to a height, metres."""
+Built = Callable[[float, float], Obstacles | None]
+"""Gives the parts of a place that stand up to a height, and up to a distance from the middle, metres."""
+
+ABOVE_KERBS = 0.2
+"""Metres above a zoo's road up to which its pieces are ground: kerbs, pavements and driveways are 0.14 m high at most."""
 
 Moved = Callable[[Thing, SceneryPiece], Thing]
 """A piece of scenery with its motion."""
@@ -83,7 +89,7 @@ class Composition(Sendable):
         place = self.recipe.scene.place
         if place is not None and place.labels == "own":
             for names in self._place_draws:
-                laid = draw_place(self.recipe.seed, place.name, names).pieces if place.name else ()
+                laid = draw_place(self.recipe, place, names).pieces if place.name else ()
                 yield from (piece.category for piece in laid)
             if not place.name:
                 yield place.category
@@ -126,8 +132,8 @@ class Composition(Sendable):
         count = sum(entry.most for entry in scene.planes if entry.labels == "own")
         count += 0 if self.blend is None else len(self.blend.labelled)
         if scene.place is not None and scene.place.labels == "own":
-            seed, name = self.recipe.seed, scene.place.name
-            count += max(len(draw_place(seed, name, n).pieces) if name else 1 for n in self._place_draws)
+            place = scene.place
+            count += max(len(draw_place(self.recipe, place, n).pieces) if place.name else 1 for n in self._place_draws)
         return count
 
     def cast(self, spec: ModelSpec, pose: str | None, redraw: int = 0) -> tuple[ModelSpec, ...]:
@@ -206,12 +212,34 @@ class Composition(Sendable):
         if place is None or place.name:
             return None
         piece = self._place(self.place_names(subject, pose, redraw))[0]
-        return lambda height: built_of((piece.model, None), composed(_inverse(world_from_room), piece.world_from_piece), height)
+        room_from_piece = composed(_inverse(world_from_room), piece.world_from_piece)
+        return lambda height, reach: built_of((piece.model, None), room_from_piece, height, reach)
+
+    def furniture(self, subject: str, pose: str | None, redraw: int) -> Built | None:
+        """Gives the parts of a zoo place's pieces that stand on its roads, bays and pavements, such as lamp posts and parked
+        cars, up to a height above the floor; None where the place is none of the zoo's.
+        """
+        place = self.recipe.scene.place
+        if place is None or not place.name:
+            return None
+        pieces = self._place(self.place_names(subject, pose, redraw))
+        placed = tuple(sorted(((p.model, p.world_from_piece) for p in pieces), key=lambda one: one[0].key))
+        return lambda height, reach: furniture_of(placed, height, reach)
 
     def lanes(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
         """The lanes of the place where it stands, world axes; none where it has none."""
         place = self.recipe.scene.place
         return place_lanes(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
+
+    def bays(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Bay, ...]:
+        """Where vehicles may park in the place where it stands, world axes; none where it has none."""
+        place = self.recipe.scene.place
+        return place_bays(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
+
+    def pavements(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
+        """Where people may walk in the place where it stands, world axes; none where it has none."""
+        place = self.recipe.scene.place
+        return place_pavements(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
     def surfaces(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Surface, ...]:
         """Where things may stand above the floor of the place, world axes; none where it has none."""
@@ -341,10 +369,26 @@ def compose(
 
 
 @lru_cache(maxsize=4)
-def built_of(shown: tuple[ModelSpec, None], room_from_piece: Matrix4, height: float) -> Obstacles | None:
+def built_of(shown: tuple[ModelSpec, None], room_from_piece: Matrix4, height: float, reach: float) -> Obstacles | None:
     """The triangles of a model up to a height above a room's floor; the last results are kept."""
     mesh = shape_of(shown)
-    return obstacles(transform(np.array(room_from_piece), mesh.vertices), mesh.triangles, height)
+    return obstacles(transform(np.array(room_from_piece), mesh.vertices), mesh.triangles, height, reach)
+
+
+@lru_cache(maxsize=4)
+def furniture_of(pieces: tuple[tuple[ModelSpec, Matrix4], ...], height: float, reach: float) -> Obstacles | None:
+    """The triangles of a place's pieces between its kerbs and a height; the last results are kept. Pieces of one model follow
+    one another, so that each mesh is read once.
+    """
+    vertices, triangles, count = list[NDArray[np.float64]](), list[NDArray[np.int32]](), 0
+    for spec, world_from_piece in pieces:
+        mesh = shape_of((spec, None))
+        placed = transform(np.array(world_from_piece), mesh.vertices)
+        if (placed[:, :2].min(axis=0) <= reach).all() and (placed[:, :2].max(axis=0) >= -reach).all():
+            vertices.append(placed)
+            triangles.append(mesh.triangles + np.int32(count))
+            count += len(placed)
+    return obstacles(np.concatenate(vertices), np.concatenate(triangles), height, reach, ABOVE_KERBS) if count else None
 
 
 def _inverse(pose: Matrix4) -> Matrix4:

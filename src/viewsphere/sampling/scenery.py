@@ -31,7 +31,7 @@ from viewsphere.sampling.pictures import IMAGE_SUFFIXES, files_in, proportions
 from viewsphere.sampling.place_file import FileOffers, offers_of
 from viewsphere.sampling.placing import Footprint, footprint, standing
 from viewsphere.sampling.seeds import Names, generator, scene_generators, share
-from viewsphere.zoo.places import Lane, Surface
+from viewsphere.zoo.places import Bay, Lane, Surface, Traffic
 
 TRIES = 200
 """Spots that are tried for one plane."""
@@ -85,7 +85,7 @@ def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: N
 def _laid_pieces(
     recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, names: Names, category_id: Naming
 ) -> tuple[SceneryPiece, ...]:
-    laid = draw_place(recipe.seed, entry.name, names)
+    laid = draw_place(recipe, entry, names)
     pieces: list[SceneryPiece] = []
     for piece in laid.pieces:
         spec = ModelSpec(
@@ -148,7 +148,7 @@ def is_indoors(recipe: Recipe, entry: PlaceEntry | None) -> bool:
 
 def _offered(recipe: Recipe, entry: PlaceEntry, names: Names) -> Any:
     """What a place offers, in its own axes: a `zoo.places.Place`, or the `FileOffers` of a file."""
-    return draw_place(recipe.seed, entry.name, names) if entry.name else _file_offers(recipe, entry)
+    return draw_place(recipe, entry, names) if entry.name else _file_offers(recipe, entry)
 
 
 def _file_offers(recipe: Recipe, entry: PlaceEntry) -> FileOffers:
@@ -170,14 +170,41 @@ def _carried(lane: Lane, world_from_place: NDArray[np.float64]) -> Lane:
     return replace(lane, points=points)
 
 
-@lru_cache(maxsize=16)
-def draw_place(seed: int, name: str, names: Names) -> Any:
+def place_bays(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Bay, ...]:
+    """Where vehicles may park in a place where it stands, world axes; none where it has none."""
+    if entry is None:
+        return ()
+    world_from_place = _world_from_place(recipe, entry, names)
+    bays = getattr(_offered(recipe, entry, names), "bays", ())
+    return tuple(replace(bay, world_from_bay=composed(world_from_place, bay.world_from_bay)) for bay in bays)
+
+
+def place_pavements(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Lane, ...]:
+    """Where people may walk in a place where it stands, world axes; none where it has none."""
+    if entry is None:
+        return ()
+    world_from_place = np.array(_world_from_place(recipe, entry, names))
+    return tuple(_carried(way, world_from_place) for way in getattr(_offered(recipe, entry, names), "pavements", ()))
+
+
+def draw_place(recipe: Recipe, entry: PlaceEntry, names: Names) -> Any:
     """The layout (a `zoo.places.Place`) that a recipe's seed and these names draw; raises RecipeError for an unknown place."""
+    if entry.parked is None and entry.walkers is None:
+        return _drawn_place(recipe.seed, entry.name, names, None)
+    rngs = scene_generators(recipe.seed, names)
+    parked = None if entry.parked is None else drawn(entry.parked, rngs, ("place", "parked"))
+    walkers = 0 if entry.walkers is None else drawn(entry.walkers, rngs, ("place", "walkers"))
+    return _drawn_place(recipe.seed, entry.name, names, Traffic(parked, walkers))
+
+
+@lru_cache(maxsize=16)
+def _drawn_place(seed: int, name: str, names: Names, traffic: Traffic | None) -> Any:
     try:
         module = plugins.place(name)
     except UserError:
         raise RecipeError(f"scene.place: {one_of(ZOO + name, [ZOO + known for known in plugins.places()])}") from None
-    return getattr(module, f"{name}_random")(generator(seed, "place", name, *names))
+    rng, draw = generator(seed, "place", name, *names), getattr(module, f"{name}_random")
+    return draw(rng) if traffic is None else draw(rng, traffic)
 
 
 def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footprint | None:
@@ -188,7 +215,7 @@ def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footpr
         return None
     if not entry.name:
         return _floor_of_file(recipe, entry, names)
-    rectangle = getattr(draw_place(recipe.seed, entry.name, names), "free", None)
+    rectangle = getattr(draw_place(recipe, entry, names), "free", None)
     if rectangle is None:
         return None
     x0, y0, x1, y1 = rectangle

@@ -20,6 +20,9 @@ HOME = "place"
 LENGTH = 11.0
 """Length of every driveway and path, metres."""
 
+TOP = 0.03
+"""Metres from its foot up to the paving."""
+
 Surface = Literal["slabs", "bricks", "asphalt", "gravel"]
 
 
@@ -37,7 +40,7 @@ def driveway(parameters: Driveway | None = None) -> Mesh:
     """The driveway in metres, centred, 3 cm high. Parts: paving, edging."""
     p = parameters or Driveway()
     rng = np.random.default_rng(p.seed)
-    half, top = p.width / 2 - 0.08, 0.03
+    half, top = p.width / 2 - 0.08, TOP
     x, y = np.meshgrid(np.linspace(-half, half, 5), np.linspace(-LENGTH / 2, LENGTH / 2, 13), indexing="ij")
     paving = grid(np.stack([x, y, np.full_like(x, top)], axis=-1))
     stones = [

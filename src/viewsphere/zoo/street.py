@@ -12,10 +12,13 @@ from viewsphere.zoo.places import Lane
 from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.townscape import paving, roadway
 from viewsphere.zoo.townscape.paving import GUTTER
-from viewsphere.zoo.townscape.plan import HALF_LENGTH, PLOT
+from viewsphere.zoo.townscape.plan import HALF_LENGTH, PLOT, STEP
 from viewsphere.zoo.townscape.surfaces import finished
 
 HOME = "place"
+
+WALK = (5.1, 0.7)
+"""x of the middle of the way that people take on a pavement, and its width, metres."""
 
 Paving = Literal["slabs", "bricks", "asphalt"]
 
@@ -95,6 +98,14 @@ def lanes() -> tuple[Lane, ...]:
     middle, width = GUTTER / 2, GUTTER
     return tuple(
         Lane(name, ((side * middle, -side * HALF_LENGTH, 0.0), (side * middle, side * HALF_LENGTH, 0.0)), width)
+        for name, side in (("right", 1.0), ("left", -1.0))
+    )
+
+
+def pavements() -> tuple[Lane, ...]:
+    """The ways that people take on the two pavements of every street, between lamp posts and benches."""
+    return tuple(
+        Lane(f"pavement_{name}", ((side * WALK[0], -HALF_LENGTH, STEP), (side * WALK[0], HALF_LENGTH, STEP)), WALK[1])
         for name, side in (("right", 1.0), ("left", -1.0))
     )
 

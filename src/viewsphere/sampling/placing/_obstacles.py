@@ -12,8 +12,14 @@ Float = NDArray[np.float64]
 CELLS = 1024
 """Cells along the longer side of a grid: 1 cm for 10 m, as fine as gaps that recipes ask for."""
 
+FINE = 0.08
+"""Metres of the widest cell: a grid that reaches farther than 40 m has more cells, so that gaps between parked cars stay."""
+
+MOST_CELLS = 8192
+"""Most cells along a side, however far a layout reaches: 64 MiB while the grid is drawn."""
+
 REACH = 20.0
-"""Metres from the middle within which the mesh is looked at; things stand nearer."""
+"""Metres from the middle within which the mesh counts at least; a layout that reaches farther says so."""
 
 STEP = 0.02
 """Metres above the floor up to which a mesh is floor: carpets, sills and the slope of a floor that is nearly level."""
@@ -51,20 +57,23 @@ def _is_near(corners: Float, points: Float, gap: float) -> bool:
     return bool((beyond <= gap).all(axis=1).any())
 
 
-def obstacles(vertices: Float, triangles: NDArray[np.int32], height: float) -> Obstacles | None:
-    """The cells over which triangles (M, 3) of vertices (N, 3), in the floor's axes, stand between the floor and a height; None
-    where nothing does.
+def obstacles(
+    vertices: Float, triangles: NDArray[np.int32], height: float, reach: float = REACH, step: float = STEP
+) -> Obstacles | None:
+    """The cells over which triangles (M, 3) of vertices (N, 3), in the floor's axes, stand between the floor and a height, as
+    far as a layout reaches from the middle; None where nothing does. `step`: metres up to which a mesh is floor.
     """
     from PIL import Image, ImageDraw
 
     corners = vertices[triangles]
-    above = (corners[..., 2].max(axis=1) > STEP) & (corners[..., 2].min(axis=1) < height)
-    near = ((corners[..., :2].min(axis=1) <= REACH) & (corners[..., :2].max(axis=1) >= -REACH)).all(axis=1)
+    reach = max(reach, REACH)
+    above = (corners[..., 2].max(axis=1) > step) & (corners[..., 2].min(axis=1) < height)
+    near = ((corners[..., :2].min(axis=1) <= reach) & (corners[..., :2].max(axis=1) >= -reach)).all(axis=1)
     flat = corners[above & near][..., :2]
     if not len(flat):
         return None
-    low, high = (edge.clip(-2 * REACH, 2 * REACH) for edge in (flat.min(axis=(0, 1)), flat.max(axis=(0, 1))))
-    cell = max(float((high - low).max()) / CELLS, 1e-4)
+    low, high = (edge.clip(-2 * reach, 2 * reach) for edge in (flat.min(axis=(0, 1)), flat.max(axis=(0, 1))))
+    cell = _cell(float((high - low).max()))
     columns, rows = (int(n) + 3 for n in np.ceil((high - low) / cell))
     picture = Image.new("1", (columns, rows))
     draw = ImageDraw.Draw(picture)
@@ -73,3 +82,8 @@ def obstacles(vertices: Float, triangles: NDArray[np.int32], height: float) -> O
         draw.line([*polygon, *polygon[:2]], fill=1)  # a polygon's outline has holes where the triangle is upright
     filled = np.asarray(picture).T.copy()
     return None if (~filled).mean() < FREE else Obstacles(low - 1.5 * cell, cell, filled)
+
+
+def _cell(side: float) -> float:
+    """Metres of a cell of a grid with a longer side of this length."""
+    return max(side / CELLS if side <= CELLS * FINE else max(FINE, side / MOST_CELLS), 1e-4)

@@ -14,7 +14,7 @@ from viewsphere.model.scene import Matrix4
 from viewsphere.sampling.placing._footprint import Footprint, Outline, footprint
 from viewsphere.sampling.placing._obstacles import Obstacles
 from viewsphere.sampling.placing._shape import Shape
-from viewsphere.zoo.places import Lane
+from viewsphere.zoo.places import Bay, Lane
 
 Spot = tuple[float, float, float]
 """(x, y) on the floor, metres, and the azimuth that a front faces there, degrees."""
@@ -38,8 +38,9 @@ class Room:
     `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it; `clearance`: metres
     of air above, None where it has no end; `seen_from`: azimuth and elevation, degrees, of the camera, where one is known;
     `memory`: keeps what is simulated; `moves`: whether the ways of things to their places are needed, too; `built` gives the
-    parts of the place's mesh up to a height above the floor, `blocked` holds those for the things that are placed; `lanes`:
-    those of the place.
+    parts of the place's mesh up to a height above the floor, as far as a layout reaches, metres; `blocked` holds those for the
+    things that are placed; `lanes`,
+    `bays` and `pavements`: those of the place; `furniture` gives what stands on and beside them, of a zoo's place.
     """
 
     free: Footprint | None = None
@@ -52,16 +53,21 @@ class Room:
     seen_from: tuple[float, float] | None = None
     memory: Memory = forgetful
     moves: bool = False
-    built: Callable[[float], Obstacles | None] | None = None
+    built: Callable[[float, float], Obstacles | None] | None = None
     blocked: Obstacles | None = None
     lanes: tuple[Lane, ...] = ()
+    bays: tuple[Bay, ...] = ()
+    pavements: tuple[Lane, ...] = ()
+    furniture: Callable[[float, float], Obstacles | None] | None = None
 
-    def obstacles(self, shapes: Sequence[Shape]) -> Room:
-        """The same room with `blocked`: the parts of its place that are in the way of things of these shapes."""
+    def obstacles(self, shapes: Sequence[Shape], reach: float) -> Room:
+        """The same room with `blocked`: the parts of its place that are in the way of things of these shapes, up to `reach`
+        metres from the middle.
+        """
         if self.built is None or not shapes:
             return self
         highest = max(float(np.ptp(shape.box[:, 2])) for shape in shapes)
-        return replace(self, blocked=self.built(highest))
+        return replace(self, blocked=self.built(highest, reach))
 
     def is_clear(self, own: Footprint | Outline, others: Sequence[Any]) -> bool:
         """Return whether something that covers so much of the floor is clear of others and of the place, by the gap."""

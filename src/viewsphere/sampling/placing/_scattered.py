@@ -15,7 +15,7 @@ from viewsphere.geometry.hull import convex_hull
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
-from viewsphere.sampling.placing import Draws, Room, Shape, footprint, outline
+from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, footprint, outline
 from viewsphere.sampling.placing._spot import Cover
 
 Spot = Callable[[np.random.Generator, Room, NDArray[np.float64], Sequence[Any], Cover | None], Matrix4 | None]
@@ -32,12 +32,18 @@ class Gaps(Frozen):
 
 
 def scattered(
-    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Gaps, spot: Spot
+    cast: Sequence[ModelSpec],
+    room: Room,
+    shapes: Sequence[Shape],
+    rng: Draws,
+    options: Gaps,
+    spot: Spot,
+    floor: Footprint | None = None,
 ) -> Sequence[Matrix4]:
     """Poses, no two boxes, or hulls, nearer than the room's gap, and none nearer to the place's mesh; raises RecipeError where
-    no spot is found for one. Each member's draws are for its slot and its key.
+    no spot is found for one. Each member's draws are for its slot and its key. `floor`: where spots are; by default the room's.
     """
-    room = room.obstacles(shapes)
+    room = room.obstacles(shapes, _reach(floor, room, shapes))
     poses: list[Matrix4] = []
     of_hulls = options.between == "hulls"
     prints: list[Any] = [outline(shape.vertices(), pose) for shape, pose in room.taken] if of_hulls else list(room.prints)
@@ -52,6 +58,17 @@ def scattered(
         poses.append(pose)
         prints.append(cover(pose))
     return poses
+
+
+def _reach(floor: Footprint | None, room: Room, shapes: Sequence[Shape]) -> float:
+    """Metres from the middle to the farthest spot: the end of the floor, or, where that is nearer, twice the side of a square
+    that holds the models however they are turned.
+    """
+    widths = [float(np.linalg.norm((shape.box[4] - shape.box[2])[:2])) + room.gap for shape in shapes]
+    heap = 2 * float(np.linalg.norm(widths))
+    if floor is not None:
+        return float(np.abs(floor.corners).max())
+    return heap if room.free is None else min(heap, float(np.abs(room.free.corners).max()))
 
 
 def _seen_from_above(shape: Shape) -> NDArray[np.float64]:

@@ -54,7 +54,7 @@ def place(
     ) -> Matrix4 | None:
         return spread_spot(draws, room, floor, box, others, cover)
 
-    return scattered(cast, room, shapes, rng, options, spot)
+    return scattered(cast, room, shapes, rng, options, spot, floor)
 
 
 def _roomy(free: Footprint, shapes: Sequence[Shape]) -> Footprint:

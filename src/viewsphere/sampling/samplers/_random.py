@@ -128,6 +128,7 @@ def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxO
     built = None if stock.composition is None else stock.composition.built(subject, pose, redraw, world_from_room)
     again = redraw_names(redraw)
     names = ("scene", subject, *again) if pose is None else ("scene", subject, pose, *again)
+    roads = None if stand is not None else stock.composition
     room = Room(
         free,
         entry.gap,
@@ -138,7 +139,10 @@ def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxO
         memory=partial(stock.memory, remembered_as(entry, models, names)),
         moves=recipe.time is not None,
         built=built,
-        lanes=() if stock.composition is None or stand is not None else stock.composition.lanes(subject, pose, redraw),
+        lanes=roads.lanes(subject, pose, redraw) if roads else (),
+        bays=roads.bays(subject, pose, redraw) if roads else (),
+        pavements=roads.pavements(subject, pose, redraw) if roads else (),
+        furniture=roads.furniture(subject, pose, redraw) if roads else None,
     )
     rng = partial(generator, recipe.seed, "layout", subject, *again)
     return laid(entry.layout, entry.orientation, models, room, box_of, rng, world_from_room)

@@ -54,15 +54,42 @@ class Surface:
 
 
 @dataclass(frozen=True)
+class Bay:
+    """A space to park in: a frame whose origin is its middle, +Z up, -Y where a parked vehicle's front points, and its size
+    along the frame's x and y, metres.
+    """
+
+    world_from_bay: Matrix4
+    size: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Traffic:
+    """A place's own traffic: the share of its bays that are taken, None for the place's usual share, and the number of people
+    on its pavements. A place with roads lays it out: its module has `ROADS = True`, and `NAME_random(rng, traffic)`.
+    """
+
+    parked: float | None = None
+    walkers: int = 0
+
+
+USUAL = Traffic()
+"""The traffic of a place for which nothing else is asked."""
+
+
+@dataclass(frozen=True)
 class Place:
     """A layout, of which nothing is built yet. `free`: lowest x and y, highest x and y of the floor that is left to targets;
-    None where this floor has no end. `lanes`: where things may drive. `surfaces`: where things may stand above the floor.
+    None where this floor has no end. `lanes`: where things may drive. `bays`: where vehicles may park. `pavements`: where
+    people may walk, either way. `surfaces`: where things may stand above the floor.
     """
 
     pieces: tuple[PlacePiece, ...]
     free: tuple[float, float, float, float] | None = None
     lanes: tuple[Lane, ...] = ()
     surfaces: tuple[Surface, ...] = ()
+    bays: tuple[Bay, ...] = ()
+    pavements: tuple[Lane, ...] = ()
 
 
 def places() -> tuple[str, ...]:

@@ -10,13 +10,31 @@ from typing import Any
 import numpy as np
 
 from viewsphere import plugins
-from viewsphere.zoo import driveway, fence, hedge, house, street, tree
-from viewsphere.zoo.places import Place, PlacePiece, standing
+from viewsphere.model.scene import Matrix4
+from viewsphere.zoo import car, driveway, fence, hedge, house, street, tree
+from viewsphere.zoo.places import USUAL, Bay, Place, PlacePiece, Traffic, standing
+from viewsphere.zoo.townscape import street_life
 from viewsphere.zoo.townscape.plan import HALF_LENGTH, ROAD, STEP
 from viewsphere.zoo.townscape.plots import Plot, allotted
 
 VERGE, PAVEMENT, GARDEN = 4.2, 5.95, 6.36
 """x of the middle of the verge, where lamp posts stand; of benches on the pavement; of the gardens' edge; metres."""
+
+ROADS = True
+
+PARKED = 0.0
+"""Usual share of the driveways with a car."""
+
+BAY = (2.3, 5.8)
+"""Width and length of a space to park in on a driveway, metres."""
+
+APART = 1.7
+"""Metres between a house's front, over which its eaves reach, and that space."""
+
+WIDE = {"bench": 1.1, "driveway": 0.0}
+"""Metres that a piece takes around its middle where that is more than `SLIM`; trees take their crowns."""
+
+SLIM = 0.5
 
 FAR = 65.0
 """Distance along the street, metres, beyond which plots have no shrubs, bins and trees behind the house."""
@@ -28,7 +46,8 @@ class Neighbourhood:
 
     houses: designs with the garage on the right, without one, with it on the left; trees: designs; lamp_spacing: between lamp
     posts of one side; lamp: y of the right one nearest to the origin, mirrored on the left; greenery: share of plots with a
-    tree before the house; bounded: share with a hedge or fence before it; clear: distance from the origin that trees keep.
+    tree before the house; bounded: share with a hedge or fence before it; clear: distance from the origin that trees keep;
+    traffic: cars on driveways and people on the pavements.
     """
 
     seed: int = 0
@@ -39,6 +58,7 @@ class Neighbourhood:
     greenery: float = 0.65
     bounded: float = 0.6
     clear: float = 15.5
+    traffic: Traffic = USUAL
 
 
 @dataclass(frozen=True)
@@ -52,11 +72,16 @@ class _Stand:
     turn: float = 0.0
     z: float = STEP
 
+    @property
+    def world_from_piece(self) -> Matrix4:
+        """Where it stands."""
+        return standing(self.x, self.y, self.turn, self.z)
+
 
 def neighbourhood(parameters: Neighbourhood | None = None) -> Place:
     """The street along Y with all that stands beside it; the origin is on the middle of the road, free for 9 m each way."""
     p = parameters or Neighbourhood()
-    design, lots, lamps, bounds, green, props = np.random.default_rng(p.seed).spawn(6)
+    design, lots, lamps, bounds, green, props, life = np.random.default_rng(p.seed).spawn(7)
     road, land = _designs(design, "street", 1)[0], _designs(design, "landscape", 1)[0]
     plan = street.draw(np.random.default_rng(road))
     plots = _plots(p, plan, design, lots)
@@ -68,10 +93,13 @@ def neighbourhood(parameters: Neighbourhood | None = None) -> Place:
     stands += _trees(p, plots, green)
     stands += _shrubs(plots, green)
     stands += _furniture(plan, plots, props)
-    return Place(_named(stands), free=(-ROAD, -HALF_LENGTH, ROAD, HALF_LENGTH), lanes=street.lanes())
+    bays, pavements = _bays(plots, stands), street.pavements()
+    pieces = _named([(s.family, s.seed, s.world_from_piece) for s in stands] + _traffic(p.traffic, bays, stands, life))
+    free = (-ROAD, -HALF_LENGTH, ROAD, HALF_LENGTH)
+    return Place(pieces, free=free, lanes=street.lanes(), bays=bays, pavements=pavements)
 
 
-def neighbourhood_random(rng: np.random.Generator) -> Place:
+def neighbourhood_random(rng: np.random.Generator, traffic: Traffic = USUAL) -> Place:
     """A neighbourhood with all parameters drawn."""
     return neighbourhood(
         Neighbourhood(
@@ -80,19 +108,61 @@ def neighbourhood_random(rng: np.random.Generator) -> Place:
             lamp=float(rng.uniform(1.7, 2.4)),
             greenery=float(rng.uniform(0.5, 0.75)),
             bounded=float(rng.uniform(0.4, 0.75)),
+            traffic=traffic,
         )
     )
 
 
-def _named(stands: Sequence[_Stand]) -> tuple[PlacePiece, ...]:
+def _named(stands: Iterable[tuple[str, int, Matrix4]]) -> tuple[PlacePiece, ...]:
     """Pieces named by family and number."""
     count: Counter[str] = Counter()
     pieces: list[PlacePiece] = []
-    for s in stands:
-        count[s.family] += 1
-        name = f"{s.family}_{count[s.family]}"
-        pieces.append(PlacePiece(name, s.family, s.seed, s.family, standing(s.x, s.y, s.turn, s.z)))
+    for family, seed, world_from_piece in stands:
+        count[family] += 1
+        pieces.append(PlacePiece(f"{family}_{count[family]}", family, seed, family, world_from_piece))
     return tuple(pieces)
+
+
+def _bays(plots: Sequence[Plot], stands: Sequence[_Stand]) -> tuple[Bay, ...]:
+    """A space to park in on each driveway that no tree grows over, before the garage, headed to it."""
+    trees = [(s.x, s.y, _around(s)) for s in stands if s.family == "tree"]
+    width, length = BAY
+    found: list[Bay] = []
+    for q in plots:
+        x, y = q.side * (q.front - APART - length / 2), q.driveway
+        if all(np.hypot(max(abs(x - a) - length / 2, 0), max(abs(y - b) - width / 2, 0)) > r for a, b, r in trees):
+            found.append(Bay(standing(x, y, (q.turn + 180.0) % 360.0, STEP + driveway.TOP), BAY))
+    return tuple(found)
+
+
+def _around(stand: _Stand) -> float:
+    """Metres that a thing takes around its middle."""
+    if stand.family == "tree":
+        return tree.draw(np.random.default_rng(stand.seed)).crown / 2
+    return WIDE.get(stand.family, SLIM)
+
+
+def _traffic(
+    traffic: Traffic, bays: Sequence[Bay], stands: Sequence[_Stand], rng: np.random.Generator
+) -> list[tuple[str, int, Matrix4]]:
+    """Cars on driveways, and people on the pavements."""
+    share = PARKED if traffic.parked is None else traffic.parked
+    if not share and not traffic.walkers:
+        return []
+    cars, people, spots, walks = rng.spawn(4)
+    pool = {s: car.draw(np.random.default_rng(s)) for s in _designs(cars, "car", 7)}
+    walking = _designs(people, "person", 6, lambda p: p.walks)
+
+    def design() -> tuple[int, car.Car]:
+        seed = int(rng.choice([*pool]))
+        return seed, pool[seed]
+
+    others = [(s.x, s.y, _around(s)) for s in stands[2:]]
+    taken = [("car", seed, at) for seed, at in street_life.parked(spots, bays, share, design)]
+    return taken + [
+        ("person", int(rng.choice(walking)), at)
+        for at in street_life.walkers(walks, street.pavements(), traffic.walkers, others)
+    ]
 
 
 def _designs(rng: np.random.Generator, family: str, count: int, wanted: Callable[[Any], bool] = lambda p: True) -> list[int]:

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from viewsphere import plugins
-from viewsphere.zoo.places import Place, PlacePiece, standing
+from viewsphere.model.scene import Matrix4
+from viewsphere.zoo.places import USUAL, Bay, Lane, Place, PlacePiece, Traffic, standing
 from viewsphere.zoo.town_ground import TownGround
-from viewsphere.zoo.townscape import blocks
+from viewsphere.zoo.townscape import blocks, street_life
 from viewsphere.zoo.townscape.blocks import CORNER, HALF, LANE, PAVED, Block
 from viewsphere.zoo.townscape.plan import STEP
 
-DESIGNS = {"car": 9, "tree": 6, "shop": 12, "house": 6, "bench": 2, "wheelie_bin": 2, "shrub": 3}
+DESIGNS = {"car": 9, "person": 8, "tree": 6, "shop": 12, "house": 6, "bench": 2, "wheelie_bin": 2, "shrub": 3}
 """How many members of a family a town has, of which it places many; of all others there is one."""
 
 KINDS: dict[str, Callable[[Any], bool]] = {
@@ -26,11 +27,19 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "low": lambda hedge: hedge.height < 1.3,
     "small": lambda tree: tree.crown < 4.2 and tree.height < 7,
     "backed": lambda bench: bench.backrest,
+    "walking": lambda person: person.walks,
 }
 """Which members of a family are of a kind."""
 
+ROADS = True
+
 PARKED = 0.4
-"""Share of the spaces to park in that are taken."""
+"""Usual share of the spaces to park in that are taken."""
+
+WIDE = {"bench": 1.1, "tree": 2.2}
+"""Metres that furniture takes around its middle where that is more than `SLIM`; small trees with their crowns."""
+
+SLIM = 0.4
 
 
 @dataclass(frozen=True)
@@ -87,9 +96,13 @@ class _Town:
 
     def put(self, family: str, seed: int, x: float, y: float, turn: float = 0.0, z: float = STEP) -> None:
         """A piece where it stands."""
+        self.put_at(family, seed, standing(x, y, turn % 360, z))
+
+    def put_at(self, family: str, seed: int, world_from_piece: Matrix4) -> None:
+        """A piece in its frame."""
         self.count[family] += 1
         name = f"{family}_{self.count[family]}"
-        self.pieces.append(PlacePiece(name, family, seed, family.replace("_", " "), standing(x, y, turn % 360, z)))
+        self.pieces.append(PlacePiece(name, family, seed, family.replace("_", " "), world_from_piece))
 
     def stand(
         self, family: str, side: Frontage, along: float, inset: float, turn: float = 0.0, kind: str = "", **of: Any
@@ -99,7 +112,7 @@ class _Town:
         self.put(family, seed, *side.at(along, inset), side.turn_deg + turn)
 
 
-def town(seed: int = 0) -> Place:
+def town(seed: int = 0, traffic: Traffic = USUAL) -> Place:
     """The town of this seed; the roads are z = 0, the origin is on the middle of a road between two junctions."""
     rng = np.random.default_rng(seed)
     own = int(rng.integers(1 << 31))
@@ -112,15 +125,17 @@ def town(seed: int = 0) -> Place:
         for side in frontages(block):
             _pavement(made, side)
     _corners(made, ground)
-    _parked(made, ground)
+    bays, pavements = tuple(blocks.bays(ground.x, ground.y)), blocks.pavements(ground.x, ground.y)
+    _traffic(made, traffic, bays, pavements)
     y = min(y for y in ground.y if y > 0) - HALF - CORNER - blocks.ZEBRA[1]
     free = (-LANE, -y, LANE, y)
-    return Place(tuple(made.pieces), free=free, lanes=blocks.lanes(ground.x, ground.y))
+    lanes = blocks.lanes(ground.x, ground.y)
+    return Place(tuple(made.pieces), free=free, lanes=lanes, bays=bays, pavements=pavements)
 
 
-def town_random(rng: np.random.Generator) -> Place:
+def town_random(rng: np.random.Generator, traffic: Traffic = USUAL) -> Place:
     """A town with all parameters drawn."""
-    return town(int(rng.integers(1 << 31)))
+    return town(int(rng.integers(1 << 31)), traffic)
 
 
 def _shops(t: _Town, block: Block) -> None:
@@ -209,21 +224,27 @@ def _corners(t: _Town, ground: TownGround) -> None:
                 t.stand("traffic_light", side, side.length - CORNER - 0.6, 0.6, 90.0)
 
 
-def _parked(t: _Town, ground: TownGround) -> None:
-    """Cars in some of the spaces, not in those beside the free stretch of the road."""
-    for x, y, turn in blocks.parking(ground.x, ground.y):
-        if t.rng.random() < PARKED and math.hypot(x, y) > 10:
-            offset = t.rng.normal(0, (0.08, 0.25))
-            seed, _ = t.drawn("car")
-            c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
-            t.put(
-                "car",
-                seed,
-                x + c * float(offset[0]) - s * float(offset[1]),
-                y + s * float(offset[0]) + c * float(offset[1]),
-                turn,
-                0.0,
-            )
+def _traffic(t: _Town, traffic: Traffic, bays: Sequence[Bay], pavements: Sequence[Lane]) -> None:
+    """Cars in some of the bays, and people on the pavements."""
+    share = PARKED if traffic.parked is None else traffic.parked
+    for seed, at in street_life.parked(t.rng, bays, share, lambda: t.drawn("car"), _crowns(t)):
+        t.put_at("car", seed, at)
+    others = [(*_spot(piece), WIDE.get(piece.family, SLIM)) for piece in t.pieces]
+    for at in street_life.walkers(t.rng, pavements, traffic.walkers, others):
+        t.put_at("person", t.drawn("person", "walking")[0], at)
+
+
+def _crowns(t: _Town) -> list[street_life.Crown]:
+    """The crowns of all trees."""
+    draw = plugins.family("tree").draw
+    known = {piece.seed: draw(np.random.default_rng(piece.seed)) for piece in t.pieces if piece.family == "tree"}
+    trees = [(_spot(piece), known[piece.seed]) for piece in t.pieces if piece.family == "tree"]
+    return [(x, y, p.crown / 2, p.clear + STEP) for (x, y), p in trees]
+
+
+def _spot(piece: PlacePiece) -> tuple[float, float]:
+    """x and y of a piece."""
+    return piece.world_from_piece[0][3], piece.world_from_piece[1][3]
 
 
 def _spread(length: float, pitch: float, margin: float) -> Iterator[float]:

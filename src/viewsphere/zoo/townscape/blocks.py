@@ -12,7 +12,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from viewsphere.assets.mesh import Material
-from viewsphere.zoo.places import Lane
+from viewsphere.zoo.places import Bay, Lane, standing
 from viewsphere.zoo.shapes.assembly import Piece
 from viewsphere.zoo.shapes.solids import Float, Solid, fan, flipped, grid, join
 from viewsphere.zoo.townscape.paving import ASPHALT, GRASS, PAINT, PAVING, STONE
@@ -44,6 +44,9 @@ ZEBRA = (1.6, 4.4)
 
 SPACE = 5.8
 """Length of a space to park in."""
+
+WALK = (1.4, 0.5)
+"""Metres from the kerb to the middle of the way that people take, between lamp posts and benches, and its width."""
 
 
 @dataclass(frozen=True)
@@ -179,15 +182,28 @@ def spaces(start: float, stop: float) -> Iterator[tuple[int, float]]:
         yield from ((side, first + k * SPACE) for k in range(count))
 
 
-def parking(x: Sequence[float], y: Sequence[float]) -> Iterator[tuple[float, float, float]]:
-    """Every space to park in: x, y, and how far a car that stands there as it would drive on the right is turned, degrees."""
+def bays(x: Sequence[float], y: Sequence[float]) -> Iterator[Bay]:
+    """Every space to park in, headed as a car that drives on the right."""
     for axis, at, start, stop in _stretches(x, y):
         for side, place in spaces(start, stop):
             off = at + side * (LANE + BAY / 2)
             if axis == 0:
-                yield place, off, 90.0 if side < 0 else 270.0
+                yield Bay(standing(place, off, 90.0 if side < 0 else 270.0), (BAY, SPACE))
             else:
-                yield off, place, 180.0 if side > 0 else 0.0
+                yield Bay(standing(off, place, 180.0 if side > 0 else 0.0), (BAY, SPACE))
+
+
+def pavements(x: Sequence[float], y: Sequence[float]) -> tuple[Lane, ...]:
+    """The way that people take around every block."""
+    inset, width = WALK
+    return tuple(
+        Lane(f"pavement_{block.column + 1}_{block.row + 1}", _points(ring(block, inset, 6), STEP), width, closed=True)
+        for block in blocks(x, y)
+    )
+
+
+def _points(line: Float, z: float) -> tuple[tuple[float, float, float], ...]:
+    return tuple((float(a), float(b), z) for a, b in line)
 
 
 def lanes(x: Sequence[float], y: Sequence[float]) -> tuple[Lane, ...]:
@@ -197,8 +213,7 @@ def lanes(x: Sequence[float], y: Sequence[float]) -> tuple[Lane, ...]:
     found: list[Lane] = []
     for block in blocks(x, y):
         path = ring(block, -(BAY + LANE / 2), 6)[::-1]
-        points = tuple((float(a), float(b), 0.0) for a, b in path)
-        found.append(Lane(f"block_{block.column + 1}_{block.row + 1}", points, LANE, closed=True))
+        found.append(Lane(f"block_{block.column + 1}_{block.row + 1}", _points(path, 0.0), LANE, closed=True))
     for number, at in enumerate(x, 1):
         for name, side in (("up", 1), ("down", -1)):
             off, ends = at + side * LANE / 2, (y[0], y[-1])[::side]
