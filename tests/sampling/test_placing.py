@@ -21,7 +21,8 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling import placing
-from viewsphere.sampling.placing import Room, Shape, footprint, standing
+from viewsphere.sampling.placing import Footprint, Room, Shape, checked, footprint, standing
+from viewsphere.sampling.placing._footprint import first_crowded
 from viewsphere.sampling.plan import plan
 from viewsphere.sampling.seeds import generator
 from viewsphere.zoo import build_zoo_model
@@ -115,6 +116,57 @@ def test_apart_never_says_more_than_there_is(one, other):
         assert not prints[0].apart(prints[1], 1e-6)
     elif there > 1e-6:
         assert prints[0].apart(prints[1], 0.0) and prints[1].apart(prints[0], 0.0)
+
+
+def all_pairs(prints, gap, start):
+    """The first two that are not apart by separating sides, computed with matrices, and how near the question was."""
+    for i in range(start, len(prints)):
+        for j in range(i):
+            one, two = prints[i], prints[j]
+            separations = [
+                abs(float((two.center - one.center) @ axis)) - sum(float(np.abs(p.axes @ axis) @ p.half) for p in (one, two))
+                for axis in (*one.axes, *two.axes)
+            ]
+            assert one.apart(two, gap) == two.apart(one, gap) == (max(separations) >= gap - 1e-9)
+            if not one.apart(two, gap):
+                return i, j
+    return None
+
+
+floor_prints = st.lists(
+    st.tuples(st.floats(0.01, 9), st.floats(0.01, 9), *[st.floats(-30, 30)] * 2, st.floats(0, 360)), min_size=0, max_size=14
+)
+
+
+@given(floor_prints, st.floats(0, 3), st.integers(0, 3))
+def test_a_sweep_finds_the_pair_that_a_look_at_all_pairs_finds(measures, gap, start):
+    prints = [footprint(box(w, n), standing(box(w, n), x, y, turn)) for w, n, x, y, turn in measures]
+    assert first_crowded(prints, gap, start) == all_pairs(prints, gap, start)
+
+
+@pytest.mark.parametrize("step", [1.25, 1.25 - 1e-8, 1.25 - 1e-10])
+def test_a_sweep_of_a_thousand_cells_compares_neighbours_alone(step, monkeypatch):
+    compared = []
+    apart = Footprint.apart
+    monkeypatch.setattr(Footprint, "apart", lambda one, two, gap: compared.append(two) or apart(one, two, gap))
+    cells = itertools.product(range(40), range(25))
+    prints = [footprint(box(1, 1), standing(box(1, 1), step * x, step * y)) for x, y in cells]
+    assert first_crowded(prints, 0.25) == (None if step > 1.25 - 1e-9 else (1, 0))
+    assert len(compared) < 10_000  # of 499,500
+
+
+def test_the_first_mistake_is_told_of_crowds_and_of_floors():
+    free = Footprint(np.zeros(2), np.eye(2), np.array([3.0, 3.0]))
+    boxes, cast = [Shape(box(1, 1), lambda: box(1, 1))] * 4, [spec(f"m{i}") for i in range(4)]
+    inside, near, beyond = (standing(box(1, 1), x) for x in (0.0, 0.5, 9.0))
+    for poses, said in (
+        ([inside, beyond, near, inside], "found m1 beyond"),
+        ([inside, near, beyond], "found m1 and m0 nearer"),
+    ):
+        with pytest.raises(RecipeError, match=said):
+            checked(cast[: len(poses)], Room(free=free), boxes[: len(poses)], poses)
+    poses = [inside, standing(box(1, 1), 1.0)]
+    assert checked(cast[:2], Room(free=free), boxes[:2], poses) is poses
 
 
 def test_a_row_is_side_by_side_at_the_gap_right_and_left_in_turn():

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,24 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.scene import Matrix4
 
 Float = NDArray[np.float64]
+
+
+FAR = 2.000001  # a little above 2, as radii are rounded
+"""Circles around two rectangles that are sqrt(2) times as far apart as they reach, and a gap, are separated by it along a side:
+the sides of a rectangle are at right angles, so that one of them is within 45 degrees of every direction."""
+
+
+@dataclass(frozen=True)
+class Sides:
+    """A footprint as plain numbers, which compare six times as fast as arrays: centre, radius of the circle around it, axes,
+    half sizes.
+    """
+
+    x: float
+    y: float
+    radius: float
+    axes: tuple[tuple[float, float], tuple[float, float]]
+    half: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +45,24 @@ class Footprint:
 
     def apart(self, other: Footprint, gap: float) -> bool:
         """Whether a side of one of the two separates them by at least `gap`: then nothing of them is nearer than that."""
-        between = other.center - self.center
-        for axis in (*self.axes, *other.axes):
-            reach = sum(float(np.abs(f.axes @ axis) @ f.half) for f in (self, other))
-            if abs(float(between @ axis)) - reach >= gap - 1e-9:
+        one, two = self.sides, other.sides
+        (dx, dy), reach = (two.x - one.x, two.y - one.y), one.radius + two.radius + gap
+        if dx * dx + dy * dy >= FAR * reach * reach:
+            return True
+        for ux, uy in (*one.axes, *two.axes):
+            extent = 0.0
+            for print_ in (one, two):
+                (ax, ay), (bx, by) = print_.axes
+                extent += abs(ax * ux + ay * uy) * print_.half[0] + abs(bx * ux + by * uy) * print_.half[1]
+            if abs(dx * ux + dy * uy) - extent >= gap - 1e-9:
                 return True
         return False
+
+    @cached_property
+    def sides(self) -> Sides:
+        (ax, ay), (bx, by) = self.axes.tolist()
+        (x, y), (h, k) = self.center.tolist(), self.half.tolist()
+        return Sides(x, y, math.hypot(h, k), ((ax, ay), (bx, by)), (h, k))
 
     def contains(self, other: Footprint | Outline) -> bool:
         """Whether all of the other lies in this one."""
@@ -59,6 +91,26 @@ class Outline:
             if between.max() >= gap - 1e-9:
                 return True
         return False
+
+
+def first_crowded(prints: Sequence[Footprint], gap: float, start: int = 0) -> tuple[int, int] | None:
+    """The first two that are not `apart` by a gap: (i, j), j < i, start <= i, the smallest i and then j; None where all are.
+
+    A sweep along the longer axis of all: only those whose circles meet along it are compared.
+    """
+    if len(prints) < 2:
+        return None
+    x, y, radius = np.array([(p.sides.x, p.sides.y, p.sides.radius) for p in prints]).T
+    along = x if np.ptp(x) >= np.ptp(y) else y
+    reach = math.sqrt(FAR) * (radius + gap / 2)
+    order = np.argsort(along - reach, kind="stable")
+    ends = np.searchsorted((along - reach)[order], (along + reach)[order], side="right")
+    found: list[tuple[int, int]] = []
+    for place, (i, end) in enumerate(zip(order.tolist(), ends.tolist(), strict=True)):
+        others = order[place + 1 : end]
+        near = others[np.hypot(x[others] - x[i], y[others] - y[i]) <= reach[others] + reach[i]].tolist()
+        found += [(max(i, j), min(i, j)) for j in near if max(i, j) >= start and not prints[i].apart(prints[j], gap)]
+    return min(found, default=None)
 
 
 def outline(points: Float, world_from_object: Matrix4) -> Outline:

@@ -11,7 +11,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
-from viewsphere.sampling.placing._footprint import Footprint, Outline, footprint
+from viewsphere.sampling.placing._footprint import Footprint, Outline, first_crowded, footprint
 from viewsphere.sampling.placing._obstacles import Obstacles
 from viewsphere.sampling.placing._shape import Shape
 from viewsphere.zoo.places import Bay, Lane
@@ -89,15 +89,16 @@ def checked(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], pose
     """
     names = ["the model that it joins"] * len(room.taken) + [spec.key for spec in cast]
     prints = [*room.prints, *(footprint(shape.box, pose) for shape, pose in zip(shapes, poses, strict=True))]
-    for i in range(len(room.taken), len(prints)):
-        for j in range(i):
-            if not prints[i].apart(prints[j], room.gap):
-                raise RecipeError(
-                    f"{room.field}.layout: expected {room.gap:g} m between all models; found {names[i]} and {names[j]} "
-                    "nearer or in one another: move them, or use layout: scatter"
-                )
-        if room.free and not room.free.contains(prints[i]):
-            raise RecipeError(
-                f"{room.field}.layout: expected all models in the free part of the place; found {names[i]} beyond it"
-            )
+    crowded = first_crowded(prints, room.gap, len(room.taken))
+    beyond = next((i for i in range(len(room.taken), len(prints)) if room.free and not room.free.contains(prints[i])), None)
+    if crowded is not None and (beyond is None or crowded[0] <= beyond):
+        i, j = crowded
+        raise RecipeError(
+            f"{room.field}.layout: expected {room.gap:g} m between all models; found {names[i]} and {names[j]} "
+            "nearer or in one another: move them, or use layout: scatter"
+        )
+    if beyond is not None:
+        raise RecipeError(
+            f"{room.field}.layout: expected all models in the free part of the place; found {names[beyond]} beyond it"
+        )
     return poses
