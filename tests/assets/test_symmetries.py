@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import time
 
 import numpy as np
 import pytest
@@ -285,3 +286,42 @@ def test_rotations_of_inexact_shapes_are_a_group(seed):
     found = find(shape)
     assert found.continuous or (found.unlisted() is None and is_group(group_of(found)))
     assert not list(lacking(shape, found))
+
+
+def noisy_ball(noise, rings=160, sectors=158):
+    """A ball of two triangles for each of its quads, each of whose vertices is off by a share of the radius."""
+    along, around = np.linspace(0, math.pi, rings + 1)[:, None], np.arange(sectors) * (2 * math.pi / sectors)
+    points = np.stack([np.sin(along) * np.cos(around), np.sin(along) * np.sin(around), np.cos(along) + 0 * around], axis=-1)
+    vertices = points.reshape(-1, 3) * (1 + noise * np.random.default_rng(0).standard_normal((points[..., 0].size, 1)))
+    row = np.arange(rings * sectors).reshape(rings, sectors)
+    right = np.roll(row, -1, axis=1)
+    quads = np.stack([row, row + sectors, right, right, row + sectors, right + sectors], axis=-1)
+    return trimesh.Trimesh(vertices, quads.reshape(-1, 3), process=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [1e-3, 3e-3, 5e-3, 7e-3, 1e-2, 3e-2])
+def test_nearly_round_surfaces_take_a_bounded_time(noise):
+    """Of 50,000 triangles: at most 3 CPU-seconds on the machine where this was measured, and a group of true symmetries."""
+    shape = surface(noisy_ball(noise))
+    begun = time.process_time()
+    found = find(shape)
+    assert time.process_time() - begun < 10
+    assert bool(found.continuous) == (noise < 4e-3) and is_group(group_of(found))
+    assert not list(lacking(shape, found))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("height", [0.05, 0.1])
+@pytest.mark.parametrize(
+    ("solid_of", "count"), [(solid.icosahedron, 59), (lambda: solid.box((1, 1, 1)), 23), (tetrahedron, 11)]
+)
+def test_a_ball_with_bumps_has_the_rotations_of_the_solid_that_these_are_at(solid_of, count, height):
+    """All moments are alike, and the ball between the bumps has every turn."""
+    mesh = solid.icosphere(4)
+    places = solid_of().vertices / np.linalg.norm(solid_of().vertices, axis=1)[:, None]
+    mesh.vertices *= 1 + height * np.exp(-(1 - (mesh.vertices @ places.T).max(axis=1, keepdims=True)) / 0.06)
+    shape = surface(mesh)
+    found = find(shape)
+    assert is_group(group_of(found)) and not list(lacking(shape, found))
+    assert len(found.discrete) == count

@@ -88,27 +88,112 @@ def _moved(m, p):
 
 @inner
 def _nearest(x, y, z, grid, limit, enough):
-    """The square of the distance to the nearest triangle within `limit` (infinity without one), which triangle that is, and
-    the point there; the first triangle within `enough` will do.
+    """The square of the distance to the nearest triangle within `limit` (infinity without one), its number, and the point
+    there; stops at the first triangle within `enough`.
+
+    Reads the point's own cell first: its nearest triangle bounds the search of the other cells.
     """
-    best, triangle, fx, fy, fz = math.inf, 0, x, y, z
-    corners, starts, members, low, cell, (width, depth, height) = grid
-    i0, i1 = _between(x - limit, x + limit, low[0], cell, width)
-    j0, j1 = _between(y - limit, y + limit, low[1], cell, depth)
-    k0, k1 = _between(z - limit, z + limit, low[2], cell, height)
+    low, cell, (width, depth, height) = grid[3], grid[4], grid[5]
+    i, j, k = _place(x, low[0], cell, width), _place(y, low[1], cell, depth), _place(z, low[2], cell, height)
+    own = (i * depth + j) * height + k
+    best = _in_cell(x, y, z, grid, own, enough, (limit * limit, -1, x, y, z))
+    reach = math.sqrt(best[0])
+    if best[1] < 0 or reach > enough:
+        best = _in_cells(x, y, z, grid, own, reach, enough, best)
+    return (math.inf, 0, x, y, z) if best[1] < 0 else best
+
+
+@inner
+def _place(x, start, cell, count):
+    """The cell of a row that a coordinate lies in, or the nearest one."""
+    return min(max(math.floor((x - start) / cell), 0), count - 1)
+
+
+@inner
+def _in_cells(x, y, z, grid, own, reach, enough, best):
+    """The better of `best` and the nearest triangle in the cells within `reach`, except the cell `own`."""
+    low, cell, (width, depth, height) = grid[3], grid[4], grid[5]
+    i0, i1 = _between(x - reach, x + reach, low[0], cell, width)
+    j0, j1 = _between(y - reach, y + reach, low[1], cell, depth)
+    k0, k1 = _between(z - reach, z + reach, low[2], cell, height)
     for i in range(i0, i1):
+        dx = _gap(x, low[0] + i * cell, cell)
         for j in range(j0, j1):
+            dy = dx + _gap(y, low[1] + j * cell, cell)
+            if dy > best[0]:
+                continue
             for k in range(k0, k1):
                 number = (i * depth + j) * height + k
-                for place in range(starts[number], starts[number + 1]):
-                    t = members[place]
-                    qx, qy, qz = _on_triangle(corners[t], x, y, z)
-                    square = (x - qx) * (x - qx) + (y - qy) * (y - qy) + (z - qz) * (z - qz)
-                    if square < best and square <= limit * limit:
-                        best, triangle, fx, fy, fz = square, t, qx, qy, qz
-                        if square <= enough * enough:
-                            return best, triangle, fx, fy, fz
-    return best, triangle, fx, fy, fz
+                if number != own and dy + _gap(z, low[2] + k * cell, cell) <= best[0]:
+                    best = _in_cell(x, y, z, grid, number, enough, best)
+                    if best[1] >= 0 and best[0] <= enough * enough:
+                        return best
+    return best
+
+
+@inner
+def _gap(x, start, cell):
+    """The square of a coordinate's distance from a cell's range."""
+    gap = max(start - x, x - start - cell, 0.0)
+    return gap * gap
+
+
+@inner
+def _in_cell(x, y, z, grid, number, enough, best):
+    """The better of `best` and the nearest triangle of a cell: the square of the distance, the triangle, the point there."""
+    corners, starts, members = grid[0], grid[1], grid[2]
+    for place in range(starts[number], starts[number + 1]):
+        t = members[place]
+        qx, qy, qz = _on_triangle(corners[t], x, y, z)
+        square = (x - qx) * (x - qx) + (y - qy) * (y - qy) + (z - qz) * (z - qz)
+        if square < best[0] or (square == best[0] and best[1] < 0):
+            best = square, t, qx, qy, qz
+            if square <= enough * enough:
+                return best
+    return best
+
+
+@njit
+def into_field(grid, low, step, limit, field):
+    """Write the distances of points (X, Y, Z), `step` apart from `low` on, from the nearest triangle: `limit` beyond it."""
+    for i in range(field.shape[0]):
+        for j in range(field.shape[1]):
+            for k in range(field.shape[2]):
+                square = _nearest(low[0] + i * step, low[1] + j * step, low[2] + k * step, grid, limit, 0.0)[0]
+                field[i, j, k] = min(math.sqrt(square), limit)
+
+
+@njit
+def field_misfits(points, motions, field, low, step, most, found):
+    """For each motion (M, 3, 4) the sum of squares of the distances that a field gives moved points; infinity where one of them
+    is more than `most`.
+    """
+    width, depth, height = field.shape
+    for m in range(len(motions)):
+        total = 0.0
+        for p in range(len(points)):
+            x, y, z = _moved(motions[m], points[p])
+            u, v, w = (x - low[0]) / step, (y - low[1]) / step, (z - low[2]) / step
+            i, j, k = math.floor(u), math.floor(v), math.floor(w)
+            if min(i, j, k) < 0 or i > width - 2 or j > depth - 2 or k > height - 2:
+                total = math.inf
+                break
+            distance = _between_nodes(field, i, j, k, u - i, v - j, w - k)
+            if distance > most:
+                total = math.inf
+                break
+            total += distance * distance
+        found[m] = total
+
+
+@inner
+def _between_nodes(field, i, j, k, u, v, w):
+    """The trilinear value of a field at (i + u, j + v, k + w)."""
+    a = (field[i, j, k] * (1 - w) + field[i, j, k + 1] * w) * (1 - v)
+    a += (field[i, j + 1, k] * (1 - w) + field[i, j + 1, k + 1] * w) * v
+    b = (field[i + 1, j, k] * (1 - w) + field[i + 1, j, k + 1] * w) * (1 - v)
+    b += (field[i + 1, j + 1, k] * (1 - w) + field[i + 1, j + 1, k + 1] * w) * v
+    return a * (1 - u) + b * u
 
 
 @inner

@@ -24,6 +24,26 @@ FINEST = 64
 
 
 @dataclass(frozen=True, eq=False)
+class DistanceField:
+    """Distances from a surface (X, Y, Z) float32 at nodes `step` metres apart from `start` on, those up to `most` at least."""
+
+    nodes: NDArray[np.float32]
+    start: Float
+    step: float
+    most: float
+
+    def misfits(self, motions: Float, points: Float) -> Float:
+        """For each motion (M, 4, 4) about the sum of squares of the distances of moved points (N, 3) from the surface; infinite
+        only where a point is farther than the field's limit. Costs the same for any number of triangles.
+        """
+        from viewsphere.assets.kernels_near import field_misfits
+
+        sums = np.zeros(len(motions))
+        field_misfits(points, np.ascontiguousarray(motions[:, :3]), self.nodes, self.start, self.step, self.most, sums)
+        return sums
+
+
+@dataclass(frozen=True, eq=False)
 class Surface:
     """Triangles with some area, by their corners (T, 3, 3) float64, metres in the object's axes."""
 
@@ -102,6 +122,18 @@ class Surface:
         found = np.zeros((len(points), 7))
         closest(points, np.ascontiguousarray(motion[:3]), self._grid, limit, found)
         return found[:, 0], found[:, 1:4], found[:, 4:]
+
+    def field(self, limit: float) -> DistanceField:
+        """A field of the distances from the surface, for points within `limit` of it."""
+        from viewsphere.assets.kernels_near import into_field
+
+        low, step, sides = self._grid[3:]
+        most = limit + step  # between nodes, the distances are off by less than the half diagonal of a cell
+        margin = math.ceil(most / step) + 1
+        start = low - margin * step
+        nodes = np.zeros([side + 2 * margin + 1 for side in sides], np.float32)
+        into_field(self._grid, start, step, 1.01 * most, nodes)
+        return DistanceField(nodes, start, step, most)
 
     @cached_property
     def _grid(self) -> tuple[Any, ...]:

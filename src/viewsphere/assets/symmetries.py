@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewsphere.assets.surface import Surface
+from viewsphere.assets.surface import DistanceField, Surface
 from viewsphere.geometry.rotation import product, rotation_about, transform
 from viewsphere.geometry.rotation_group import largest_group
 from viewsphere.model.scene import Matrix4, Vector
@@ -28,8 +29,11 @@ TOLERANCE = 0.01
 ORDERS = tuple(range(2, 17))
 """How often a turn may be repeated until the model is as it was. A prism of more sides is round, as far as `TOLERANCE` goes."""
 
-PRIMES = (13, 11, 7, 5, 3, 2)
-"""An axis of any of these orders has a turn of one of these, which is what is searched for."""
+PRIMES = {13: 1, 11: 1, 7: 1, 5: 8, 3: 12, 2: 18}
+"""An axis of any of these orders has a turn of one of these, for which the search looks; and the most axes with such a turn
+that it collects: at least those of a finite group (an icosahedron has 6 and 10, a 16-sided prism 17, and one of more than 5).
+Surfaces that are round but for noise near the tolerance seem to have hundreds.
+"""
 
 GOLDEN = math.pi * (3 - math.sqrt(5))
 """Radians: multiples of this angle come near to every angle."""
@@ -58,6 +62,24 @@ NICE = 1e-3
 FEW = 600
 """Points that lines are fitted to."""
 
+SOLIDS = (59, 23, 11)
+"""Turns of the icosahedron, the cube and the tetrahedron. A surface that is round but for noise or bumps near the tolerance has
+other turns beside these, of no group.
+"""
+
+EARLY, HOPELESS = 3, 2.0
+"""A fit ends after so many steps if its line is still off by more than so many tolerances: three steps take the line of a
+symmetry from 0.09 radians to well within one.
+"""
+
+RANKED = 128
+"""Points by which directions of the half ball are ranked."""
+
+STARTS = 32
+"""Most directions of the half ball that lines of one order are fitted from, the best first: twice the 15 half turns of an
+icosahedron, which has the most axes of one order. Without a limit, a nearly round surface has 500.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Line:
@@ -81,27 +103,48 @@ def find(surface: Surface) -> Symmetries:
     if round_ones:
         return _turned(surface, round_ones)
     for order, candidates in _candidates(surface, usual):
-        for line in _around(surface, candidates, [2 * math.pi / order], lines, _as_it_is):
+        for line in islice(_around(surface, candidates, [2 * math.pi / order], lines, _as_it_is), PRIMES[order]):
             if not line.order:
                 return _turned(surface, [line])
             lines.append(line)
-            if order == line.order == 2 and sum(one.order > 2 for one in lines) == 1:  # a prism, whose others follow
+            if order == line.order == 2 and _is_prism(lines):  # whose others follow
                 return _finite(surface, _whole(lines))
+            if sum(one.order > 5 for one in lines) > 1:  # of no finite group: round, but for noise near the tolerance
+                return _finite(surface, lines)
     return _finite(surface, _whole(lines))
 
 
-def _finite(surface: Surface, lines: Iterable[Line]) -> Symmetries:
-    """The largest group of rotations about lines of these orders."""
+def _finite(surface: Surface, lines: Sequence[Line]) -> Symmetries:
+    """The largest group of rotations about lines of these orders: of all, or of those that fit best."""
+    best = np.zeros((0, 4, 4))
+    for motions in _fittest(surface, lines):
+        if len(motions) > len(best):
+            group = _group(surface, motions)
+            best = max(best, group, key=len)
+    return Symmetries(discrete=tuple(_plain_motion(surface, motion) for motion in best))
+
+
+def _group(surface: Surface, motions: Float) -> Float:
+    """The largest group of motions (N, 4, 4) and their products, without the identity."""
     limit = TOLERANCE * surface.diameter
-    motions = np.array([*_turns(lines)]).reshape(-1, 4, 4)
-    group = largest_group(
+    return largest_group(
         motions,
         lambda few: surface.are_near(few, limit),
         lambda few: surface.are_near(few, COARSE * limit),
         np.eye(3),
         NICE,
     )
-    return Symmetries(discrete=tuple(_plain_motion(surface, motion) for motion in group))
+
+
+def _fittest(surface: Surface, lines: Sequence[Line]) -> Iterator[Float]:
+    """The turns about all lines; where these are too many, those about the best lines, as many as a solid has."""
+    if sum(line.order - 1 for line in lines) <= SOLIDS[0]:
+        yield np.array([*_turns(lines)]).reshape(-1, 4, 4)
+        return
+    ranked = sorted(lines, key=lambda line: _misfit(surface, line, 2 * math.pi / line.order))
+    ends = np.cumsum([line.order - 1 for line in ranked])
+    for most in SOLIDS:
+        yield np.array([*_turns(ranked[: np.searchsorted(ends, most, "right")])]).reshape(-1, 4, 4)
 
 
 def lacking(surface: Surface, declared: Symmetries) -> Iterator[str]:
@@ -122,6 +165,12 @@ def _off(surface: Surface, motion: Float) -> float:
     """About how far a motion takes a point of the surface away from all others."""
     points = surface.points[:: max(len(surface.points) // 1000, 1)]
     return max(math.sqrt(((points - moved) ** 2).sum(axis=1).min()) for moved in transform(motion, points))
+
+
+def _is_prism(lines: Sequence[Line]) -> bool:
+    """Whether the last line lies across the only one of an order above 2."""
+    along = [line.axis for line in lines if line.order > 2]
+    return len(along) == 1 and abs(float((along[0] * lines[-1].axis).sum())) < math.sin(APART)
 
 
 def _whole(lines: Sequence[Line]) -> Sequence[Line]:
@@ -196,10 +245,10 @@ def _angles() -> list[float]:
     return [GOLDEN * i for i in range(1, TURNS + 1)]
 
 
-def _is_one(surface: Surface, line: Line, angles: Iterable[float]) -> bool:
-    """Whether all turns by these angles, and back, are symmetries."""
-    motions = [_motion(line, sign * angle) for angle in angles for sign in (1, -1)]
-    return bool(surface.are_near(motions, TOLERANCE * surface.diameter).all())
+def _is_one(surface: Surface, line: Line, angles: Iterable[float], tolerances: float = 1.0) -> bool:
+    """Whether all turns by these angles, and back, are symmetries within so many tolerances."""
+    limit = tolerances * TOLERANCE * surface.diameter
+    return all(surface.are_near([_motion(line, angle), _motion(line, -angle)], limit).all() for angle in angles)
 
 
 def _as_round(surface: Surface, line: Line) -> Line | None:
@@ -239,7 +288,8 @@ def _candidates(surface: Surface, usual: Float) -> Iterator[tuple[int, Float]]:
     values, vectors = np.linalg.eigh(surface.spread)
     low, high = np.diff(values) <= ALIKE * values[2]
     if low and high:
-        yield from ((order, np.concatenate([usual, _half_ball()])) for order in PRIMES)
+        field, ball = surface.field(COARSE * TOLERANCE * surface.diameter), _half_ball()
+        yield from ((order, np.concatenate([usual, _best(surface, field, ball, order)])) for order in PRIMES)
         return
     yield from ((order, usual) for order in PRIMES)
     if low or high:
@@ -253,6 +303,17 @@ def _half_ball() -> Float:
     z = (np.arange(AXES) + 0.5) / AXES
     angle, level = GOLDEN * np.arange(AXES), np.sqrt(1 - z * z)
     return np.stack([level * np.cos(angle), level * np.sin(angle), z], axis=1)
+
+
+def _best(surface: Surface, field: DistanceField, axes: Float, order: int) -> Float:
+    """The axes (N, 3), at most `STARTS`, around which turns of an order fit best, the best first; none near to a better one."""
+    misfits = field.misfits(_motions(axes, surface.center, 2 * math.pi / order), surface.points[:RANKED])
+    left = axes[np.argsort(misfits, kind="stable")[: np.isfinite(misfits).sum()]]
+    best = list[Float]()
+    while len(left) and len(best) < STARTS:
+        best.append(left[0])
+        left = left[~_near(left, left[0])]
+    return np.array(best).reshape(-1, 3)
 
 
 def _around(
@@ -300,7 +361,9 @@ def _settled(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
     Its offset is the point nearest to the surface's centroid.
     """
     points, limit = surface.points[:FEW], 2 * COARSE * TOLERANCE * surface.diameter
-    for _ in range(10):
+    for step in range(10):
+        if step == EARLY and not _is_one(surface, line, angles, HOPELESS):
+            break
         slopes, off = zip(*(_slopes(surface, line, angle, points, limit) for angle in angles), strict=True)
         slope, rest = np.concatenate(slopes, axis=1), np.concatenate(off)
         squares = np.array([[float((a * b).sum()) for b in slope] for a in slope])
