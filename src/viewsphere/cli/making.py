@@ -36,6 +36,7 @@ from viewsphere.cli.terminal import (
     write_picture,
 )
 from viewsphere.errors import StoreError, UserError
+from viewsphere.kernels.garbage import importing
 from viewsphere.model.quantity import quantity
 from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
 from viewsphere.run.crew_size import cores
@@ -230,13 +231,14 @@ def plan(
     allow_scripts: AllowScripts = False,
 ) -> None:
     """Report what a recipe would make: models, poses, frames, splits. No mesh is read without --models or --estimate."""
-    from viewsphere.run.opening import check_formats, prepare
-    from viewsphere.sampling.plan import check_sidecars
+    with importing():
+        from viewsphere.run.opening import check_formats, prepare
+        from viewsphere.sampling.plan import check_sidecars
 
-    loaded = load_recipe(recipe, changes)
-    planned = prepare(loaded)
-    check_formats(planned, loaded.formats, loaded.channels)
-    check_sidecars(planned)
+        loaded = load_recipe(recipe, changes)
+        planned = prepare(loaded)
+        check_formats(planned, loaded.formats, loaded.channels)
+        check_sidecars(planned)
     if not json_:
         print_plan(planned)
         for note in planned.notes:
@@ -376,19 +378,20 @@ def render(
     allow_scripts: AllowScripts = False,
 ) -> None:
     """Render a recipe into a data set. Run it again to resume: finished frames are never rendered twice."""
-    from viewsphere.run.generate import generate
-    from viewsphere.run.opening import to_append
-    from viewsphere.run.share import shard_named
-    from viewsphere.sampling.plan import plan as make_plan
-    from viewsphere.store import Store
-
     if recipe is None or output is None:
         raise UserError(for_render(recipe, output))
-    share = None if shard is None else shard_named(shard)
-    loaded = load_recipe(recipe, changes)
-    asked = asked_formats(format_)
-    planned = make_plan(loaded)
-    formats = with_options([entry.name for entry in loaded.formats] if asked is None else asked, format_option)
+    with importing():
+        from viewsphere.run.generate import generate
+        from viewsphere.run.opening import to_append
+        from viewsphere.run.share import shard_named
+        from viewsphere.sampling.plan import plan as make_plan
+        from viewsphere.store import Store
+
+        share = None if shard is None else shard_named(shard)
+        loaded = load_recipe(recipe, changes)
+        asked = asked_formats(format_)
+        planned = make_plan(loaded)
+        formats = with_options([entry.name for entry in loaded.formats] if asked is None else asked, format_option)
     addition = to_append(planned, Store(output)) if append else None
     if not json_:
         print_plan(planned)

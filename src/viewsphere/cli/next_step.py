@@ -8,6 +8,7 @@ import typer
 from typer.core import TyperCommand
 
 from viewsphere.errors import UserError
+from viewsphere.kernels.garbage import importing
 
 RECIPES = ("[!.]*.yaml", "[!.]*.yml", "[!.]*/recipe.yaml", "recipes/*.yaml")
 MODELS = tuple(f"{folder}[!.]*.{suffix}" for folder in ("", "[!.]*/") for suffix in ("glb", "gltf", "obj", "ply", "stl"))
@@ -20,7 +21,8 @@ class Command(TyperCommand):
         """Parse the arguments by typer; raises UserError with a suggestion if arguments are required and none is given."""
         if not args and not ctx.resilient_parsing and any(p.required for p in self.params):
             raise UserError(for_command(ctx.info_name or ""))
-        return super().parse_args(ctx, args)  # pyright: ignore[reportArgumentType]
+        with importing():  # while callbacks of options import
+            return super().parse_args(ctx, args)  # pyright: ignore[reportArgumentType]
 
 
 def for_command(name: str) -> str:

@@ -37,6 +37,7 @@ from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, Row, Store, located
+from viewsphere.store.checksums import damaged_files
 from viewsphere.store.credits import write_credits
 from viewsphere.store.heartbeat import Pulse
 
@@ -54,7 +55,7 @@ class Warnings:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run left: frames in the data set, frames it rendered itself, what it skipped, seconds, formats that it wrote,
+    """What a run left: frames in the data set, frames it rendered itself, what it skipped, seconds, formats that are written,
     notes, warnings, and how many frames are left to other shards.
     """
 
@@ -133,9 +134,10 @@ def generate(
             write_credits(dataset)
         left_over = None if share.is_all else status(store.root)
         if left_over is None or left_over.complete:
-            wanted = tuple(_due(wanted, portion, rendered > 0, store))
-            notes += export(store.root, wanted, workers=0 if ray else cores() if workers is None else workers, listener=tell)
+            due = tuple(_due(wanted, portion, rendered > 0, store))
+            notes += export(store.root, due, workers=0 if ray else cores() if workers is None else workers, listener=tell)
             store.forget_failures()
+            wanted = tuple({entry.name: entry for entry in (*wanted, *due)}.values()) if share.is_all else due
     if left_over is not None and not left_over.complete:
         warnings, notes = _warnings(planned, dataset), (*notes, _left_to_others(portion, left_over))
         seconds = time.monotonic() - begun
@@ -167,12 +169,17 @@ def _at_work(portion: Portion, store: Store) -> Generator[Pulse]:
 def _due(wanted: Sequence[FormatEntry], portion: Portion, has_rendered: bool, store: Store) -> Iterator[FormatEntry]:
     """The formats that a run writes when nothing is missing: those asked for, and those that lie there and are out of date.
 
-    A run of a shard that had nothing to render leaves alone what another has written.
+    A run that had nothing to render leaves alone what is written and, unless it is one of a shard, whole.
     """
     dataset, least = Dataset(store.root), portion.plan.recipe.keep_annotations_above
-    anew = portion.share.is_all or has_rendered or portion.part.supplies
-    yield from (entry for entry in wanted if anew or not is_written(entry, dataset, least))
+    anew = has_rendered or portion.part.supplies
+    yield from (entry for entry in wanted if anew or not _is_done(entry, dataset, least, portion.share.is_all))
     yield from (entry for entry in _others(wanted, store) if is_out_of_date(entry.name, dataset, least))
+
+
+def _is_done(entry: FormatEntry, dataset: Dataset, least: float | None, proved: bool) -> bool:
+    """Whether a format is written as it would be now and, if that is to be `proved`, all its files have their digests."""
+    return is_written(entry, dataset, least) and not (proved and any(damaged_files(dataset.root / entry.name)))
 
 
 def _left_to_others(portion: Portion, far: Status) -> str:
