@@ -67,3 +67,18 @@ def test_the_suggestion_stands_before_the_list():
     assert one_of("coc", FORMATS) == f"'coc' is unknown; did you mean 'coco'? Valid: {', '.join(FORMATS)}"
     assert one_of("x", ()) == "'x' is unknown. Valid: none"
     assert one_of("x", [f"model_{i}" for i in range(500)]).endswith(", model_79, ...")
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "meant"),
+    [
+        ("yes", ["auto", "off", "on"], "on"),
+        ("no", ["auto", "on", "off"], "off"),
+        (True, ["off", "on"], "on"),
+        (False, ["none", "box"], "none"),
+        ("no", ["sky", "environment", "transparent"], "transparent"),
+        ("yes", ["standard", "filmic"], None),
+    ],
+)
+def test_a_boolean_suggests_the_word_that_means_it(name, known, meant):
+    assert suggestion(name, known) == meant

@@ -66,6 +66,7 @@ class _Work:
         return replace(
             base,
             name=told["name"],
+            double_sided=told.get("double_sided", True),
             **rough,
             **self._emissive(),
             **self._occlusion(),

@@ -20,6 +20,7 @@ SYNONYMS = {
     "color": ("rgb",),
     "colour": ("color", "rgb"),
     "depth_map": ("depth",),
+    "false": ("off", "none", "transparent"),
     "feet": ("ft",),
     "focal_length": ("focal_mm", "focal_px"),
     "foot": ("ft",),
@@ -40,6 +41,7 @@ SYNONYMS = {
     "ms_coco": ("coco",),
     "normal_map": ("normals",),
     "num": ("count",),
+    "no": ("off", "none", "false", "transparent"),
     "number": ("count",),
     "opengl": ("raster",),
     "optical_flow": ("flow",),
@@ -49,7 +51,9 @@ SYNONYMS = {
     "resolution": ("size",),
     "segmentation": ("instances", "semantic"),
     "semantic_segmentation": ("semantic",),
+    "true": ("on", "auto"),
     "ultralytics": ("yolo",),
+    "yes": ("on", "true", "auto"),
 }
 """Words that other tools use, and the names here, the likeliest first; only valid names are suggested."""
 

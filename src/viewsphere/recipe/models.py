@@ -157,8 +157,8 @@ class ModelEntry(Brief):
     )
     faces: Literal["both", "as_file"] | None = Field(
         default=None,
-        description="as_file: cameras do not see the backs of materials that the file has single-sided (glTF: without "
-        "doubleSided); both (the default): all surfaces are seen from both sides",
+        description="as_file: cameras do not see the backs of surfaces that the file has single-sided (glTF, COLLADA, USD, "
+        "Blender's materials); both (the default): all surfaces are seen from both sides",
     )
     color: Word | None = Field(
         default=None, description="what captions call the models' colour, instead of what their surfaces say"

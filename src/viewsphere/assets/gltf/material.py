@@ -22,7 +22,8 @@ IMAGE_EXTENSIONS = ("EXT_texture_webp", "MSFT_texture_dds")
 def read_materials(document: Document, used: Collection[int]) -> list[Material]:
     """Return the materials in file order (unused ones plain, but for their sides), then the default of primitives without one.
 
-    Primitives without material are plain white plastic rather than the specification's mirror-like metal.
+    Primitives without material are plain white plastic rather than the specification's mirror-like metal, and single-sided as
+    it has them.
     """
     reader = _Reader(document)
     entries = document.root.items("materials")
@@ -30,7 +31,7 @@ def read_materials(document: Document, used: Collection[int]) -> list[Material]:
         reader.material(entry) if i in used else Material(double_sided=entry.boolean("doubleSided"))
         for i, entry in enumerate(entries)
     ]
-    return [*read, Material(name="default")]
+    return [*read, Material(name="default", double_sided=False)]
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.instances import check_instances, dae_references
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
-from viewsphere.assets.readers.dae_material import DaeMaterials
+from viewsphere.assets.readers.dae_material import DaeMaterials, is_double_sided
 from viewsphere.assets.readers.dae_mesh import DaeFaces, numbers_of, read_mesh
 from viewsphere.assets.smoothing import creased
 from viewsphere.assets.transform import moved
@@ -139,10 +139,12 @@ class _Scene:
         return {str(e.get("symbol")): e for e in instance.iterfind("bind_material/technique_common/instance_material")}
 
     def _placed(self, geometry: str, bound: Mapping[str, Any], matrix: Float) -> Iterator[Primitive]:
+        element = self._elements.get(("geometry", geometry))
+        sides = None if element is None else is_double_sided(element)
         for faces in self._faces(geometry):
             self.total += len(faces.triangles)
             self.folder.check("MAX_TRIANGLES", self.total, "triangles, all instances counted,")
-            piece = self.materials.dressed(faces, self._unique(geometry), bound.get(faces.symbol))
+            piece = self.materials.dressed(faces, self._unique(geometry), bound.get(faces.symbol), sides)
             yield moved(piece if piece.normals is not None else creased(piece), matrix)
 
     def _faces(self, name: str) -> Sequence[DaeFaces]:

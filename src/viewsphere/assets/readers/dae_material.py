@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,14 +34,18 @@ class DaeMaterials:
         for element in self.root.iter("image", "effect", "material"):
             self._elements.setdefault((element.tag, str(element.get("id"))), element)
 
-    def dressed(self, faces: DaeFaces, part: str, instance: Any) -> Primitive:
-        """The faces with the material that an `<instance_material>` gives; with None the one whose id is the faces' symbol."""
+    def dressed(self, faces: DaeFaces, part: str, instance: Any, sides: bool | None = None) -> Primitive:
+        """The faces with the material that an `<instance_material>` gives; with None the one whose id is the faces' symbol.
+        sides: whether the geometry is double-sided, None where only the material may state it.
+        """
         target = faces.symbol if instance is None else str(instance.get("target", "")).removeprefix("#")
         element = self._elements.get(("material", target))
         if element is None and target:
             self.folder.warn(f"material {target[:80]!r} does not exist; it is plain white")
         sets: list[int] = []
         material = Material(name="default") if element is None else self._material(element, _Coordinates(faces, instance, sets))
+        if sides is not None:
+            material = replace(material, double_sided=sides)
         if material not in self.kept:
             self.kept.append(material)
         index = self.kept.index(material)
@@ -89,7 +93,15 @@ class DaeMaterials:
             emissive=glow if emission_texture is None else (1.0, 1.0, 1.0),
             emissive_texture=emission_texture,
             alpha_mode="BLEND" if opacity < 1.0 else "OPAQUE",
+            double_sided=is_double_sided(element, effect) is not False,
         )
+
+
+def is_double_sided(*elements: Any) -> bool | None:
+    """The `<double_sided>` that programs write into an `<extra>` of elements; None where there is none."""
+    found = (text for element in elements for text in element.iterfind(".//extra//double_sided"))
+    words = [str(one.text or "").strip().lower() for one in found]
+    return None if not words else words[0] not in ("0", "false", "0.0")
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,7 +75,8 @@ class Reader:
             for name in ("Volume", "Displacement"):
                 if output.inputs[name].is_linked:
                     self._lose(name.lower())
-        return {"name": material.name, **(PLAIN | look), "occlusion": self._occlusion(tree), "lost": self.lost}
+        told = {"name": material.name, "double_sided": not material.use_backface_culling, "lost": self.lost}
+        return told | PLAIN | look | {"occlusion": self._occlusion(tree)}
 
     def _occlusion(self, tree):
         """glTF's ambient occlusion, the share of the ambient light that arrives; None where the tree has none."""

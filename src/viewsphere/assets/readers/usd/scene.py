@@ -14,7 +14,7 @@ from viewsphere.assets.named_points import NamedPoint, named_points
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
 from viewsphere.assets.readers.usd.layers import opened
 from viewsphere.assets.readers.usd.library import Usd, UsdGeom
-from viewsphere.assets.readers.usd.material import Look, UsdMaterials
+from viewsphere.assets.readers.usd.material import UsdMaterials
 from viewsphere.assets.readers.usd.mesh import Influences, by_material, pieces_of, read_shape
 from viewsphere.assets.readers.usd.skel import skins_of
 from viewsphere.assets.smoothing import creased
@@ -135,14 +135,18 @@ class _Scene:
             return
         for subset, triangles in by_material(shape):
             look = self.looks.look(prim if subset is None else subset)
-            material, influences = self._number(look), self.influences.get(str(prim.GetPath()))
+            is_double = bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get(self.time))
+            material, influences = (
+                self._number(replace(look.material, double_sided=is_double)),
+                self.influences.get(str(prim.GetPath())),
+            )
             piece = pieces_of(shape, material, look.uvs, look.color, influences, triangles)
             yield piece if piece.normals is not None else creased(piece)
 
-    def _number(self, look: Look) -> int:
-        if look.material not in self.materials:
-            self.materials.append(look.material)
-        return self.materials.index(look.material)
+    def _number(self, material: Material) -> int:
+        if material not in self.materials:
+            self.materials.append(material)
+        return self.materials.index(material)
 
     def _unique(self, name: str) -> str:
         number = self._names[name] = self._names.get(name, 0) + 1
