@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from viewsphere.errors import RecipeError
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.placing import obstacles
@@ -103,6 +104,13 @@ def test_a_scatter_over_60_m_keeps_clear_of_a_whole_street(tmp_path):
     assert (np.abs(spots).max(axis=0) > 40).all()
     beside = np.abs(spots[np.abs(spots[:, 1]) < 50][:, :1] - np.array(walls)).min(axis=1)
     assert beside.min() > 2.5
+
+
+@pytest.mark.parametrize("layout", ["scatter", "heap_together", {"kind": "scatter", "between": "hulls"}])
+def test_a_model_larger_than_the_floor_is_refused_with_both_sizes(layout, tmp_path):
+    reason = r"scenes: weed covers 0\.08 x 0\.08 m, and the free floor has 0\.05 x 2 m\. Use a smaller model, set its `scale`"
+    with pytest.raises(RecipeError, match=reason):
+        spots_of(tmp_path, layout, objects=1, surface={"size": [0.05, 2], "height": 0.5})
 
 
 @pytest.mark.parametrize("layout", ["scatter", "heap_together"])

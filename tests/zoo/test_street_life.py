@@ -14,7 +14,7 @@ from viewsphere.zoo.places import Lane, Place, PlacePiece, Traffic
 from viewsphere.zoo.townscape import street_life
 from zoo_mesh import seeds
 
-SEEDS = seeds(20, few=2)
+SEEDS = seeds(8, few=2)
 GROUND = ("street", "landscape", "driveway", "town_ground", "outskirts")
 FULL = Traffic(parked=1.0, walkers=40)
 USUAL = {"neighbourhood": 0.0, "town": 0.4}

@@ -51,6 +51,7 @@ def scattered(
         cover = partial(outline, _seen_from_above(shape)) if of_hulls else partial(footprint, shape.box)
         pose = spot(rng(str(slot), spec.key), room, shape.box, prints, cover if of_hulls else None)
         if pose is None:
+            _check_size(spec, shape, floor or room.free, room.field)
             raise RecipeError(
                 f"{room.field}: expected room for {len(prints) + len(cast) - slot} models; found none for {spec.key}: ask for "
                 "fewer, or for a smaller gap"
@@ -58,6 +59,18 @@ def scattered(
         poses.append(pose)
         prints.append(cover(pose))
     return poses
+
+
+def _check_size(spec: ModelSpec, shape: Shape, floor: Footprint | None, field: str) -> None:
+    """Raise RecipeError for a model that is larger than the floor, however it is turned."""
+    size = (shape.box[4] - shape.box[2])[:2]
+    if floor is None or (size.min() <= 2 * floor.half.min() and size.max() <= 2 * np.linalg.norm(floor.half)):
+        return
+    (width, length), (across, along) = size.tolist(), (2 * floor.half).tolist()
+    raise RecipeError(
+        f"{field}: {spec.key} covers {width:.3g} x {length:.3g} m, and the free floor has {across:.3g} x {along:.3g} m. Use a "
+        "smaller model, set its `scale`, or choose a larger surface or place"
+    )
 
 
 def _reach(floor: Footprint | None, room: Room, shapes: Sequence[Shape]) -> float:
