@@ -170,6 +170,24 @@ def test_a_recipe_that_is_another_in_all_its_copies(copied, field):
     assert unseen == []
 
 
+WITHOUT_EFFECT = {"max_frames": "a limit on mistakes in the number of frames: every value that is not below it gives the same plan"}
+"""Fields of a recipe of which another value changes no plan, shot, picture or label, and why."""
+
+
+@pytest.mark.parametrize("field", WITHOUT_EFFECT)
+def test_a_field_without_effect_may_have_any_value_that_gives_the_same_plan(copied, field):
+    """A value that no plan of so many frames has is found."""
+    file = Dataset(copied).store.plan_file
+    value, verdicts = unsealed(file.read_text()), {}
+    for limit in (1_000_001, 12, 11):
+        recipe = value["recipe"] | {field: limit}
+        parts = [part | {"recipe": recipe} for part in value["parts"]]
+        file.write_text(sealed(value | {"recipe": recipe, "parts": parts}))
+        verdicts[limit] = bool(found(lambda: plan_findings(copied)))
+    assert field in BEFORE_RENDERING
+    assert verdicts == {1_000_001: False, 12: False, 11: True}
+
+
 # files
 
 
