@@ -317,3 +317,14 @@ def test_a_normal_without_direction_is_said(write):
     mesh, _ = load_model(path)
     assert mesh.warnings == ("n.obj: 1 of 3 normals are missing, NaN or of no length: smooth ones take their place",)
     np.testing.assert_array_equal(mesh.normals, [[0, 0, 1]] * 3)
+
+
+@pytest.mark.parametrize("word", ["nan", "-NaN", "inf", "-inf", "1e400", "1e39"])
+@pytest.mark.parametrize("axis", range(3))
+def test_a_vertex_that_is_nowhere_is_refused_with_its_line(tmp_path, word, axis):
+    """Even one of many, which no face names."""
+    numbers = ["0", "0", "0"]
+    numbers[axis] = word
+    (tmp_path / "a.obj").write_text(f"# cube\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv {' '.join(numbers)}\nf 1 2 3\n")
+    with pytest.raises(ModelError, match=r"a\.obj:5: vertex 4 has a NaN or infinite coordinate"):
+        load_model(tmp_path / "a.obj")

@@ -170,7 +170,9 @@ def test_a_recipe_that_is_another_in_all_its_copies(copied, field):
     assert unseen == []
 
 
-WITHOUT_EFFECT = {"max_frames": "a limit on mistakes in the number of frames: every value that is not below it gives the same plan"}
+WITHOUT_EFFECT = {
+    "max_frames": "a limit on mistakes in the number of frames: every value that is not below it gives the same plan"
+}
 """Fields of a recipe of which another value changes no plan, shot, picture or label, and why."""
 
 

@@ -215,3 +215,13 @@ def test_keys_of_very_long_names_are_shortened_and_stay_distinct(build):
     found = keys(build([entry("*.obj")], files))
     assert len(set(found)) == 3
     assert all(len(key.encode()) <= 150 for key in found)
+
+
+@pytest.mark.parametrize("is_installed", [True, False])
+def test_folders_and_patterns_mean_usd_files_where_they_are_read_without_blender(tmp_path, monkeypatch, is_installed):
+    for name in ("a.obj", "b.usda", "c.USDZ", "d.fbx"):
+        (tmp_path / name).touch()
+    monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: is_installed)
+    expected = ["a.obj", "b.usda", "c.USDZ"] if is_installed else ["a.obj"]
+    for source in (".", "*"):
+        assert sorted(file.name for file in models._matching(tmp_path, source, "models[0]")) == expected

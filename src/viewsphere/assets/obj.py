@@ -17,7 +17,7 @@ from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.mtl import read_materials
 from viewsphere.assets.obj_text import Library, read_texts
 from viewsphere.assets.polygon_proof import cut_polygons
-from viewsphere.assets.primitive import FileFacts, Float, Int, Primitive, assemble, compact
+from viewsphere.assets.primitive import GREATEST, FileFacts, Float, Int, Primitive, assemble, compact
 from viewsphere.assets.smoothing import creased
 from viewsphere.assets.srgb import linear
 from viewsphere.assets.text import number_of, numeric_words, statements, uncommented
@@ -211,6 +211,11 @@ def _without_faces(folder: ModelFolder, source: _Source) -> ModelError:
 def _vertices(folder: ModelFolder, source: _Source) -> tuple[Float, Float | None]:
     """Positions (V, 3) and linear colours (V, 4) or None; a fourth number alone is a weight of curves."""
     values = _padded(_rows(folder, source, "v", 3, 6), 6, np.nan)
+    unusable = np.flatnonzero(~(np.abs(values[:, :3]) < GREATEST).all(axis=1))
+    if unusable.size:
+        row = int(unusable[0])
+        wrong = f"vertex {row + 1:,} has a NaN or infinite coordinate ({source.v[row].strip()[:60]!r}); export the model again"
+        raise folder.error(wrong, source.where("v", row))
     given = np.isfinite(values[:, 3:6]).all(axis=1, keepdims=True)
     if any(line.startswith("#MRGB") for line in source.lines):
         folder.warn("colours of ZBrush (#MRGB) are not read; export colours as `v x y z r g b`")

@@ -289,7 +289,7 @@ def _matching(folder: Path, source: str, where: str) -> list[Path]:
     found = _candidates(folder, source, where)
     matches = found if found == [path] else [f for f in found if f.suffix.lower() in _wanted(path) and f.is_file()]
     if not matches:
-        endings, unread = ", ".join(sorted(MODEL_SUFFIXES)), _unread(folder, source, where)
+        endings, unread = ", ".join(sorted(_read_here())), _unread(folder, source, where)
         hint = f"; {_naming(folder, unread)}" if unread else ""
         raise RecipeError(f"{where}.source: expected model files ({endings}); {source!r} gives none in {folder}{hint}")
     return [named(_normal(f), f"{where}.source") for f in matches]
@@ -341,7 +341,12 @@ def _candidates(folder: Path, source: str, where: str) -> list[Path]:
 def _wanted(path: Path) -> Set[str]:
     """Endings of the files that a folder or a pattern means."""
     ending = path.suffix.lower()
-    return {ending} if ending[1:] in BLENDER_SUFFIXES else MODEL_SUFFIXES
+    return {ending} if ending[1:] in BLENDER_SUFFIXES else _read_here()
+
+
+def _read_here() -> Set[str]:
+    """Endings of the model files that are read without Blender: USD too where its package is installed."""
+    return MODEL_SUFFIXES | {f".{suffix}" for suffix in BLENDER_SUFFIXES if not needs_blender(suffix)}
 
 
 def _is_hidden(name: str) -> bool:
