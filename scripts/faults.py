@@ -38,6 +38,7 @@ TIMES = {
     ("SIGKILL of everything", "merge"): 10,
     ("SIGKILL of everything", "import"): 10,
     ("SIGKILL of everything", "export"): 10,
+    ("SIGKILL of everything", "convert"): 20,
     ("SIGKILL of the parent", "render"): 15,
     ("SIGKILL of a worker", "render"): 15,
     ("SIGTERM", "render"): 6,

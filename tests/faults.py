@@ -25,6 +25,7 @@ from pathlib import Path
 from command_line import Answer, viewsphere
 from deadline import DEADLINE, until
 from small import small_recipe, tree_hash
+from viewsphere.aside import LOCK
 from viewsphere.errors import StoreError
 from viewsphere.store.checksums import damaged_files
 from viewsphere.store.manifest import MANIFEST, Manifest
@@ -51,11 +52,15 @@ BIGGER = {"models": [{"source": "zoo:post_box", "category": "post box", "count":
 
 @dataclass(frozen=True)
 class Work:
-    """A command, without `python -m viewsphere`, that writes into `out`, where `base` lies, if any; some have workers."""
+    """A command, without `python -m viewsphere`, that writes into `out`, where `base` lies, if any; some have workers.
+
+    `is_resumed`: a second run keeps the results of a killed one, so several kills may precede the last run.
+    """
 
     words: Callable[[Path, Path], list[str]]
     base: str = ""
     has_workers: bool = False
+    is_resumed: bool = True
 
     def start(self, stock: Path, out: Path, *before: str, workers: int = 2) -> subprocess.Popen[str]:
         """Start it in a process group of its own, behind other words."""
@@ -87,6 +92,20 @@ WORKS = {
     "merge": Work(lambda stock, out: ["merge", str(stock / "small"), str(stock / "other"), "-o", str(out), "--format", "coco"]),
     "import": Work(lambda stock, out: ["import", "native", str(stock / "small" / "native"), "-o", str(out)]),
     "export": Work(lambda stock, out: ["export", str(out), "--format", "coco,native,csv"], "small"),
+    "convert": Work(
+        lambda stock, out: [
+            "convert",
+            str(stock / "small" / "native"),
+            "--from",
+            "native",
+            "--to",
+            "coco,csv,yolo",
+            "-o",
+            str(out),
+        ],
+        has_workers=True,
+        is_resumed=False,
+    ),
 }
 
 
@@ -205,7 +224,7 @@ class Course:
         there = finished(self.out)
         self.tally.add(process, fault(process))
         self.look(there)
-        if process.returncode == 0:
+        if process.returncode == 0 or not self.work.is_resumed:
             self.renew()
 
     def look(self, there: set[str]) -> None:
@@ -238,6 +257,8 @@ def torn(out: Path, *wholes: Path) -> list[str]:
             damage = [str(error)]
         found += damage[:1]
     for path in out.glob("*"):
+        if (path / LOCK).is_file():  # made aside by a process, and removed by the next run
+            continue
         same = [whole / path.name for whole in wholes if (whole / path.name).exists()]
         if not same:
             found.append(f"{path}: expected no such file")

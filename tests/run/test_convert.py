@@ -162,6 +162,35 @@ def test_a_run_that_was_killed_between_two_folders_can_be_repeated(photos, tmp_p
     assert tree_hash(tmp_path / "out" / "voc") != before and names_in(tmp_path / "out") == ["voc", "yolo"]
 
 
+def meanwhile(run):
+    """A listener that does something once, while a run is at work."""
+    runs = [run]
+    return lambda progress: runs.pop()() if runs else None
+
+
+@pytest.mark.parametrize("formats", [["voc", "yolo"], ["yolo", "voc"]])
+def test_two_runs_at_the_same_time_both_end_with_the_same_folders(formats, photos, tmp_path):
+    out = tmp_path / "out"
+    other = meanwhile(lambda: vs.convert("coco", photos, formats, out))
+    vs.convert("coco", photos, ["voc", "yolo"], out, listener=other)
+    vs.convert("coco", photos, ["voc", "yolo"], tmp_path / "whole")
+    assert tree_hash(out) == tree_hash(tmp_path / "whole") and names_in(out) == ["voc", "yolo"]
+
+
+def test_of_two_runs_with_other_pictures_the_later_one_is_refused(photos, tmp_path):
+    out, fewer = tmp_path / "out", tmp_path / "fewer"
+    shutil.copytree(photos, fewer)
+    listed = next(fewer.rglob("*.json"))
+    value = json.loads(listed.read_text())
+    value["annotations"] = []
+    listed.write_text(json.dumps(value))
+    other = meanwhile(lambda: vs.convert("coco", fewer, ["voc", "csv"], out))
+    with pytest.raises(StoreError, match="this folder holds another data set"):
+        vs.convert("coco", photos, ["csv", "voc"], out, listener=other)
+    vs.convert("coco", fewer, ["csv", "voc"], tmp_path / "whole")
+    assert tree_hash(out) == tree_hash(tmp_path / "whole") and names_in(out) == ["csv", "voc"]
+
+
 def test_other_files_stay_and_are_named(photos, tmp_path):
     (tmp_path / "out" / "yolo").mkdir(parents=True)
     (tmp_path / "out" / "yolo" / "mine.txt").write_text("mine")

@@ -63,10 +63,12 @@ def obedient():
 
 @pytest.mark.parametrize("work", WORKS)
 def test_kills_at_any_moment(work, stock, tmp_path):
+    source = tree_hash(stock / "small")
     course = Course(WORKS[work], stock, tmp_path, random.Random(f"kills {work}"), workers=2 if work == "render" else 1)
     course.suffer(SIGNALS["SIGKILL of everything"], 1)
     course.renew()
     assert course.tally.is_good, course.tally
+    assert tree_hash(stock / "small") == source
 
 
 @pytest.mark.parametrize("fault", [fault for fault in SIGNALS if fault != "SIGKILL of everything"])
@@ -86,6 +88,27 @@ def test_several_runs_on_one_output(stock, whole, tmp_path):
     started = [WORKS["render"].start(stock, tmp_path / "out", workers=workers) for workers in (0, 0, 1)]
     said = [process.communicate(timeout=DEADLINE)[1] for process in started]
     assert [process.returncode for process in started] == [0, 0, 0], said
+    assert tree_hash(tmp_path / "out") == tree_hash(whole)
+
+
+@pytest.mark.parametrize("work", ["convert", "export"])
+def test_two_runs_that_write_the_same_exports(work, stock, tmp_path):
+    out = tmp_path / "out"
+    if WORKS[work].base:
+        shutil.copytree(stock / WORKS[work].base, out)
+    started = [WORKS[work].start(stock, out, workers=0) for _ in range(2)]
+    said = [process.communicate(timeout=DEADLINE)[1] for process in started]
+    assert [process.returncode for process in started] == [0, 0], said
+    assert tree_hash(out) == undisturbed(WORKS[work], stock).whole
+
+
+@pytest.mark.usefixtures("mounts")
+def test_little_shared_memory(stock, whole, tmp_path):
+    """Workers of a container whose shared memory has 1 MB."""
+    mount = 'mount -t tmpfs -o size=1m tmpfs /dev/shm && exec "$@"'
+    process = WORKS["render"].start(stock, tmp_path / "out", "unshare", "-m", "sh", "-c", mount, "sh")
+    said = process.communicate(timeout=DEADLINE)[1]
+    assert process.returncode == 0, said
     assert tree_hash(tmp_path / "out") == tree_hash(whole)
 
 

@@ -42,6 +42,21 @@ def leave(store, told):
     file.with_name(LOCK).touch()
 
 
+@pytest.mark.parametrize("jump", [-3600, 86_400])
+def test_a_clock_that_jumps_changes_no_rate(jump, monkeypatch):
+    ticks, now = [0.0], [1e9]
+    monkeypatch.setattr("viewsphere.store.heartbeat.time.monotonic", lambda: ticks[0])
+    monkeypatch.setattr("viewsphere.store.heartbeat.time.time", lambda: now[0])
+    pulse = Pulse(lambda text: None)
+    pulse.enters("frames")
+    pulse.now = replace(pulse.now, done=40, total=100)
+    ticks[0], now[0] = 20.0, 1e9 + 20 + jump
+    told = json.loads(pulse.told())
+    assert told["beat"] == now[0]
+    assert told["beat"] - told["begun"] == 20
+    assert replace(pulse.now, begun=told["begun"], beat=told["beat"]).rate == 2
+
+
 def test_a_finished_data_set(small_run):
     found = vs.status(small_run)
     assert (found.frames, found.finished, found.missing, found.left_out, found.models) == (12, 12, 0, 0, ())

@@ -4,6 +4,7 @@ import os
 import shutil
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
 
 from deadline import until
@@ -210,3 +211,13 @@ def test_other_processes_read_many(small_run, tmp_path):
         assert not known.damaged.any()
         assert known.frames["number"].tolist() == list(range(frames))
         assert len(known.table.objects) == frames
+
+
+def test_the_rate_stays_sensible_when_the_clock_is_set():
+    from viewsphere.view.live import _rate
+
+    made = np.array([1000.0, 1002.0, 1004.0])
+    assert _rate(made, 1004.0) == 0.5
+    assert _rate(made, 1004.0 - 3600) == 0  # an hour back: all times are still to come
+    assert _rate(np.append(made, [1004.0 - 3600, 1008.0 - 3600]), 1008.0 - 3600) == 0.25
+    assert _rate(made, 1004.0 + 86_400) == 0

@@ -22,6 +22,7 @@ from viewsphere.run.scope import refuse, scope_of_foreign
 from viewsphere.store import Dataset, located, new_folder
 from viewsphere.store.checksums import CHECKSUMS, damaged_files
 from viewsphere.store.foreign import ForeignDataset
+from viewsphere.store.places.local import TAKEN
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,9 @@ def convert(
     foreign = read_dataset(kind, source, keep_going=keep_going, field="--from")
     refuse(entries, scope_of_foreign(foreign), source)
     with ExitStack() as whole:
-        folders = [(entry, whole.enter_context(_folder(located(out) / entry.name))) for entry in entries]
+        # In order of their names: of two runs at the same time, the first to put one folder in place puts all shared ones.
+        ordered = sorted(entries, key=lambda entry: entry.name)
+        folders = [(entry, whole.enter_context(_folder(located(out) / entry.name))) for entry in ordered]
         store = whole.enter_context(aside(folders[0][1].parent)) / "store"  # on the same disk, for links
         with _told_of(store, foreign, source, located(out)):
             put_in_store(foreign, store, listener)
@@ -73,21 +76,35 @@ def convert(
 
 @contextmanager
 def _folder(target: Path) -> Generator[Path]:
-    """A folder to write into that becomes `target`, or goes where `target` has the same files already.
+    """A folder to write into that becomes `target`, or goes where `target` has the same files already, also where another run
+    puts them there meanwhile.
 
     Raises StoreError where other files lie there.
     """
-    if not (target / CHECKSUMS).is_file():
+    made = b""
+    if (target / CHECKSUMS).is_file():
+        with aside(target.parent) as own:
+            folder = own / target.name
+            folder.mkdir()
+            yield folder
+            _check_same(read_bytes(folder / CHECKSUMS, "MAX_STREAMED_BYTES"), target)
+        return
+    try:
         with new_folder(target) as folder:
             yield folder
-        return
-    with aside(target.parent) as own:
-        folder = own / target.name
-        folder.mkdir()
-        yield folder
-        is_same = read_bytes(folder / CHECKSUMS, "MAX_STREAMED_BYTES") == read_bytes(target / CHECKSUMS, "MAX_STREAMED_BYTES")
-        if not is_same or any(damaged_files(target)):
-            raise StoreError(f"{target}: this folder holds another data set. Choose another folder, or delete it")
+            made = read_bytes(folder / CHECKSUMS, "MAX_STREAMED_BYTES")
+    except StoreError as error:
+        if not made or getattr(error.__cause__, "errno", None) not in TAKEN:
+            raise
+        _check_same(made, target)
+
+
+def _check_same(made: bytes, target: Path) -> None:
+    """Raise StoreError unless the files of a folder are those of this list of digests."""
+    listed = target / CHECKSUMS
+    is_same = listed.is_file() and read_bytes(listed, "MAX_STREAMED_BYTES") == made
+    if not is_same or any(damaged_files(target)):
+        raise StoreError(f"{target}: this folder holds another data set. Choose another folder, or delete it")
 
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

@@ -84,11 +84,13 @@ class Heartbeat:
 class Pulse:
     """Tells of a run, every few seconds by a thread of its own, however long a frame takes. `now` is what it tells next; a shot
     that is handed out or done changes `working_on`.
+
+    A monotonic clock measures the time since a phase began, so that rates stay right when the system's time is set.
     """
 
     def __init__(self, write: Callable[[str], None], shard: tuple[int, int] = (0, 1)) -> None:
-        begun = time.time()
-        self.now = Heartbeat(socket.gethostname(), os.getpid(), shard, begun=begun, beat=begun)
+        self.now = Heartbeat(socket.gethostname(), os.getpid(), shard)
+        self._phase_begun = time.monotonic()
         self.working_on: dict[str, None] = {}
         self._write = write
         self._ended = Event()
@@ -106,11 +108,13 @@ class Pulse:
     def enters(self, phase: str) -> None:
         """Begin a phase; one that has begun goes on."""
         if phase != self.now.phase:
-            self.now = replace(self.now, phase=phase, begun=time.time())
+            self.now, self._phase_begun = replace(self.now, phase=phase), time.monotonic()
 
     def told(self, error: str = "") -> str:
         """What there is to tell now: how far the run is, or how it ended."""
-        return replace(self.now, beat=time.time(), working_on=tuple(self.working_on.copy()), error=error).to_json()
+        beat = time.time()
+        begun = beat - (time.monotonic() - self._phase_begun)
+        return replace(self.now, begun=begun, beat=beat, working_on=tuple(self.working_on.copy()), error=error).to_json()
 
     def _beats(self) -> None:
         if hasattr(signal, "pthread_sigmask"):

@@ -314,8 +314,11 @@ def _unknown(count: int, split: str) -> FrameTable:
 
 
 def _rate(made: NDArray[np.float64], now: float) -> float:
-    """Frames a second of late, by the times at which they were finished; 0 where none was of late, or nobody can tell."""
-    recent = np.sort(made[made >= now - RECENT])
+    """Frames a second of late, by the times at which they were finished; 0 where none was of late, or nobody can tell.
+
+    Times to come are from before the clock was set back, and do not count.
+    """
+    recent = np.sort(made[(made >= now - RECENT) & (made <= now)])
     if not len(recent) or recent[0] == recent[-1]:
         return 0.0
     return float(np.count_nonzero(recent > recent[0]) / (now - recent[0]))
