@@ -207,7 +207,7 @@ def one_shot(clock: Clock, shot: Shot, instants: Sequence[int], stage: Stage, me
             inside.append(time.process_time() - begun)
 
     begun = time.process_time()
-    store.write_shot(f"{id(clock)}-{instants[0]}", samples())
+    store.write_shot(f"{id(clock)}-{instants[0]}", samples(), shot=shot)
     share = (time.process_time() - begun - sum(inside)) / len(instants)
     clock.times.setdefault("files", []).extend(1e3 * (own + share) for own in files)
 

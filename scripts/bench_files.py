@@ -16,14 +16,13 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from viewsphere import plan
 from viewsphere.errors import MissingExtraError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.allocator import keep_freed_memory
-from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.extension import whole
 from viewsphere.store import encode
 
 ROUNDS = 20
@@ -48,8 +47,8 @@ def frames() -> list[dict[str, Any]]:
         viewpoints={"azimuth": 30, "elevation": [5, 25, 50], "distance": 5.5},
         channels=["rgb", "depth", "instances", "normals"],
     )
-    portion, stages = whole(prepare(recipe)), Stages()
-    return [dict(s.channels) for row in portion.shot_table() for s in stages.render(portion.shot(row, stages.box))]
+    stages = Stages()
+    return [dict(s.channels) for shot in plan(recipe).shots(stages.box) for s in stages.render(shot)]
 
 
 def cost(work: Callable[[Any], bytes], arrays: Sequence[Any]) -> str:

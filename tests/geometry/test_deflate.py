@@ -10,7 +10,8 @@ import pytest
 from isal import isal_zlib
 
 from quick import quick
-from viewsphere.codecs.deflate import RAW, ZLIB, compressed
+from viewsphere.codecs.deflate import RAW, ZLIB, compressed, deflate_lines
+from viewsphere.codecs.kernels_huffman import LONGEST_CODE
 
 PLACES = ((1 << 20, 0), (3 << 20, 7), (5 << 20, 255), (9 << 20, 90))
 """Bytes of a thread's stack, and the number that freed memory is full of."""
@@ -73,3 +74,51 @@ def test_deflating_for_sure_costs_no_size():
     for values in (1, 4, 64, 256):
         data = np.random.default_rng(values).integers(0, values, 3000, dtype=np.uint8)
         assert len(compressed(data)) <= len(isal_zlib.compress(data, 1)) + 16
+
+
+def huffman_only(lines: np.ndarray) -> int:
+    """Bytes that zlib makes of scan lines by Huffman codes alone."""
+    coder = zlib.compressobj(9, zlib.DEFLATED, RAW, 9, zlib.Z_HUFFMAN_ONLY)
+    return len(coder.compress(lines.tobytes()) + coder.flush())
+
+
+@pytest.mark.parametrize("step", [3, 4])
+@pytest.mark.parametrize(("height", "width"), [(1, 1), (3, 700), (480, 1), (150, 200), (2, 22_000)])
+@pytest.mark.parametrize("spread", [0.0, 0.3, 2.0, 30.0])
+def test_scan_lines_inflate_to_the_input_and_are_no_longer_than_zlibs_codes(height, width, step, spread):
+    rng = np.random.default_rng([height, width, int(10 * spread)])
+    lines = np.empty((height, 1 + step * width), np.uint8)
+    lines[:] = rng.normal(0, spread, lines.shape).round().astype(np.int64) & 255
+    lines[:, 0] = 1
+    data = deflate_lines(lines, step)
+    assert zlib.decompress(data, RAW) == lines.tobytes()
+    assert len(data) <= 1.02 * huffman_only(lines) + 200  # their lengths are sent in full
+
+
+def test_codes_of_rare_bytes_are_shortened():
+    """Numbers each half as frequent as the one before would have codes of up to 19 bits."""
+    rng = np.random.default_rng(0)
+    lines = np.minimum(rng.geometric(0.5, (128, 1 + 3 * 2048)), 200).astype(np.uint8)
+    assert lines.max() > LONGEST_CODE
+    data = deflate_lines(lines, 3)
+    assert zlib.decompress(data, RAW) == lines.tobytes()
+    assert len(data) <= 1.02 * huffman_only(lines)
+
+
+def test_noise_is_not_made_longer():
+    lines = np.random.default_rng(1).integers(0, 256, (90, 1 + 3 * 80), dtype=np.uint8)
+    data = deflate_lines(lines, 3)
+    assert zlib.decompress(data, RAW) == lines.tobytes()
+    assert len(data) < lines.size + 64
+
+
+def test_runs_of_every_length_come_back():
+    """Runs of equal pixels, of 1 to 200 pixels, at the start, in the middle and at the end of lines."""
+    lines = np.zeros((200, 1 + 3 * 420), np.uint8)
+    for k in range(1, 200):
+        pixels = lines[k, 1:].reshape(420, 3)
+        pixels[:] = 9
+        pixels[:k], pixels[k + 5 : 2 * k + 5], pixels[420 - k // 4 :] = 0, 0, 0
+    data = deflate_lines(lines, 3)
+    assert zlib.decompress(data, RAW) == lines.tobytes()
+    assert len(data) < lines.size / 12

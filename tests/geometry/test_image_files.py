@@ -53,6 +53,42 @@ def test_png_round_trip_and_pillow(size, components, dtype, mode):
     np.testing.assert_array_equal(np.asarray(picture), array)
 
 
+def rendering(rng: np.random.Generator, height: int, width: int, components: int) -> np.ndarray:
+    """A picture of one of the kinds that renderings are made of: flat, in bands, smooth, textured, noise, or patches of all."""
+    y, x = np.mgrid[:height, :width]
+    kinds = [
+        np.broadcast_to(rng.integers(0, 256, components), (height, width, components)),
+        rng.integers(0, 256, (height, 1, components)).repeat(width, 1),
+        (y[..., None] * rng.uniform(-3, 3) + x[..., None] * rng.uniform(-3, 3, components)) % 256,
+        rng.normal(128, rng.uniform(0, 9), (height, width, components)),
+        rng.integers(0, 256, (height, width, components)),
+    ]
+    kind = int(rng.integers(6))
+    if kind < 5:
+        return kinds[kind].astype(np.uint8)
+    which = rng.integers(0, 5, (height // 8 + 1, width // 8 + 1)).repeat(8, 0).repeat(8, 1)[:height, :width]
+    return np.select([(which == k)[..., None] for k in range(5)], kinds).astype(np.uint8)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_rendered_pictures_come_back_from_every_reader(seed):
+    codecs = pytest.importorskip("imagecodecs")
+    rng = np.random.default_rng(seed)
+    shape = (*(int(n) for n in rng.integers(1, [5, 400] if seed % 3 else [200, 90])), int(rng.integers(3, 5)))
+    array = rendering(rng, *shape)
+    data = encode_png(array, rendered=True)
+    assert data == encode_png(array.copy(), rendered=True)
+    for back in (decode_png(data), np.asarray(pillow(data)), codecs.png_decode(data)):
+        assert back.dtype == np.uint8
+        np.testing.assert_array_equal(back, array)
+
+
+@pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.uint16])
+def test_what_is_no_picture_of_colours_is_written_as_ever(dtype):
+    array = random_picture((20, 30), dtype)
+    assert encode_png(array, rendered=True) == encode_png(array)
+
+
 def test_png_of_a_view_is_that_of_its_copy():
     array = random_picture((20, 30, 3), np.uint8)
     for view in (array[::2, ::-1], array.transpose(1, 0, 2), array[..., 1]):

@@ -51,3 +51,17 @@ def deflate(array: NDArray[Any]) -> bytes | memoryview:
     out = np.empty(data.size + 5 * (data.size // STORED) + 64, np.uint8)
     end = deflate_runs(data.view(np.uint32), step, *match_codes(4 * step), data, out, 0)
     return out[:end].data
+
+
+def deflate_lines(lines: NDArray[np.uint8], step: int) -> bytes:
+    """The raw deflate stream of a rendered picture's filtered scan lines, of pixels of 3 or 4 bytes.
+
+    Twice as fast as `compressed`, and of the same size for what is rendered: see `kernels_huffman`. Lines that it would make
+    longer, such as noise, are left to `compressed`.
+    """
+    from viewsphere.codecs import kernels_huffman as kernels
+
+    words = np.empty((lines.shape[1] - 1) // step + kernels.RUN, np.uint32)
+    out, room = np.empty(2 * lines.size + 512, np.uint8), np.zeros((4, kernels.SYMBOLS), np.int64)
+    end = kernels.deflate_lines(lines, step, words, room, out)
+    return compressed(lines, RAW) if end > lines.size else out[:end].tobytes()

@@ -60,7 +60,7 @@ def deflate_runs(words, step, codes, widths, data, out, at):
             end = 4 * (i + step) if is_run else 4 * count
             while literal < end:  # blocks of type 0, each beginning at a whole byte
                 size = min(end - literal, STORED)
-                at, waiting, bits = _send(out, at, waiting, (bits + 10) // 8 * 8)
+                at, waiting, bits = send(out, at, waiting, (bits + 10) // 8 * 8)
                 for k in range(2):
                     byte = (size >> (8 * k)) & 255
                     out[at + k], out[at + k + 2] = byte, byte ^ 255
@@ -75,11 +75,11 @@ def deflate_runs(words, step, codes, widths, data, out, at):
                 length = left if left <= LONGEST else min(left - 3, LONGEST)
                 left -= length
                 waiting |= codes[length] << np.uint64(bits)
-                at, waiting, bits = _send(out, at, waiting, bits + widths[length])
-            at, waiting, bits = _send(out, at, waiting, bits + 7)
+                at, waiting, bits = send(out, at, waiting, bits + widths[length])
+            at, waiting, bits = send(out, at, waiting, bits + 7)
             literal = 4 * j
         i = j
-    return _send(out, at, waiting, (bits + 7) // 8 * 8)[0]
+    return send(out, at, waiting, (bits + 7) // 8 * 8)[0]
 
 
 @inner
@@ -119,7 +119,7 @@ def _repeats(words, step, j):
 
 
 @inner
-def _send(out, at, waiting, bits):
+def send(out, at, waiting, bits):
     """Write the whole bytes among the waiting bits."""
     for k in range(U(8)):  # always 8 bytes, most of them overwritten next: loops of one to three bytes mispredict branches
         out[U(at) + k] = np.uint8(waiting >> np.uint64(8 * k))

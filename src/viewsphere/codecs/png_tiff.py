@@ -16,7 +16,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from viewsphere.codecs.deflate import compressed, deflate
+from viewsphere.codecs.deflate import compressed, deflate, deflate_lines
 from viewsphere.codecs.size import check_size
 from viewsphere.errors import UserError
 
@@ -32,11 +32,13 @@ _SAMPLES, _ROWS, _BYTES, _PLANAR, _EXTRA, _FORMAT = 277, 278, 279, 284, 338, 339
 _SAMPLE_FORMATS = {np.dtype(np.int32): 2, np.dtype(np.float32): 3}
 
 
-def encode_png(array: NDArray[Any], *, palette: NDArray[np.uint8] | None = None, unit: float | None = None) -> bytes:
+def encode_png(
+    array: NDArray[Any], *, palette: NDArray[np.uint8] | None = None, unit: float | None = None, rendered: bool = False
+) -> bytes:
     """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8 or uint16, not empty.
 
     With a `palette` (n, 3), (H, W) uint8 are indices of its colours. `unit` is the length in metres of one step of (H, W)
-    (pCAL).
+    (pCAL). Of a `rendered` picture with colours of 8 bits only runs are matched, which takes half the time.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     dtypes = (np.bool_, np.uint8, np.uint16) if array.ndim == 2 else (np.uint8, np.uint16)
@@ -52,7 +54,8 @@ def encode_png(array: NDArray[Any], *, palette: NDArray[np.uint8] | None = None,
     more = b"" if palette is None else _chunk(b"PLTE", palette.tobytes())
     if unit is not None:
         more += _chunk(b"pCAL", struct.pack(">6siiBB2s", b"depth", 0, 65535, 0, 2, b"m") + f"0\0{65535 * unit!r}".encode())
-    body = compressed(_filtered(array, components))
+    lines = _filtered(array, components)
+    body = _zlib(lines, components) if rendered and array.dtype == np.uint8 and components > 1 else compressed(lines)
     return b"".join((_SIGNATURE, _chunk(b"IHDR", header), more, _chunk(b"IDAT", body), _chunk(b"IEND", b"")))
 
 
@@ -73,6 +76,11 @@ def _filtered(array: NDArray[Any], components: int) -> NDArray[np.uint8]:
     lines[:, 1 : 1 + components] = rows[:, :components]
     np.subtract(rows[:, components:], rows[:, :-components], out=lines[:, 1 + components :])
     return lines
+
+
+def _zlib(lines: NDArray[np.uint8], components: int) -> bytes:
+    """The zlib stream of a rendered picture's filtered scan lines."""
+    return b"".join((b"\x78\x01", deflate_lines(lines, components), struct.pack(">I", isal_zlib.adler32(lines))))
 
 
 def _chunk(kind: bytes, body: bytes) -> bytes:

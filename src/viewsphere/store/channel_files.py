@@ -39,7 +39,7 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
         case "npz":
             return npz.encode_npz(array, channel.name)
         case "png":
-            return png_tiff.encode_png(array)
+            return png_tiff.encode_png(array, rendered=True)
         case "png16" if channel.name == "depth":
             return png_tiff.encode_png(_steps(array, files.step), unit=files.step)
         case "png16" | "png8" as kind:
