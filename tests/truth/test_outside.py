@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from truth_scenes import cube, orbit_camera, sphere
+from viewsphere.geometry.box import overlap
+from viewsphere.labels import Sight
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.visibility import homogeneous, in_picture, rasterize
+from viewsphere.truth.visibility import OUTSIDE, homogeneous, in_picture, rasterize
 
 LENS = Intrinsics(width=64, height=48, fx=50.0, fy=50.0, cx=32.0, cy=24.0)
 MESHES = [sphere(1, 0.8), cube(0.5)]
@@ -40,3 +42,31 @@ def test_what_is_seen_is_what_is_seen_when_all_are_drawn(seed):
         assert np.array_equal(corners[first:stop], everywhere[first:stop])
     drawn = np.concatenate([geometry.triangles[first:stop] for first, stop in triangles])
     assert np.isin(drawn, np.concatenate([np.arange(first, stop) for first, stop in vertices])).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_thing_alone_is_the_same_from_its_own_vertices_and_from_those_of_all(seed):
+    rng = np.random.default_rng(seed)
+    geometry = scattered(rng)
+    camera = orbit_camera(LENS, rng.uniform(0, 7), rng.uniform(-0.1, 0.7), rng.uniform(1, 7))
+    corners, window = homogeneous(geometry, camera), (-64, -48, 128, 96)
+    assert 0 < sum((corners[start] == OUTSIDE).all() for start in geometry.vertex_start[:-1]) < geometry.object_count
+    for number in range(1, geometry.object_count + 1):
+        one, two = (rasterize(geometry, camera, object_id=number, window=window, corners=known) for known in (None, corners))
+        assert one.triangle.tobytes() == two.triangle.tobytes()
+        assert one.inverse_depth.tobytes() == two.inverse_depth.tobytes()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_hides_nothing_is_told_by_all_pairs_of_boxes(seed):
+    rng = np.random.default_rng(seed)
+    geometry = scattered(rng, 40)
+    camera = orbit_camera(LENS, rng.uniform(0, 7), rng.uniform(0.5, 1.3), rng.uniform(3, 12))
+    sight = Sight(geometry, camera, rasterize(geometry, camera))
+    boxes = sight.projected
+    said = [sight.is_unobstructed(i) for i in range(40)]
+    for i, (own, _) in enumerate(boxes):
+        others = [(box, whole) for j, (box, whole) in enumerate(boxes) if j != i and box]
+        meets = own is not None and any(not whole or overlap(own, box) for box, whole in others)
+        assert said[i] == (not meets and camera.center[2] > geometry.ground_z)
+    assert any(said)

@@ -94,7 +94,10 @@ def rle_of_part(height: int, width: int, part: Mask, x0: int, y0: int) -> str:
     """`encode_rle` of a (height, width) mask whose pixels all lie in a part of it (h, w), which begins at column x0, row y0."""
     from pycocotools import mask as coco
 
-    runs = np.diff(_ends(height, width, part, x0, y0), prepend=0, append=height * width)
+    ends = _ends(height, width, part, x0, y0)
+    runs = np.empty(len(ends) + 1, np.int64)  # np.diff with its prepend and append takes five times as long
+    runs[:-1], runs[-1] = ends, height * width
+    runs[1:] -= ends
     code: Any = coco.frPyObjects({"size": [height, width], "counts": runs.tolist()}, height, width)
     return code["counts"].decode("ascii")
 
@@ -103,9 +106,9 @@ def _ends(height: int, width: int, part: Mask, x0: int, y0: int) -> NDArray[np.i
     """Indices in column-major order at which the mask begins and ends to hold."""
     own, columns = part.shape
     rows = own if own == height else own + 1  # a gap between columns unless they touch
-    inside = np.zeros((columns, rows), np.bool_)
-    inside[:, :own] = part.T
-    x, y = np.divmod(np.flatnonzero(np.diff(inside.ravel(), prepend=False, append=False)), max(rows, 1))
+    inside = np.zeros(columns * rows + 2, np.bool_)
+    inside[1:-1].reshape(columns, rows)[:, :own] = part.T
+    x, y = np.divmod(np.flatnonzero(inside[1:] != inside[:-1]), max(rows, 1))
     ends = (x0 + x) * height + y0 + y
     return ends[ends < height * width]
 

@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.box import Bounds, is_behind, overlap, projected_bounds
+from viewsphere.geometry.box import Bounds, is_behind, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
@@ -87,6 +87,7 @@ class Around(Protocol):
 OptionsT = TypeVar("OptionsT", bound=Frozen)
 Made = TypeVar("Made")
 
+NOWHERE = (math.nan,) * 4
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
 
@@ -223,10 +224,21 @@ class Sight:
         if geometry.has_scenery:
             return False  # a street's box meets all others: to look at scenery's boxes would cost more than it saves
         own = self.projected[i][0]
-        for j, (other, whole) in enumerate(self.projected):
-            if j != i and own and other and (not whole or overlap(own, other)):
+        if own is not None:
+            (left, top, right, bottom), (x0, y0, x1, y1) = own, self._reaches.T
+            meets = (left < x1) & (x0 < right) & (top < y1) & (y0 < bottom)
+            meets[i] = False
+            if meets.any():
                 return False
         return geometry.ground_z is None or float(self.camera.center[2]) > geometry.ground_z
+
+    @cached_property
+    def _reaches(self) -> NDArray[np.float64]:
+        """For each object the 2D box, (N, 4), beyond which it hides nothing: everywhere where the lens does not show all of it,
+        nowhere (NaN) for an object that is behind the camera.
+        """
+        boxes = (NOWHERE if box is None else box if whole else EVERYWHERE for box, whole in self.projected)
+        return np.array([*boxes], np.float64).reshape(-1, 4)
 
     def alone(self, i: int) -> Alone:
         """What the camera would see if the object of id i + 1 were alone; drawn once."""
@@ -243,7 +255,9 @@ class Sight:
         if right <= left or bottom <= top:
             return Alone(0, 0, np.zeros((0, 0), np.float32))
         window = (left, top, right, bottom)
-        return Alone(left, top, rasterize(self.geometry, self.camera, object_id=i + 1, window=window).inverse_depth)
+        corners = self.visibility.corners
+        drawn = rasterize(self.geometry, self.camera, object_id=i + 1, window=window, corners=corners)
+        return Alone(left, top, drawn.inverse_depth)
 
     def placement(self, i: int) -> Placement:
         """Placement of the object of id i + 1; raises ValueError for an absent object."""

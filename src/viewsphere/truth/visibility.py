@@ -94,18 +94,23 @@ def rasterize(
     all vertices, where it is known. `keeps_exact`: keep 1/s before it was rounded, too, which labels that compare pictures
     need; still pictures are spared its memory.
     """
-    everything = (0, _last_drawn(geometry, camera), 0, len(geometry.coordinates))
-    part = _range(geometry, object_id) if object_id else everything
-    is_whole = part == everything and window is None
-    if is_whole:
-        q = homogeneous(geometry, camera) if corners is None else corners
-    elif part == everything and corners is not None:
-        q = corners
+    is_whole = not object_id and window is None
+    if object_id:
+        part = _range(geometry, object_id)
+        q = None if corners is None else _known(corners, part)
     else:
-        q = homogeneous(geometry, camera, *part[2:])
+        part, q = (0, _last_drawn(geometry, camera), 0, len(geometry.coordinates)), corners
+    if q is None:
+        q = homogeneous(geometry, camera) if is_whole else homogeneous(geometry, camera, *part[2:])
     nearest, seen = _draw(geometry, camera, subdivision, part, window, q)
     known = q if is_whole else None
     return Visibility(seen, nearest.astype(np.float32), known, nearest if keeps_exact else None)
+
+
+def _known(corners: NDArray[np.float64], part: tuple[int, int, int, int]) -> NDArray[np.float64] | None:
+    """A part's vertices among all `homogeneous` ones; None for a thing that is left out there."""
+    q = corners[part[2] : part[3]]
+    return None if len(q) and (q[0] == OUTSIDE).all() else q
 
 
 def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:
