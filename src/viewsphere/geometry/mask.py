@@ -98,7 +98,8 @@ def rle_of_part(height: int, width: int, part: Mask, x0: int, y0: int) -> str:
     runs = np.empty(len(ends) + 1, np.int64)  # np.diff with its prepend and append takes five times as long
     runs[:-1], runs[-1] = ends, height * width
     runs[1:] -= ends
-    code: Any = coco.frPyObjects({"size": [height, width], "counts": runs.tolist()}, height, width)
+    whole: Any = {"size": [height, width], "counts": runs.tolist()}
+    code: Any = coco.frPyObjects(whole, height, width)
     return code["counts"].decode("ascii")
 
 
