@@ -1,7 +1,7 @@
 """Every limit on what files may ask for, so that none of them makes a program run out of memory or time.
 
-The variable `VIEWSPHERE_<NAME>` of the environment sets a limit anew, for this process and those that it starts. Messages say
-the limit's name and value, and what was found.
+The variable `VIEWSPHERE_<NAME>` of the environment sets a limit anew, for this process and those that it starts; a whole number
+may have a unit, such as `20 GB`. Messages say the limit's name and value, and what was found.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from typing import Generic, TypeVar
 from viewsphere.errors import UserError
 
 Number = TypeVar("Number", int, float)
+
+UNITS = {"kb": 10**3, "mb": 10**6, "gb": 10**9, "tb": 10**12, "kib": 1 << 10, "mib": 1 << 20, "gib": 1 << 30, "tib": 1 << 40}
+"""What numbers of bytes may have behind them."""
 
 
 class Limit(Generic[Number]):
@@ -37,13 +40,20 @@ class Limit(Generic[Number]):
     def __get__(self, owner: object, kind: type | None = None) -> Number:
         text, number = os.environ.get(self.variable, ""), type(self.default)
         try:
-            value = number(text) if text else self.default
+            value = _parsed(text, number) if text else self.default
         except ValueError:
             value = number(0)
         if not 0 < value < math.inf:
             whole = "whole " if number is int else ""
             raise UserError(f"{self.variable}: expected a {whole}number above 0, found {text!r:.60}")
         return value
+
+
+def _parsed(text: str, number: type[Number]) -> Number:
+    """The number in a text; raises ValueError where there is none."""
+    head = text.rstrip("bBkKmMgGtTi")
+    unit = UNITS.get(text[len(head) :].lower())
+    return number(text) if unit is None or number is not int else number(round(float(head) * unit))
 
 
 class Limits:
@@ -84,6 +94,7 @@ class Limits:
     MAX_VOXELS = Limit(100_000_000, "cells of the grid of a label voxels; 1 GB while it is computed")
     MAX_FETCHED_BYTES = Limit(10 << 30, "bytes of the folder of a recipe at a URL, which is copied to this machine")
     MAX_REMOTE_TRIES = Limit(5, "times that a URL is asked for the same, 0.2 seconds and then three times as long apart")
+    CACHE_LIMIT = Limit(4 << 30, "bytes of the cache, whose entries that were used longest ago are deleted")
     MAX_REDRAWS = Limit(32, "draws of a frame, and of a scene with so many objects, until one fits; the first one included")
     MAX_REPAIRED_SHOTS = Limit(1_000_000, "shots that a repair renders because they are missing")
 

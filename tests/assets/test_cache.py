@@ -120,7 +120,7 @@ def test_damaged_entries_are_built_again(spec, tmp_path):
     folder = tmp_path / "cache"
     first = load_normalised(spec, folder=folder)
     entries = sorted(folder.iterdir())
-    assert {entry.suffix for entry in entries} == {".json", ".npz"}
+    assert {entry.suffix for entry in entries} == {".json", ".arrays"}
     for entry in entries:
         whole = entry.read_bytes()
         for damaged in (b"", whole[: len(whole) // 2], b"x" * len(whole)):

@@ -213,7 +213,7 @@ def test_what_was_left_behind_is_swept(spec):
     folder = cache_folder()
     killed = folder / f"{PREFIX}{of_this_process()}x"
     killed.mkdir(parents=True)
-    (killed / "mesh.npz").write_bytes(b"half")
+    (killed / "mesh.arrays").write_bytes(b"half")
     with aside(folder, PREFIX) as alive:
         load_normalised(spec)
         assert {p.name for p in folder.iterdir() if p.is_dir()} == {alive.name}
@@ -400,5 +400,5 @@ def test_the_reader_writes_nothing_elsewhere(spec, tmp_path, monkeypatch):
     before = {p for p in tmp_path.rglob("*") if "cache" not in p.parts}
     load_normalised(spec)
     assert {p for p in tmp_path.rglob("*") if "cache" not in p.parts} == before
-    assert {p.suffix for p in cache_folder().iterdir()} == {".json", ".npz"}
+    assert {p.suffix for p in cache_folder().iterdir()} == {".json", ".arrays"}
     assert reader_program.LOG not in {p.name for p in cache_folder().rglob("*")}

@@ -2,7 +2,7 @@
 readers change.
 
 An entry is two files: `<first>.json` lists the files that the model named when it was last read, and
-`<second>.npz` holds the mesh. The first name is the digest of the model's bytes, its settings and the
+`<second>.arrays` holds the mesh. The first name is the digest of the model's bytes, its settings and the
 readers; the second adds the bytes of the files listed. So an entry is never stale, and two folders with equal
 files share it. What is not in the cache is read in a process of its own (`isolated`).
 """
@@ -32,6 +32,7 @@ from viewsphere.assets.part_points import part_points
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.caches import cache_of
+from viewsphere.caches.entries import SUFFIX, note_use, publish
 from viewsphere.errors import ModelError
 from viewsphere.files import open_file, read_bytes, read_text
 from viewsphere.limits import limits
@@ -158,7 +159,7 @@ def keep(entry: Path, text: str) -> None:
     """Write an entry of the cache, which appears whole or not at all; a cache that cannot be written is no error."""
     with suppress(OSError), _aside(entry.parent) as place:
         (place / "told.json").write_text(text, "utf-8", newline="\n")
-        (place / "told.json").replace(entry)
+        publish(place / "told.json", entry)
 
 
 def _batches(frames: Sequence[int]) -> Iterable[Sequence[int]]:
@@ -250,7 +251,7 @@ def _second_digest(first: str, path: Path, names: Iterable[str]) -> str:
 def _is_stored(folder: Path, first: str, path: Path) -> bool:
     try:
         names = json.loads(read_text(folder / f"{first}.json"))
-        return (folder / f"{_second_digest(first, path, names)}.npz").is_file()
+        return (folder / f"{_second_digest(first, path, names)}{SUFFIX}").is_file()
     except (OSError, ValueError):
         return False
 
@@ -259,7 +260,10 @@ def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | No
     """The mesh in the cache and its facts, None when they are not there or damaged."""
     try:
         names = json.loads(read_text(folder / f"{first}.json"))
-        mesh, facts = read_mesh(folder / f"{_second_digest(first, path, names)}.npz", path)
+        file = folder / f"{_second_digest(first, path, names)}{SUFFIX}"
+        mesh, facts = read_mesh(file, path)
+        note_use(file)
+        note_use(folder / f"{first}.json")
         return mesh, replace(facts, files=tuple(path.parent / name for name in names))
     except Exception:  # whatever is wrong with an entry, the answer is to build it again
         return None
@@ -283,6 +287,6 @@ def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Pa
     names = _names(path, files)
     aside = mesh.with_name("files.json")
     with suppress(OSError):
-        mesh.replace(folder / f"{_second_digest(first, path, names)}.npz")
+        publish(mesh, folder / f"{_second_digest(first, path, names)}{SUFFIX}")
         aside.write_text(json.dumps(names), "utf-8", newline="\n")
-        aside.replace(folder / f"{first}.json")
+        publish(aside, folder / f"{first}.json")

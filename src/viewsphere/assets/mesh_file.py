@@ -1,18 +1,15 @@
-"""A mesh and the facts of its file as one .npz file."""
+"""A mesh and the facts of its file as one file of the cache."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
-
 from viewsphere.assets.marks import Mark
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import TEXTURE_FIELDS, FileFacts
-from viewsphere.files import open_file
+from viewsphere.caches.arrays import Content, read_arrays, write_arrays
 from viewsphere.model.keypoints import Keypoints
 
 ARRAYS = (
@@ -31,9 +28,22 @@ FACTS = ("format", "up", "forward", "unit", "origin", "size", "object_from_file"
 
 def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
     """Write a mesh with its materials and images, and all of its file's facts but `path` and `files`."""
+    content = packed(mesh, facts)
+    write_arrays(path, content.about, content.arrays)
+
+
+def read_mesh(path: Path, source: Path) -> tuple[Mesh, FileFacts]:
+    """The mesh of the model `source` as `write_mesh` stored it, bit for bit. A damaged file raises ValueError, TypeError or
+    KeyError.
+    """
+    return unpacked(read_arrays(path), source)
+
+
+def packed(mesh: Mesh, facts: FileFacts) -> Content:
+    """A mesh and its facts as plain data."""
     arrays = {name: getattr(mesh, name) for name in ARRAYS if getattr(mesh, name) is not None}
     arrays |= {f"image{i}": image.pixels for i, image in enumerate(mesh.images)}
-    header = {
+    about = {
         "materials": [asdict(material) for material in mesh.materials],
         "parts": mesh.parts,
         "body_parts": mesh.body_parts,
@@ -43,16 +53,14 @@ def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
         "marks": [asdict(mark) for mark in facts.marks],
         "keypoints": None if facts.keypoints is None else facts.keypoints.model_dump(),
     }
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    np.savez(path, **arrays)
+    return Content(about, arrays)
 
 
-def read_mesh(path: Path, source: Path) -> tuple[Mesh, FileFacts]:
-    """The mesh of the model `source` as `write_mesh` stored it, bit for bit; a damaged file raises numpy's or json's errors."""
-    with open_file(path) as file, np.load(file, allow_pickle=False) as stored:
-        header: dict[str, Any] = json.loads(stored["header"].tobytes())
-        arrays = {name: stored[name] for name in ARRAYS if name in stored}
-        pixels = [stored[f"image{i}"] for i in range(len(header["images"]))]
+def unpacked(content: Content, source: Path) -> tuple[Mesh, FileFacts]:
+    """The mesh and the facts of the model `source` that `packed` made plain; raises as `read_mesh` does."""
+    header: dict[str, Any] = content.about
+    arrays = {name: content.arrays[name] for name in ARRAYS if name in content.arrays}
+    pixels = [content.arrays[f"image{i}"] for i in range(len(header["images"]))]
     mesh = Mesh(
         **arrays,
         materials=tuple(_material(fields) for fields in header["materials"]),

@@ -1,7 +1,7 @@
 """The program that reads model files, so that a crash costs a message: `python -m viewsphere.assets.reader`.
 
 A line of standard input is a job: the model's specification, the folder for the result, and the limits. The folder receives
-`mesh.npz` and `outcome.json`: the files that the model named, or the error. On Linux a process is forked for each job, and a
+`mesh.arrays` and `outcome.json`: the files that the model named, or the error. On Linux a process is forked for each job, and a
 line of standard output is its exit code. The program itself opens no model, so that nothing of one file is left for the next.
 Other systems do not fork safely: there the program ends with its first job. End of file on standard input means that the
 process that asked is gone.
@@ -28,7 +28,7 @@ from viewsphere.errors import ModelError
 if TYPE_CHECKING:
     from viewsphere.model.model_spec import ModelSpec
 
-MESH, OUTCOME, LOG = "mesh.npz", "outcome.json", "log.txt"
+MESH, OUTCOME, LOG = "mesh.arrays", "outcome.json", "log.txt"
 
 FORKS = sys.platform == "linux"
 """Whether the program reads many files, each in a process forked from it."""
@@ -215,7 +215,7 @@ def _read_model(spec: ModelSpec, job: Job) -> Sequence[Path]:
 
 def mesh_name(number: int) -> str:
     """File name for the mesh of a job's frame, by the frame's position in the job."""
-    return MESH if number == 0 else f"mesh{number}.npz"
+    return MESH if number == 0 else f"mesh{number}.arrays"
 
 
 def _end_with(parent: int) -> None:

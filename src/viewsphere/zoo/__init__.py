@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from viewsphere import plugins
-from viewsphere.aside import aside, temporary
+from viewsphere.aside import temporary
 from viewsphere.caches import cache_of
+from viewsphere.caches.entries import kept, making, note_use
 from viewsphere.files import read_bytes
 
 if TYPE_CHECKING:
@@ -70,14 +71,32 @@ def build(family: str, rng: np.random.Generator) -> Mesh:
 
 def build_zoo_model(spec: ModelSpec) -> Mesh | Path:
     """The procedural model that a `zoo:family` source names, drawn from its seed, and built to the size that it asks for: its
-    mesh, or the file of one that moves.
+    mesh, from the cache where it is there, or the file of one that moves.
     """
-    import numpy as np
-
     file = file_of(spec)
     if file is not None:
         return file
-    family, rng = spec.source.removeprefix(ZOO), np.random.default_rng(spec.seed)
+    family = spec.source.removeprefix(ZOO)
+    if not plugins.family(family).__name__.startswith(f"{__name__}."):  # whose sources, all together, are not known
+        return _built_to_size(family, spec)
+    from viewsphere.assets.mesh_file import packed, unpacked
+    from viewsphere.assets.primitive import FileFacts
+
+    facts = FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0)
+    name = hashlib.sha256(f"{_digest(family)} {family} {spec.seed} {spec.size}".encode()).hexdigest()
+    return kept(
+        "zoo",
+        name,
+        lambda: _built_to_size(family, spec),
+        lambda mesh: packed(mesh, facts),
+        lambda content: unpacked(content, facts.path)[0],
+    )
+
+
+def _built_to_size(family: str, spec: ModelSpec) -> Mesh:
+    import numpy as np
+
+    rng = np.random.default_rng(spec.seed)
     return build(family, rng) if spec.size is None else getattr(plugins.family(family), f"{family}_sized")(rng, spec.size)
 
 
@@ -101,10 +120,10 @@ def file_of(spec: ModelSpec) -> Path | None:
         from viewsphere.assets.glb import rigged_glb_bytes
 
         data = rigged_glb_bytes(_built(family, np.random.default_rng(spec.seed)))
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with aside(file.parent, "building-") as place:
-            (place / file.name).write_bytes(data)
-            (place / file.name).replace(file)
+        with making(file) as half:
+            half.write_bytes(data)
+    else:
+        note_use(file)
     return file
 
 
@@ -120,9 +139,13 @@ def _digest(family: str) -> str:
 
 @cache
 def _sources() -> str:
+    """Digest of all sources that models of the zoo are made by, and of what numpy's sines depend on: the processor's type."""
+    from viewsphere.assets.cache import readers_digest
+    from viewsphere.kernels.build import HOST
+
     own = Path(__file__).parent
-    digest = hashlib.sha256()
-    for source in [*sorted(own.rglob("*.py")), *(own.with_name("assets") / name for name in ("glb.py", "rigged.py"))]:
+    digest = hashlib.sha256(f"{readers_digest()} {HOST}".encode())
+    for source in [*sorted(own.rglob("*.py")), *sorted(own.with_name("geometry").rglob("*.py"))]:
         digest.update(read_bytes(source))
     return digest.hexdigest()
 

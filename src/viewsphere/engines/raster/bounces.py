@@ -7,29 +7,31 @@ Light of lamps and sun reaches patches along rays of their own: nothing depends 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_probes as kernels
+from viewsphere.engines.raster import tracing
 from viewsphere.engines.raster.directions import TURNS, dome
 from viewsphere.engines.raster.environment import Surrounding, sky_along
-from viewsphere.engines.raster.gathering import Gathering, Look, look
+from viewsphere.engines.raster.gathering import Gathering, Look, Round, Spots, look
+from viewsphere.engines.raster.kept_light import kept_light
 from viewsphere.engines.raster.kernels_bounce import COLUMNS, terms
 from viewsphere.engines.raster.kernels_environment import LAMPS
 from viewsphere.engines.raster.kernels_lanterns import shine_at, shine_at_probes, shine_near
 from viewsphere.engines.raster.kernels_views import FOLD, NODES, send_views, spread_views
 from viewsphere.engines.raster.lanterns import Lanterns, lanterns_of
-from viewsphere.engines.raster.lightmaps import has_planes
+from viewsphere.engines.raster.lightmaps import Charts, has_planes
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.patch_rays import RAYS as PATCH_RAYS
 from viewsphere.engines.raster.patch_rays import WAYS, PatchRays, rays_of
-from viewsphere.engines.raster.patches import Patches, Rays, patches_of
+from viewsphere.engines.raster.patches import Patches, Rays, Table, patches_of
 from viewsphere.engines.raster.records import (
     NO_BOUNCES,
     NO_LIGHTMAP,
@@ -38,11 +40,13 @@ from viewsphere.engines.raster.records import (
     Bounces,
     Float32,
     Int32,
+    Lightmap,
     PatchLight,
     Surfaces,
     Textures,
 )
-from viewsphere.engines.raster.tracing import Tree, cast, tree_of
+from viewsphere.engines.raster.tracing import Tree, tree_of
+from viewsphere.engines.raster.vertex_light import Facets, Sites
 from viewsphere.engines.raster.volumes import LAST, Grid, Volume, grids_of, join, rays_of_probes, settle, volume_of
 
 Float = NDArray[np.float64]
@@ -100,6 +104,16 @@ class Hall:
     has_map: bool
     is_fine: bool
 
+    @property
+    def content(self) -> Iterator[Any]:
+        """All that it is made of but for numbers that other things of a stage change, for a digest."""
+        (things, meshes), *others = cast("tuple[Any, ...]", self.key)
+        yield from (thing.model_dump_json(exclude={"id"}) for thing in things)
+        for mesh in meshes:
+            yield from (getattr(mesh, field.name) for field in fields(mesh) if field.name != "images")
+            yield from (image.pixels for image in mesh.images)
+        yield from (others, self.low, self.high, self.is_fine, self.has_map)
+
     @cached_property
     def owns(self) -> NDArray[np.bool_]:
         """Which of the surfaces' triangles are its own, (T,)."""
@@ -136,6 +150,17 @@ class _Lighting:
     surrounding: Surrounding = field(compare=False)
     lights: Lights = field(compare=False)
 
+    @property
+    def content(self) -> Iterator[Any]:
+        """All that it is made of, for a digest."""
+        yield from self.hall.content
+        yield from (*self.lamps, *self.surrounding)
+
+
+LIGHT = (Bounces, Lightmap, PatchLight)
+SEEN = (*LIGHT, _Seen, Tree, Volume, Grid, Rays, Patches, Table, Look, Charts, Spots, Round, Sites, Facets, PatchRays)
+"""Types of which `Bounces` and `_Seen` are made."""
+
 
 def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounces:
     """The light that a hall's things throw at one another. The last hall's rays are kept, and the last light."""
@@ -149,7 +174,7 @@ def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounce
     lamps = tuple(values.tobytes() for values in lights if isinstance(values, np.ndarray))
     sky = tuple(values.tobytes() for values in (surrounding.texels, surrounding.light, surrounding.up))
     lighting = _Lighting(hall, lamps, sky, surrounding, lights)
-    bounces = _bake.__wrapped__(lighting) if hall.key is None else _bake(lighting)
+    bounces = _baked(lighting) if hall.key is None else _bake(lighting)
     if not len(bounces.lightmap.chart):
         return bounces
     chart = np.full(len(hall.surfaces.triangles), -1, np.int32)
@@ -162,15 +187,25 @@ def without_maps(lights: Lights) -> Lights:
     return lights._replace(first=np.zeros_like(lights.first))
 
 
+@lru_cache(maxsize=1)
 def tree_of_hall(hall: Hall) -> Tree:
     """The tree of a hall's triangles; it is there already where the hall is the last one whose light was baked."""
-    return _look(hall).tree
+    return kept_light(("tree", *hall.content), lambda: _tree_of(hall), (Tree,))
+
+
+def _tree_of(hall: Hall) -> Tree:
+    return tree_of(hall.surfaces.vertices[hall.surfaces.triangles[hall.which], 11:14])
 
 
 @lru_cache(maxsize=1)
 def _bake(lighting: _Lighting) -> Bounces:
+    """The light of a hall, from the cache where it is there."""
+    return kept_light(("bounces", *lighting.content), lambda: _baked(lighting), LIGHT)
+
+
+def _baked(lighting: _Lighting) -> Bounces:
     hall, surrounding = lighting.hall, lighting.surrounding
-    seen = _look.__wrapped__(hall) if hall.key is None else _look(hall)
+    seen = _looked(hall, _tree_of(hall)) if hall.key is None else _look(hall)
     bounces, patches = seen.bounces, seen.patches
     light, views = np.zeros_like(bounces.light), np.zeros((len(bounces.light), NODES, 4), np.float32)
     bounces = bounces._replace(light=light, views=views.reshape(-1, 4), floor=np.zeros_like(bounces.floor))
@@ -278,9 +313,13 @@ def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32
 
 @lru_cache(maxsize=1)
 def _look(hall: Hall) -> _Seen:
+    """All that depends on no light, from the cache where it is there."""
+    return kept_light(("seen", *hall.content), lambda: _looked(hall, tree_of_hall(hall)), SEEN)
+
+
+def _looked(hall: Hall, tree: Tree) -> _Seen:
     """Cast all rays."""
     corners = hall.surfaces.vertices[hall.surfaces.triangles[hall.which], 11:14]
-    tree = tree_of(corners)
     normals = hall.surfaces.normals[hall.which]
     grids = grids_of(hall.low, hall.high, hall.unit)
     has_charts = len(grids) == 1 and has_planes(corners, hall.unit)
@@ -290,7 +329,7 @@ def _look(hall: Hall) -> _Seen:
     if hall.has_map and hall.ground_z is not None:
         places, floor_frame = _map(hall, hall.ground_z)
         floor, up, same = np.zeros((MAP, MAP, 4), np.float32), dome(MAP_RAYS)[None], np.zeros(len(places), np.int32)
-        met, far = cast(tree, places, up, same, np.inf)
+        met, far = tracing.cast(tree, places, up, same, np.inf)
         below = Rays(places, up, same, met, far)
         bundles.append(below)
     made = hall.surfaces.vertices, hall.surfaces.triangles[hall.which]

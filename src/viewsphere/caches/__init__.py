@@ -1,0 +1,34 @@
+"""Results that viewsphere keeps because it can make them again: one folder, found by content, within one limit.
+
+    <cache>/<kind>/<digest>.arrays    an entry of `arrays`: JSON and numpy arrays, checked by a digest, mapped into memory
+    <cache>/<kind>/...                other files of a kind, such as compiled kernels
+
+`budget` deletes the entries that were used longest ago. Other folders of the cache hold downloads, which stay.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import platformdirs
+
+KINDS: Mapping[str, str] = {
+    "kernels": "compiled kernels",
+    "light": "baked light of places",
+    "models": "model files as they were read",
+    "parts": "convex parts of models",
+    "zoo": "models of the zoo",
+}
+"""Folders of the cache, and their content. All of it can be made again."""
+
+
+def cache_folder() -> Path:
+    """The folder of all caches: `$VIEWSPHERE_CACHE`, else viewsphere's in the user's cache folder. It may not exist."""
+    return Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere"))
+
+
+def cache_of(kind: str) -> Path:
+    """The folder of one kind of entries. It may not exist."""
+    return cache_folder() / kind

@@ -1,0 +1,125 @@
+"""Files of plain data: JSON and numpy arrays, which processes that read a file share in memory.
+
+    4 bytes    MAGIC
+    16 bytes   xxh128 of all that follows
+    8 bytes    length of the head, little endian
+    head       JSON: {"about": ..., "arrays": {name: [dtype, shape, offset]}}
+    arrays     C-contiguous, at their offsets from the first multiple of LINE bytes behind the head
+
+Nothing in a file is executed: arrays hold numbers, and their places are checked against the file's length.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import mmap
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import BufferedReader
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xxhash
+from numpy.typing import NDArray
+
+from viewsphere.caches.mounts import is_local
+from viewsphere.files import open_file
+
+MAGIC = b"VSA1"
+LINE = 64
+"""Bytes of a processor's cache line, at which every array begins."""
+
+_DIGEST_BYTES, _LENGTH_BYTES = 16, 8
+_START = len(MAGIC) + _DIGEST_BYTES
+_NUMBERS = "?bBhHiIlLqQefd"
+"""numpy's characters of dtypes that arrays may have."""
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+class DamagedError(ValueError):
+    """A file that is not whole, or not of this format."""
+
+
+@dataclass(frozen=True)
+class Content:
+    """The content of a file: plain JSON, and arrays by name. Changes of an array stay in this process."""
+
+    about: Any
+    arrays: Arrays
+
+
+def write_arrays(file: Path, about: Any, arrays: Arrays) -> int:
+    """Write a new file, and return the number of its bytes. Raises OSError as writing does."""
+    blocks = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
+    head = _head(about, blocks)
+    digest = xxhash.xxh3_128(head)
+    with file.open("wb") as stream:
+        stream.write(MAGIC + bytes(_DIGEST_BYTES) + head)
+        for values in blocks.values():
+            for part in (_filling(stream.tell()), _bytes(values)):
+                digest.update(part)
+                stream.write(part)
+        size = stream.tell()
+        stream.seek(len(MAGIC))
+        stream.write(digest.digest())
+    return size
+
+
+def read_arrays(file: Path) -> Content:
+    """The content of a file. Raises DamagedError for a file that is not whole, OSError as opening does."""
+    with open_file(file) as stream:
+        whole = _mapped(stream, file)
+    if bytes(whole[: len(MAGIC)]) != MAGIC or len(whole) < _START + _LENGTH_BYTES:
+        raise DamagedError(f"{file}: not a file of arrays")
+    if xxhash.xxh3_128(whole[_START:]).digest() != bytes(whole[len(MAGIC) : _START]):
+        raise DamagedError(f"{file}: damaged")
+    try:
+        begin = _START + _LENGTH_BYTES
+        length = int.from_bytes(whole[_START:begin], "little")
+        head = json.loads(bytes(whole[begin : begin + length]))
+        data = whole[begin + length + len(_filling(begin + length)) :]
+        return Content(head["about"], {name: _array(data, *place) for name, place in head["arrays"].items()})
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise DamagedError(f"{file}: damaged ({error})") from None
+
+
+def _head(about: Any, blocks: Arrays) -> bytes:
+    """The head, behind its length."""
+    places: dict[str, list[Any]] = {}
+    at = 0
+    for name, values in blocks.items():
+        places[name] = [values.dtype.str, list(values.shape), at]
+        at += values.nbytes + -values.nbytes % LINE
+    text = json.dumps({"about": about, "arrays": places}).encode()
+    return len(text).to_bytes(_LENGTH_BYTES, "little") + text
+
+
+def _filling(at: int) -> bytes:
+    """The bytes up to the next multiple of LINE."""
+    return bytes(-at % LINE)
+
+
+def _bytes(values: NDArray[Any]) -> memoryview:
+    return values.reshape(-1).view(np.uint8).data if values.size else memoryview(b"")
+
+
+def _array(data: memoryview, dtype: str, shape: list[int], at: int) -> NDArray[Any]:
+    kind = np.dtype(dtype)
+    count = math.prod(shape)
+    if kind.char not in _NUMBERS or min(shape, default=0) < 0 or at < 0 or at + count * kind.itemsize > len(data):
+        raise ValueError(f"an array of {dtype} {shape} at {at}")
+    return np.frombuffer(data, kind, count, at).reshape(shape) if count else np.empty(shape, kind)
+
+
+def _mapped(stream: BufferedReader, file: Path) -> memoryview:
+    """All bytes of a file, copied on write: other processes that map it share its memory. A file of another machine is read,
+    since that machine may delete it, which would kill a process that maps it.
+    """
+    size = os.fstat(stream.fileno()).st_size
+    if size and is_local(file):
+        return memoryview(mmap.mmap(stream.fileno(), size, access=mmap.ACCESS_COPY))
+    return memoryview(bytearray(stream.read()))

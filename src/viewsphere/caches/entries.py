@@ -1,0 +1,85 @@
+"""Entries of the cache: written whole or not at all, checked whenever they are read, and never an error.
+
+An entry that is damaged is deleted and made anew. Where the cache cannot be written, or its disk is full, the caller makes its
+result again in each process.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+from viewsphere.aside import aside, sweep
+from viewsphere.caches import budget, cache_of
+from viewsphere.caches.arrays import Arrays, Content, DamagedError, read_arrays, write_arrays
+
+SUFFIX = ".arrays"
+PREFIX = "entry-"
+"""How folders of entries that are being written begin."""
+
+RECENT_S = 600.0
+"""Seconds within which a second use of an entry is not noted: noting one writes to the disk."""
+
+T = TypeVar("T")
+
+
+def kept(kind: str, digest: str, make: Callable[[], T], pack: Callable[[T], Content], unpack: Callable[[Content], T]) -> T:
+    """The result of `make`, from the cache where it has an entry of this kind and digest."""
+    file = cache_of(kind) / f"{digest}{SUFFIX}"
+    content = read_entry(file)
+    if content is not None:
+        with suppress(ValueError, TypeError, KeyError, IndexError):  # of another version, in spite of its digest
+            return unpack(content)
+    result = make()
+    packed = pack(result)
+    write_entry(file, packed.about, packed.arrays)
+    return result
+
+
+def read_entry(file: Path) -> Content | None:
+    """The content of an entry; None where there is none that is whole."""
+    try:
+        content = read_arrays(file)
+    except DamagedError:
+        with suppress(OSError):
+            file.unlink()
+        return None
+    except (OSError, MemoryError):
+        return None
+    note_use(file)
+    return content
+
+
+def write_entry(file: Path, about: Any, arrays: Arrays) -> None:
+    """Write an entry where that is possible."""
+    with suppress(OSError), making(file) as half:
+        write_arrays(half, about, arrays)
+
+
+@contextmanager
+def making(file: Path) -> Generator[Path]:
+    """A path at which to write an entry's file, which appears when the block has ended; raises OSError as writing does."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    sweep(file.parent, PREFIX)
+    with aside(file.parent, PREFIX) as place:
+        half = place / file.name
+        yield half
+        publish(half, file)
+
+
+def publish(half: Path, file: Path) -> None:
+    """Make a whole file an entry of the cache, and keep the cache within its limit; raises OSError as renaming does."""
+    size = half.stat().st_size
+    half.replace(file)
+    budget.note_written(size)
+
+
+def note_use(file: Path) -> None:
+    """Note that an entry was used, as the time of its last change."""
+    with suppress(OSError):
+        if abs(time.time() - file.stat().st_mtime) > RECENT_S:
+            os.utime(file)
