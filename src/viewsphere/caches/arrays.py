@@ -29,6 +29,11 @@ from viewsphere.caches.mounts import is_local
 from viewsphere.files import open_file
 
 MAGIC = b"VSA1"
+MAPPED_BYTES = 8 << 20
+"""Bytes from which on a file is mapped. Sharing smaller ones saves little, and a program that truncates a mapped file in place
+ends the processes that map it. viewsphere itself only replaces and deletes files.
+"""
+
 LINE = 64
 """Bytes of a processor's cache line, at which every array begins."""
 
@@ -116,10 +121,10 @@ def _array(data: memoryview, dtype: str, shape: list[int], at: int) -> NDArray[A
 
 
 def _mapped(stream: BufferedReader, file: Path) -> memoryview:
-    """All bytes of a file, copied on write: other processes that map it share its memory. A file of another machine is read,
-    since that machine may delete it, which would kill a process that maps it.
+    """All bytes of a file. A large one is mapped, and copied on write: processes share its memory. A file of another machine is
+    read, since that machine may delete it, which would end a process that maps it.
     """
     size = os.fstat(stream.fileno()).st_size
-    if size and is_local(file):
+    if size >= MAPPED_BYTES and is_local(file):
         return memoryview(mmap.mmap(stream.fileno(), size, access=mmap.ACCESS_COPY))
     return memoryview(bytearray(stream.read()))
