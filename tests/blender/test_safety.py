@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from pathlib import Path
 
@@ -72,6 +73,120 @@ def test_files_do_not_run_and_sockets_do_not_open(blender, tmp_path):
     assert opened.returncode == 0, opened.stderr
     assert "kept off" in opened.stdout
     assert "['driver ran', 'text ran']" in opened.stdout
+
+
+CONTAINED = """
+import os, sys
+sys.path.append(sys.argv[2])
+from worker.confine import confine
+folder = sys.argv[1]
+if not confine([folder + "/given"], [folder + "/own"]):
+    print("no Landlock")
+    sys.stdout.flush()
+    os._exit(0)
+from worker.__main__ import start_blender
+start_blender()
+import bpy
+bpy.ops.wm.open_mainfile(filepath=folder + "/given/file.blend", use_scripts=True)
+print("went on")
+"""
+
+TRIES = """
+import os, socket, urllib.request
+from pathlib import Path
+log = Path({folder!r}) / "own" / "log"
+def tried(name, act):
+    try:
+        act()
+    except OSError as error:
+        log.open("a").write(name + ": " + type(error).__name__ + "\\n")
+    else:
+        log.open("a").write(name + ": done\\n")
+tried("write", lambda: (Path({folder!r}) / "written").write_text("x"))
+tried("key", lambda: (Path({folder!r}) / ".ssh" / "id").read_text())
+tried("home", lambda: os.listdir(Path.home()))
+tried("remove", lambda: os.remove({folder!r} + "/given/file.blend"))
+tried("socket", lambda: socket.create_connection(("127.0.0.1", 9), timeout=1))
+tried("name", lambda: socket.getaddrinfo("localhost", 80))
+tried("own", lambda: (Path({folder!r}) / "own" / "fine").write_text("x"))
+"""
+
+MAKE_TRYING = """
+import os, sys
+import bpy
+text = bpy.data.texts.new("run_me.py")
+text.write(os.environ["TRIES"])
+text.use_module = True
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1] + "/given/file.blend")
+"""
+
+
+def test_scripts_that_would_run_are_contained(blender, tmp_path):
+    """The second wall: the file's script is run on purpose, and reaches only the process's own folder."""
+    for name in ("given", "own", ".ssh"):
+        (tmp_path / name).mkdir()
+    (tmp_path / ".ssh" / "id").write_text("secret")
+    worker, tries = Path(package.__file__).parent, TRIES.format(folder=str(tmp_path))
+
+    def run(code):
+        words = [blender, "-c", code + LEAVE, tmp_path, worker]
+        return subprocess.run(words, capture_output=True, text=True, timeout=DEADLINE, env=os.environ | {"TRIES": tries})
+
+    assert run(MAKE_TRYING).returncode == 0
+    opened = run(CONTAINED)
+    if "no Landlock" in opened.stdout:
+        pytest.skip("needs Landlock, of Linux 5.13 and later")
+    assert "went on" in opened.stdout, opened.stderr
+    told = dict(line.split(": ") for line in (tmp_path / "own" / "log").read_text().splitlines())
+    assert told.pop("own") == "done"
+    assert told.keys() == {"write", "key", "home", "remove", "socket", "name"}
+    assert set(told.values()) == {"PermissionError"}
+    assert not (tmp_path / "written").exists()
+
+
+MAKE_STYLED = """
+import os, sys
+import bpy
+style = bpy.data.texts.new("style.py")
+style.write(f"open({sys.argv[1] + '/style ran'!r}, 'w')")
+scene = bpy.context.scene
+scene.render.use_freestyle = scene.view_layers[0].use_freestyle = True
+scene.view_layers[0].freestyle_settings.mode = "SCRIPT"
+scene.view_layers[0].freestyle_settings.modules.new().script = style
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1] + "/file.blend")
+"""
+RENDER_STYLED = """
+import os, sys
+sys.path.append(sys.argv[2])
+from worker.__main__ import start_blender
+start_blender()
+import bpy
+from worker.opening import open_file
+def ran():
+    render = bpy.context.scene.render
+    render.engine, render.resolution_x, render.resolution_y = "CYCLES", 8, 8
+    bpy.context.scene.cycles.samples = 1
+    bpy.ops.render.render()
+    return [name for name in os.listdir(sys.argv[1]) if name.endswith(" ran")]
+file = sys.argv[1] + "/file.blend"
+print(open_file(file, "blend", None)[1])
+assert bpy.context.scene.render.use_freestyle
+assert not ran()
+# That the file would have run is part of the proof.
+bpy.ops.wm.open_mainfile(filepath=file)
+print(ran())
+"""
+
+
+def test_style_modules_do_not_run(blender, tmp_path):
+    """Blender runs them at rendering, whatever is set about scripts."""
+    worker = Path(package.__file__).parent
+    for code in (MAKE_STYLED, RENDER_STYLED):
+        words = [blender, "-c", code + LEAVE, tmp_path, worker]
+        run = subprocess.run(words, capture_output=True, text=True, timeout=DEADLINE)
+        assert run.returncode == 0, run.stderr
+    assert "style modules of Freestyle do not run: 'style.py'" in run.stdout
+    assert "['style ran']" in run.stdout
 
 
 def test_a_model_that_is_read_does_not_run(blender, tmp_path):

@@ -24,6 +24,18 @@ def needed():
     return said
 
 
+def remove_styles():
+    """Remove the style modules of Freestyle from all scenes: Blender runs their Python at rendering, also where it runs no
+    other scripts, and a compositor may render other scenes than the open one. Returns a warning where there are any.
+    """
+    layers = [layer for scene in bpy.data.scenes for layer in scene.view_layers if hasattr(layer, "freestyle_settings")]
+    styles = {one.script for layer in layers for one in layer.freestyle_settings.modules if one.script is not None}
+    names = sorted(style.name for style in styles)
+    for style in styles:
+        bpy.data.texts.remove(style)
+    return [f"style modules of Freestyle do not run: {_listed(names)}"] if names else []
+
+
 def _trees():
     """All node trees: groups, and those within materials, worlds, lights and scenes."""
     yield from bpy.data.node_groups

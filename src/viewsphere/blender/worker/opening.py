@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from .addons import needed
+from .addons import needed, remove_styles
 from .playing import play, set_span
 from .rates import DEFAULT, key_rate, own_rate, set_rate
 
@@ -36,6 +36,7 @@ def open_file(file, kind, root, cameras=False, clip=None, fps=None):
             _import(file, SAME.get(kind, kind), cameras, fps)
     except RuntimeError as error:
         raise ValueError(" ".join(str(error).removeprefix("Error: ").split())) from None
+    warnings = remove_styles()
     scene = bpy.context.scene
     if fps is not None:
         set_rate(scene, fps)
@@ -45,7 +46,7 @@ def open_file(file, kind, root, cameras=False, clip=None, fps=None):
     scene.frame_set(scene.frame_start)
     units = scene.unit_settings
     metres = units.scale_length if kind == "blend" and units.system != "NONE" else 1.0
-    return metres, [*_newer(kind), *_libraries(root), *needed()]
+    return metres, [*warnings, *_newer(kind), *_libraries(root), *needed()]
 
 
 def _import(file, kind, cameras, fps):
