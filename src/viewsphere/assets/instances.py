@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
-from typing import Any
+from xml.etree.ElementTree import Element
 
 from viewsphere.assets.folder import ModelFolder
-from viewsphere.limits import limits
 
 ENOUGH = 10**12
 """Counting stops here: more digits would be a message of pages."""
@@ -47,36 +45,24 @@ def check_instances(folder: ModelFolder, references: Mapping[str, Sequence[str]]
     folder.check("MAX_INSTANCES", count, "instances")
 
 
-def dae_references(data: bytes) -> dict[str, list[str]]:
-    """For each node of a COLLADA file its child nodes and the nodes it instantiates; the root is `""`.
-
-    Nothing for a file that has too few nodes to break a limit.
-    """
-    is_wide = b"\0" in data[:64]  # UTF-16
-    if not is_wide and b"instance_node" not in data and data.count(b"node") <= limits.MAX_NESTING:
-        return {}
-    from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
-
+def dae_references(root: Element) -> dict[str, list[str]]:
+    """For each node of a COLLADA file its child nodes and the nodes it instantiates; the scenes' own parent is `""`."""
     # Nodes are told apart by their numbers: files in which two have the same id are common.
-    root, library = "", "library"
-    references: dict[str, list[str]] = {root: [], library: []}
+    scenes, library = "", "library"
+    references: dict[str, list[str]] = {scenes: [], library: []}
     by_url: dict[str, str] = {}
-    open_nodes = [library]
-    parser: Any = etree.iterparse(
-        io.BytesIO(data), events=("start", "end"), recover=True, resolve_entities=False, no_network=True, load_dtd=False
-    )
-    for event, element in parser:
-        tag = str(element.tag).rpartition("}")[2]
-        if tag == "instance_node" and event == "start":
-            references[open_nodes[-1]].append(str(element.get("url", "")))
-        elif tag == "node" and event == "start":
+    waiting = [(root, library)]
+    while waiting:
+        element, owner = waiting.pop()
+        if element.tag == "instance_node":
+            references[owner].append(element.get("url", ""))
+        elif element.tag == "visual_scene":
+            owner = scenes
+        elif element.tag == "node":
             name = f"node {len(references)}"
             by_url.setdefault(f"#{element.get('id')}", name)
             references[name] = []
-            references[open_nodes[-1]].append(name)
-            open_nodes.append(name)
-        elif tag == "visual_scene" and event == "start":
-            open_nodes.append(root)
-        elif tag in {"node", "visual_scene"}:
-            open_nodes.pop()
+            references[owner].append(name)
+            owner = name
+        waiting += ((child, owner) for child in reversed(element))
     return {name: [by_url.get(other, other) for other in inner] for name, inner in references.items()}

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.assets.folder import UnreadableError
+from viewsphere.errors import MissingExtraError
 from viewsphere.files import check_file, open_file
 from viewsphere.limits import limits
 
@@ -101,12 +102,22 @@ def _unreadable(path: Path, found: str) -> UnreadableError:
     return UnreadableError(f"environment {path}: {EXPECTED}, {found}")
 
 
-def _exr(path: Path) -> ExrHead:
-    import OpenEXR
+def openexr(path: Path) -> Any:
+    """The package that reads this EXR file; raises MissingExtraError where it is not installed."""
+    try:
+        import OpenEXR
+    except ImportError:
+        raise MissingExtraError(
+            f"environment {path}: expected the package OpenEXR, found none: pip install 'viewsphere[exr]', or take an HDR"
+        ) from None
+    return OpenEXR
 
+
+def _exr(path: Path) -> ExrHead:
+    library = openexr(path)
     try:
         check_file(path, "MAX_PICTURE_BYTES")
-        with silenced(), OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
+        with silenced(), library.File(str(path), separate_channels=True, header_only=True) as file:
             found = _colors(file)
             if found is None:
                 channels = ", ".join(sorted({name for part in file.parts for name in _names(part)}))

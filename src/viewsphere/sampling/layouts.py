@@ -26,6 +26,7 @@ from viewsphere.sampling.packages import check_packages
 from viewsphere.sampling.physics import EDITION
 from viewsphere.sampling.placing import Draws, Piece, Placer, Room, Shape, Way
 from viewsphere.sampling.scenery import composed
+from viewsphere.sampling.stable_poses import NEEDS as STABLE_NEEDS
 from viewsphere.sampling.stable_poses import stable_turn
 
 Float = NDArray[np.float64]
@@ -144,7 +145,7 @@ def check_layout(layout: Layout, field: str) -> None:
 def check_orientation(orientation: str, field: str) -> None:
     """See that things can be turned in this way; raises MissingExtraError for packages that it needs."""
     if orientation == "stable":
-        check_packages(("scipy",), "physics", f"{field}.orientation: stable")
+        check_packages(STABLE_NEEDS, "physics", f"{field}.orientation: stable")
 
 
 def has_ways(layout: Layout) -> bool:

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import MissingExtraError
 from viewsphere.geometry.rotation import rotation_about
+from viewsphere.sampling.packages import check_packages
 
 Float = NDArray[np.float64]
+
+NEEDS = ("trimesh", "networkx", "scipy")
+"""Packages of the extra physics."""
 
 RAREST = 0.02
 """Share of its falls after which a model comes to lie in a way, below which it is taken for one on which it tips over."""
@@ -22,7 +25,7 @@ def stable_turn(hull: Float, rng: np.random.Generator) -> Float:
     as likely as the model, let go at random, is to come to rest so (Goldberg et al. 1999, by trimesh's `compute_stable_poses`).
     Turned about the vertical at random.
 
-    Raises MissingExtraError without scipy.
+    Raises MissingExtraError without the packages that it needs.
     """
     ways, chances = stable_ways(hull)
     way = ways[int(rng.choice(len(ways), p=chances))]
@@ -36,12 +39,7 @@ def stable_ways(hull: Float) -> tuple[Float, Float]:
 
 @lru_cache(maxsize=256)
 def _stable_ways(corners: bytes) -> tuple[Float, Float]:
-    try:
-        import scipy  # pyright: ignore[reportUnusedImport]  # noqa: F401
-    except ImportError:
-        raise MissingExtraError(
-            "orientation: expected the package scipy for stable poses, found none: pip install 'viewsphere[physics]'"
-        ) from None
+    check_packages(NEEDS, "physics", "orientation: stable")
     import trimesh
 
     hull = np.frombuffer(corners).reshape(-1, 3)

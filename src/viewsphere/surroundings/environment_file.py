@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.folder import UnreadableError
-from viewsphere.assets.sphere import EXPECTED, ExrHead, HdrHead, check_shape, read_head, silenced
+from viewsphere.assets.sphere import EXPECTED, ExrHead, HdrHead, check_shape, openexr, read_head, silenced
 from viewsphere.errors import RecipeError
 from viewsphere.files import check_file, open_file, read_bytes
 from viewsphere.surroundings.kernels_rgbe import decode_rows
@@ -69,11 +69,10 @@ def _error(path: Path, found: str) -> UnreadableError:
 
 
 def _read_exr(path: Path, head: ExrHead) -> Float32:
-    import OpenEXR
-
+    library = openexr(path)
     try:
         check_file(path, "MAX_PICTURE_BYTES")
-        with silenced(), OpenEXR.File(str(path), separate_channels=True) as file:
+        with silenced(), library.File(str(path), separate_channels=True) as file:
             if not file.parts:  # OpenEXR returns no parts for pixels that it cannot read
                 raise _error(path, "found one whose pixels cannot be read: damaged or cut off; get or export it again")
             channels: Any = file.parts[head.part].channels

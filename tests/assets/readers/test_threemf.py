@@ -142,7 +142,7 @@ def test_what_is_not_read_is_a_warning(write):
         (model(triangle(corner='v3="9"').replace('v3="2" v3', "v3"), '<item objectid="1"/>'), "vertex 9"),
         (model(triangle().replace('x="2"', 'x="2,5"'), '<item objectid="1"/>'), "three numbers"),
         (model(triangle(corner='pid="5" p1="3"') + '<basematerials id="5"/>', '<item objectid="1"/>'), "base material 3"),
-        ("<model", "no well-formed XML"),
+        ("<model", "not well-formed XML"),
         ("<html/>", "expected <model>, found <html>"),
         (model(""), "no triangles"),
     ],

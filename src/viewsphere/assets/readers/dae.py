@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ from viewsphere.assets.readers.dae_material import DaeMaterials, is_double_sided
 from viewsphere.assets.readers.dae_mesh import DaeFaces, numbers_of, read_mesh
 from viewsphere.assets.smoothing import creased
 from viewsphere.assets.transform import moved
+from viewsphere.assets.xml_tree import parse_xml
 from viewsphere.model.model_spec import Axis
 
 AXES: dict[str, tuple[Axis, Axis]] = {"X_UP": ("+x", "+z"), "Y_UP": ("+y", "+z"), "Z_UP": ("+z", "-y")}
@@ -30,30 +30,14 @@ def read_dae(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     Vertex colours are taken as sRGB. Without normals, edges are smooth up to a crease. Raises ModelError.
     """
     data = folder.read_model()
-    root = _parse(folder, data)
-    check_instances(folder, dae_references(data))
+    root = parse_xml(folder, data)
+    if root.tag != "COLLADA":
+        raise folder.error(f"expected a COLLADA file, found XML of <{root.tag[:40]}>")
+    check_instances(folder, dae_references(root))
     materials = DaeMaterials(folder, root)
     pieces = list(_Scene(folder, root, materials).pieces())
     kept = with_alpha_modes(folder, pieces, materials.kept or [Material()], materials.stated)
     return assemble(folder, pieces, kept, _facts(folder, root))
-
-
-def _parse(folder: ModelFolder, data: bytes) -> Any:
-    """The root of the file's tree; entities are not expanded."""
-    from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
-
-    parser: Any = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=True, remove_comments=True)
-    try:
-        root = etree.parse(io.BytesIO(data), parser).getroot()
-    except etree.XMLSyntaxError as error:
-        raise folder.error(f"is not well-formed XML ({str(error.msg)[:120]}): truncated or damaged") from None
-    name = str(root.tag).rpartition("}")[2]
-    if name != "COLLADA":
-        raise folder.error(f"expected a COLLADA file, found XML of <{name[:40]}>")
-    for element in root.iter():
-        if isinstance(element.tag, str):
-            element.tag = element.tag.rpartition("}")[2]
-    return root
 
 
 def _facts(folder: ModelFolder, root: Any) -> FileFacts:
@@ -81,8 +65,9 @@ class _Scene:
     _names: dict[str, int] = field(default_factory=dict[str, int])
 
     def __post_init__(self) -> None:
-        for element in self.root.iter("node", "geometry", "controller", "visual_scene"):
-            self._elements.setdefault((element.tag, str(element.get("id"))), element)
+        for element in self.root.iter():
+            if element.tag in ("node", "geometry", "controller", "visual_scene"):
+                self._elements.setdefault((element.tag, str(element.get("id"))), element)
 
     def pieces(self) -> Iterator[Primitive]:
         """Return all faces of the scene where its nodes put them; of a file without a scene each geometry once."""
@@ -122,7 +107,7 @@ class _Scene:
         controller = self._target("controller", instance)
         bound = self._bound(instance)
         while controller is not None:
-            inner = next(controller.iterchildren("skin", "morph"), None)
+            inner = next((child for child in controller if child.tag in ("skin", "morph")), None)
             if inner is None:
                 return
             shape = numbers_of(self.folder, inner.find("bind_shape_matrix"), np.float64)

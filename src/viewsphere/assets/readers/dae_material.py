@@ -31,8 +31,9 @@ class DaeMaterials:
     _elements: dict[tuple[str, str], Any] = field(default_factory=dict[tuple[str, str], Any])
 
     def __post_init__(self) -> None:
-        for element in self.root.iter("image", "effect", "material"):
-            self._elements.setdefault((element.tag, str(element.get("id"))), element)
+        for element in self.root.iter():
+            if element.tag in ("image", "effect", "material"):
+                self._elements.setdefault((element.tag, str(element.get("id"))), element)
 
     def dressed(self, faces: DaeFaces, part: str, instance: Any, sides: bool | None = None) -> Primitive:
         """The faces with the material that an `<instance_material>` gives; with None the one whose id is the faces' symbol.

@@ -23,6 +23,7 @@ from viewsphere.assets.readers.threemf_object import Object, Part, objects_of
 from viewsphere.assets.readers.threemf_resources import Resources
 from viewsphere.assets.smoothing import creased
 from viewsphere.assets.transform import moved
+from viewsphere.assets.xml_tree import parse_xml
 from viewsphere.errors import ModelError
 
 UNITS = {
@@ -84,17 +85,8 @@ class _Package:
 
     def _parsed(self, path: str) -> Any:
         """The root element of a file of the archive, tags and attributes without their namespaces."""
-        from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
-
         if path not in self._roots:
-            data = self._bytes(path)
-            parser: Any = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=True)
-            try:
-                self._roots[path] = etree.parse(io.BytesIO(data), parser).getroot()
-            except etree.XMLSyntaxError as error:
-                raise self.folder.error(
-                    f"{path} is no well-formed XML ({str(error.msg)[:100]}): truncated or damaged"
-                ) from None
+            self._roots[path] = parse_xml(self.folder, self._bytes(path), path)
         return self._roots[path]
 
     def _bytes(self, path: str) -> bytes:
@@ -106,19 +98,15 @@ class _Package:
     def model(self, path: str) -> Any:
         """The `<model>` of a model file."""
         root = self._parsed(path)
-        if _tag(root) != "model":
-            raise self.folder.error(f"{path}: expected <model>, found <{_tag(root)[:40]}>")
+        if root.tag != "model":
+            raise self.folder.error(f"{path}: expected <model>, found <{root.tag[:40]}>")
         return root
 
     def items(self) -> list[Part]:
         """The items of the build; of a file without any, all objects that are no components, with a warning."""
         path = self.root
         items = [
-            Part.of(item, path)
-            for build in self.model(path)
-            if _tag(build) == "build"
-            for item in build
-            if _tag(item) == "item"
+            Part.of(item, path) for build in self.model(path) if build.tag == "build" for item in build if item.tag == "item"
         ]
         if items:
             return items
@@ -184,7 +172,3 @@ def _name_of(key: Key) -> str:
 
 def _clean(path: str) -> str:
     return posixpath.normpath(unquote(path).replace("\\", "/")).lstrip("/")
-
-
-def _tag(element: Any) -> str:
-    return str(element.tag).rpartition("}")[2]

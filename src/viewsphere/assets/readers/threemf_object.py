@@ -26,7 +26,7 @@ class Part:
     @staticmethod
     def of(element: Any, path: str) -> Part:
         """The part that an `<item>` or `<component>` of the model file `path` names."""
-        attributes = {name.rpartition("}")[2]: value for name, value in element.attrib.items()}
+        attributes = element.attrib
         place = posixpath.normpath(attributes.get("path", path).replace("\\", "/")).lstrip("/")
         return Part((place, attributes.get("objectid", "")), _matrix(attributes.get("transform", "")))
 
@@ -55,20 +55,20 @@ class Object:
 def objects_of(folder: ModelFolder, model: Any, path: str) -> dict[str, Object]:
     """The objects of a model file by their ids."""
     objects: dict[str, Object] = {}
-    for element in model.iter("{*}object"):
-        mesh = next(element.iterchildren("{*}mesh"), None)
-        components = tuple(Part.of(part, path) for part in element.iterfind("{*}components/{*}component"))
+    for element in model.iter("object"):
+        mesh = next(element.iterfind("mesh"), None)
+        components = tuple(Part.of(part, path) for part in element.iterfind("components/component"))
         triangles = None if mesh is None else _triangles(folder, element, mesh)
         objects[str(element.get("id"))] = Object(str(element.get("name") or "").strip()[:80], triangles, components)
     return objects
 
 
 def _triangles(folder: ModelFolder, element: Any, mesh: Any) -> Triangles:
-    vertices = [(v.get("x"), v.get("y"), v.get("z")) for v in mesh.iterfind("{*}vertices/{*}vertex")]
-    rows = list(mesh.iterfind("{*}triangles/{*}triangle"))
+    vertices = [(v.get("x"), v.get("y"), v.get("z")) for v in mesh.iterfind("vertices/vertex")]
+    rows = list(mesh.iterfind("triangles/triangle"))
     folder.check("MAX_VERTICES", len(vertices), "vertices")
     folder.check("MAX_TRIANGLES", len(rows), "triangles")
-    if next(mesh.iterchildren("{*}beamlattice"), None) is not None:
+    if next(mesh.iterfind("beamlattice"), None) is not None:
         folder.warn("beam lattices are left out")
     where = f"object {element.get('id')}"
     positions = _numbers(folder, vertices, np.float64, where)

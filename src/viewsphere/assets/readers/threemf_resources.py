@@ -27,7 +27,7 @@ class Resources:
         self.folder = folder
         self.materials = materials
         self.picture = picture
-        self.elements = {str(e.get("id")): e for e in model.iterfind("{*}resources/*") if isinstance(e.tag, str)}
+        self.elements = {str(e.get("id")): e for e in model.iterfind("resources/*")}
 
     def dressed(self, one: Object) -> Iterator[Primitive]:
         """An object's triangles with their materials, a piece for each material."""
@@ -41,13 +41,13 @@ class Resources:
 
     def _group(self, group: str, piece: Primitive, properties: Int) -> Iterator[Primitive]:
         element = self.elements.get(group)
-        kind = "" if element is None else str(element.tag).rpartition("}")[2]
+        kind = "" if element is None else element.tag
         if element is None:
             yield self._plain(piece, group, "do not exist")
         elif kind == "basematerials":
             yield from self._by_base(element, piece, properties[:, 0])
         elif kind == "colorgroup":
-            colors = np.array([_color(child.get("color")) for child in element.iterchildren("{*}color")])
+            colors = np.array([_color(child.get("color")) for child in element.iterfind("color")])
             yield replace(split(piece), colors=self._picked(colors, properties, group))
         elif kind == "texture2dgroup":
             yield self._textured(element, piece, properties, group)

@@ -48,7 +48,7 @@ def convex_parts(shape: Shape) -> list[Float]:
 
 def _parted(vertices: Float, triangles: NDArray[np.int32]) -> list[Float]:
     coacd = needed("coacd")
-    import trimesh
+    trimesh = needed("trimesh")
 
     coacd.set_log_level("error")
     mesh = trimesh.Trimesh(vertices, triangles, process=False)
