@@ -69,9 +69,8 @@ class RayCaster:
     """
 
     def __init__(self, dataset: Dataset, scenery: Scenery) -> None:
-        for package in ("embreex", "trimesh"):
-            if find_spec(package) is None:
-                raise MissingExtraError(f"expected {package}, found none: pip install 'viewsphere[check]'")
+        if find_spec("embreex") is None or find_spec("trimesh") is None:
+            raise MissingExtraError("expected embreex and trimesh, found none: pip install 'viewsphere[check]'")
         self._dataset, self._scenery = dataset, scenery
         self._files = {info.key: (dataset.path(info.glb), info.node, info.faces is not None) for info in dataset.models}
         self._known: dict[str, _Soup] = {}
