@@ -167,6 +167,7 @@ ON_DATA = {
 
 IN_THE_SOURCE = {
     "expected room for",
+    "others can write this folder",
     "scaled to its real length",
     "expected finished frames",
     "expected nobody else to append",
@@ -181,6 +182,7 @@ IN_THE_SOURCE = {
 
 TRIED = {
     "limit MAX_READ_SECONDS",
+    "so kernels are compiled for it alone",
     "files are read by Blender",
     "Blender cannot read it",
     "its frames are not known",
@@ -352,13 +354,30 @@ def test_no_hard_links(said, monkeypatch):
 
 
 def test_the_first_run_says_why_it_takes_longer(monkeypatch, tmp_path, capsys):
-    from viewsphere.cli.making import _announce_compilation
+    from viewsphere.cli.making import _compile_kernels
+    from viewsphere.run import warm
+
+    def compile_all(overloads, tell):
+        tell(0, 2)
+        tell(2, 2)
 
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
-    folder = tmp_path / "kernels" / "imported"
-    folder.mkdir(parents=True)
-    _announce_compilation()
+    monkeypatch.setattr(warm, "compile_all", compile_all)
+    _compile_kernels()
     assert_shown("compiling kernels", capsys.readouterr().err)
-    (folder / "compiled.kernel").touch()
-    _announce_compilation()
+    _compile_kernels()
     assert capsys.readouterr().err == ""
+
+
+def test_an_old_processor_is_named_where_kernels_are_compiled(monkeypatch, capsys):
+    from viewsphere.cli.terminal import ProgressBar
+    from viewsphere.kernels import build
+    from viewsphere.run.progress import Progress
+
+    monkeypatch.setattr(build, "TARGET", build.Target.of(build.TRIPLE, "ivybridge", {"avx": True}, native=False))
+    with ProgressBar(quiet=False) as bar:
+        for done in range(3):
+            bar.show(Progress("kernels", done, 2))
+    said = capsys.readouterr().err
+    assert said.count("lacks avx2") == 1
+    assert_shown("so kernels are compiled for it alone", said)

@@ -39,6 +39,7 @@ def test_a_machine_where_all_works(tmp_path, monkeypatch):
     assert told["blender"]["devices"][0] == {"kind": "CPU", "name": "A processor"}
     assert told["blender"]["graphics"] == {"driver": "A driver", "problem": None}
     assert told["processor"]["cores"] >= 1
+    assert told["kernels"]["target"] and told["kernels"]["numba"] and told["kernels"]["llvmlite"]
     assert {extra["name"] for extra in told["extras"]} >= {"check", "codecs"}
     assert all((extra["install"] is None) == (None not in extra["packages"].values()) for extra in told["extras"])
 
@@ -80,6 +81,22 @@ def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
     kernels = json.loads(doctor("--json").stdout)["kernels"]
     assert (kernels["writable"], kernels["compiled"]) == (False, False)
     assert "set VIEWSPHERE_CACHE" in doctor().stdout
+
+
+def test_speed_is_measured_in_a_second_once_kernels_are_there(monkeypatch):
+    from viewsphere.run import speed, warm
+
+    monkeypatch.setattr(speed, "is_precompiled", lambda shot: False)
+    assert speed.measure_speed() is None
+    assert "speed        not measured" in doctor().stdout
+    monkeypatch.setattr(speed, "is_precompiled", lambda shot: True)
+    monkeypatch.setattr(speed, "render", lambda recipe: iter(range(5)))
+    clock = iter([0.0, 0.020, 0.050, 0.070, 0.090])
+    monkeypatch.setattr(speed.time, "process_time", lambda: next(clock))
+    found = speed.measure_speed()
+    assert found is not None and found.frame_ms == pytest.approx(20)
+    assert found.relative == pytest.approx(speed.REFERENCE_MS / 20)
+    assert warm.sketched(speed.RECIPE).objects
 
 
 @pytest.mark.slow

@@ -25,9 +25,9 @@ def root(monkeypatch, tmp_path):
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(entries.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()
-    entries._is_own.cache_clear()
+    entries._warn.cache_clear()
     yield tmp_path / "cache" / "kernels"
-    entries._is_own.cache_clear()
+    entries._warn.cache_clear()
 
 
 def test_an_entry_is_read_as_it_was_written(root):
@@ -65,7 +65,7 @@ def test_a_folder_that_others_can_write_is_not_read(root, capsys, tmp_path, plac
     entries.save(NAME, b"hostile")
     folder = root if place == "kernels" else root / "0123"
     folder.chmod(mode)
-    entries._is_own.cache_clear()
+    entries._warn.cache_clear()
     assert entries.load(NAME) is None and not entries.has(NAME)
     assert entries.load(NAME) is None
     warned = capsys.readouterr().err
@@ -89,7 +89,7 @@ def test_a_file_that_others_can_write_is_not_read(root):
 def test_nothing_of_another_user_is_read(root, place, monkeypatch):
     entries.save(NAME, b"hostile")
     os.chown(root / place, 12345, 12345)
-    entries._is_own.cache_clear()
+    entries._warn.cache_clear()
     assert entries.load(NAME) is None
 
 

@@ -60,6 +60,7 @@ def examine() -> dict[str, Any]:
         "system": platform.platform(),
         "processor": _processor(),
         "kernels": _kernels(),
+        "speed": _speed(),
         "extras": [_extra(name, packages) for name, packages in sorted(_extras().items())],
         "blender": _blender(),
         "people": makehuman.where(),
@@ -85,13 +86,31 @@ def _processor() -> dict[str, Any]:
 
 
 def _kernels() -> dict[str, Any]:
-    """The folder of compiled kernels, whether it is writable, and whether it holds any."""
+    """The folder of compiled kernels, whether it is writable, whether there are any and from where, and what they are for."""
+    from viewsphere.kernels.build import LLVMLITE, NUMBA, TARGET
     from viewsphere.kernels.entries import SUFFIX, kernel_folder
+    from viewsphere.run.warm import has_all
 
     folder = kernel_folder()
     there = next(place for place in (folder, *folder.parents) if place.exists())
-    compiled = any(folder.glob(f"*/*{SUFFIX}"))
-    return {"folder": str(folder), "writable": there.is_dir() and os.access(there, os.W_OK), "compiled": compiled}
+    return {
+        "folder": str(folder),
+        "writable": there.is_dir() and os.access(there, os.W_OK),
+        "compiled": has_all() or any(folder.glob(f"*/*{SUFFIX}")),
+        "complete": has_all(),
+        "target": TARGET.cpu,
+        "note": TARGET.note or None,
+        "numba": NUMBA,
+        "llvmlite": LLVMLITE,
+    }
+
+
+def _speed() -> dict[str, Any] | None:
+    """CPU milliseconds of a frame, beside the machine of docs/performance.md; None where kernels are not compiled yet."""
+    from viewsphere.run.speed import REFERENCE_MS, measure_speed
+
+    speed = measure_speed()
+    return speed and {"frame_ms": speed.frame_ms, "relative": speed.relative, "reference_ms": REFERENCE_MS}
 
 
 def _extras() -> dict[str, list[str]]:
@@ -146,9 +165,7 @@ def _lines(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "Python", f"{python['version']}, {python['executable']}"
     yield "system", found["system"]
     yield "processor", f"{processor['name']}, {processor['cores']} {'core' if processor['cores'] == 1 else 'cores'}"
-    compiled = "compiled" if kernels["compiled"] else "not compiled yet: the first picture takes about 20 seconds longer"
-    unwritable = "" if kernels["writable"] else "cannot be written: set VIEWSPHERE_CACHE; "
-    yield "kernels", f"{kernels['folder']}: {unwritable}{compiled}"
+    yield from _kernel_lines(kernels, found["speed"])
     for extra in found["extras"]:
         packages = ", ".join(f"{name} {is_ or 'missing'}" for name, is_ in extra["packages"].items())
         yield f"[{extra['name']}]", packages + (f": {extra['install']}" if extra["install"] else "")
@@ -160,6 +177,22 @@ def _lines(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "", f"EEVEE, Workbench: {_graphics_line(blender['graphics'])}"
     if blender["install"]:
         yield "", f"on Debian and Ubuntu: {blender['install']}"
+
+
+def _kernel_lines(kernels: dict[str, Any], speed: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
+    """Which kernels are used, and how fast they are here."""
+    few = "compiled" if kernels["compiled"] else "not compiled yet: the first picture takes about 20 seconds longer"
+    compiled = "all there, nothing is compiled" if kernels["complete"] else few
+    unwritable = "" if kernels["writable"] else "cannot be written: set VIEWSPHERE_CACHE; "
+    yield "kernels", f"{kernels['folder']}: {unwritable}{compiled}"
+    yield "", f"for {kernels['target']}, by numba {kernels['numba']} and llvmlite {kernels['llvmlite']}"
+    if kernels["note"]:
+        yield "", kernels["note"]
+    if speed is None:
+        yield "speed", "not measured: run a preview first, which compiles kernels"
+        return
+    yield "speed", f"{speed['frame_ms']:.0f} ms of one core for a frame of a car with labels, 640 x 480;"
+    yield "", f"{speed['relative']:.2f} times as fast as the machine of docs/performance.md ({speed['reference_ms']:.0f} ms)"
 
 
 def _blender_line(blender: dict[str, Any]) -> str:

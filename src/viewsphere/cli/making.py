@@ -87,7 +87,7 @@ def new(
 def _new_again(format_: str, source: Path, folder: Path | None) -> None:
     from viewsphere.run.again import make_again
 
-    _announce_compilation()
+    _compile_kernels()
     made = make_again(format_, source, folder or Path(f"{source.resolve().stem}-again"))
     for note in made.notes:
         say(f"note: {note}", err=True)
@@ -176,7 +176,7 @@ def inspect(
         _inspect_rig(rig, output, changes, json_)
         return
     assert model is not None
-    _announce_compilation()
+    _compile_kernels()
     spec = model_spec(model, up=up, forward=forward, unit=unit, seed=seed)
     report = inspect_model(spec)
     picture = output or Path(f"{Path(model.replace(':', '-')).stem}-sides.png")
@@ -198,7 +198,7 @@ def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, j
     from viewsphere.run.rig_view import recipe_rig, rig_lines, rig_mesh, sensor_facts
 
     shown = recipe_rig(load_recipe(recipe, changes))
-    _announce_compilation()
+    _compile_kernels()
     picture = output or Path(f"{recipe.stem}-rig.png")
     frusta = picture.with_suffix(".glb")
     write_whole(frusta, glb_bytes(rig_mesh(shown)))
@@ -309,7 +309,7 @@ def preview(
         samples, before = dataset_samples(dataset, count, columns, films), Earlier(dataset, films)
     else:
         recipe = load_recipe(source, changes)
-        _announce_compilation()
+        _compile_kernels(recipe)
         with recipe.located():
             samples = list(preview_samples(recipe, count, draw=names, row=columns))
         before = Earlier(samples, ())
@@ -442,13 +442,15 @@ def _kept(output: Path) -> str:
 def _estimate(recipe: Recipe, workers: int | None) -> Estimate:
     from viewsphere.run.estimate import estimate
 
-    _announce_compilation()
+    _compile_kernels(recipe)
     return estimate(recipe, cores() if workers is None else workers)
 
 
-def _announce_compilation() -> None:
-    """Say why the first picture on a machine takes longer."""
-    from viewsphere.kernels.entries import SUFFIX, kernel_folder
+def _compile_kernels(recipe: Recipe | None = None) -> None:
+    """Compile the kernels that a recipe's frames call, or a plain one's: the first picture on a machine takes longer."""
+    from viewsphere.recipe.recipe import Recipe
+    from viewsphere.run.warm import precompile_for, told_to
 
-    if not any(kernel_folder().glob(f"*/*{SUFFIX}")):
-        say("compiling kernels, once on this machine: about 20 seconds", err=True)
+    plain = {"models": [{"source": "zoo:car"}], "viewpoints": {"azimuth": [0], "elevation": [20], "distance": 4}}
+    with ProgressBar(quiet=False) as bar:
+        precompile_for(recipe or Recipe.model_validate(plain), told_to(bar.show))

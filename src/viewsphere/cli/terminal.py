@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -224,6 +225,18 @@ def _rate(frames: int, seconds: float) -> str:
     return f"{rate:.1f} frames/s" if rate >= 1 else f"{rate:.2g} frames/s"
 
 
+def _say_target() -> None:
+    """Say why kernels are compiled for this processor alone, where they are."""
+    from viewsphere.kernels import build
+
+    if build.TARGET.note:
+        say(build.TARGET.note, err=True)
+
+
+KERNELS_S = 1.5
+"""Seconds between lines about kernels where no bar can be drawn."""
+
+
 class ProgressBar:
     """A line for each phase: work done, frames a second, time left."""
 
@@ -231,6 +244,7 @@ class ProgressBar:
         self._quiet = quiet
         self._bars: dict[str, Any] = {}
         self._rich: Any = None
+        self._said = 0.0
 
     def __enter__(self) -> ProgressBar:
         if not self._quiet:
@@ -260,6 +274,11 @@ class ProgressBar:
         def listen(progress: Progress) -> None:
             if self._rich is None:
                 return
+            if progress.phase == "kernels" and not progress.done:
+                _say_target()
+            if progress.phase == "kernels" and not self._rich.console.is_terminal:
+                self._say_kernels(progress)
+                return
             if progress.phase not in self._bars:
                 self._rich.start()
                 self._bars[progress.phase] = self._rich.add_task(progress.phase, total=progress.total, rate="")
@@ -270,6 +289,13 @@ class ProgressBar:
             rate = _rate(made, elapsed) if progress.phase == "frames" and made and elapsed else ""
             if progress.nodes is not None:
                 rate = ", ".join(filter(None, (rate, f"{progress.nodes} node{'' if progress.nodes == 1 else 's'}")))
-            self._rich.update(bar, completed=seen, rate=rate)
+            self._rich.update(bar, completed=seen, total=progress.total, rate=rate)
 
         return listen
+
+    def _say_kernels(self, progress: Progress) -> None:
+        """A line, now and then: compiling takes long, and is no frame that other programs could count."""
+        now = time.monotonic()
+        if progress.done in (0, progress.total) or now >= self._said + KERNELS_S:
+            self._said = now
+            say(f"compiling kernels, once on this machine: {progress.done} of {progress.total}", err=True)

@@ -52,7 +52,7 @@ class Target:
         """Why this machine's kernels are none that other machines have; empty where they are."""
         if not self.lacking:
             return ""
-        return f"note: this processor ({self.cpu}) lacks {', '.join(self.lacking)}, so kernels are compiled for it alone"
+        return f"note: this processor, {self.cpu}, lacks {', '.join(self.lacking)}, so kernels are compiled for it alone"
 
 
 def _features() -> Mapping[str, bool]:

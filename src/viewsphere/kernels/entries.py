@@ -97,7 +97,6 @@ def _is_trusted(folder: Path, name: str) -> bool:
     return folder == SHIPPED or (_is_own(folder) and _is_own((folder / name).parent))
 
 
-@cache
 def _is_own(folder: Path) -> bool:
     try:
         about = folder.lstat() if folder != kernel_folder() else folder.stat()  # users may link their cache elsewhere
@@ -109,6 +108,7 @@ def _is_own(folder: Path) -> bool:
     return True
 
 
+@cache
 def _warn(folder: Path) -> None:
     """Say once, in a run's first process, that a folder's kernels are not loaded."""
     if multiprocessing.parent_process() is None:
@@ -122,7 +122,6 @@ def _make(folder: Path) -> bool:
         if not folder.is_dir():
             folder.parent.mkdir(parents=True, exist_ok=True)
             folder.mkdir(mode=0o700, exist_ok=True)
-            _is_own.cache_clear()
             _sweep(folder.parent)
     except OSError:
         return False

@@ -17,7 +17,6 @@ import pickle
 from collections.abc import Callable
 from typing import Any
 
-import llvmlite.binding
 import numba
 from numba.core.caching import _Cache
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
@@ -35,6 +34,7 @@ from viewsphere.kernels.build import TARGET
 from viewsphere.kernels.digests import sources_digest
 
 NAME = "viewsphere"
+_ANNOTATION = 5  # its place among `CompileResult._reduce`'s values behind the library
 
 
 class ViewsphereCPU(CPU):
@@ -42,25 +42,16 @@ class ViewsphereCPU(CPU):
 
 
 class _Loaded(JITCodeLibrary):
-    """Code from the cache. Its bitcode is parsed only when others link it, and its symbols are not listed: half the time."""
-
-    def __init__(self, codegen: Any, name: str, bitcode: bytes) -> None:
-        super().__init__(codegen, name)
-        self._bitcode = bitcode
+    """Machine code from the cache, without what others would need to link it; its symbols are not listed: half the time."""
 
     @classmethod
     def _unserialize(cls, codegen: Any, state: Any) -> Any:
-        name, _, (machine_code, bitcode) = state
-        self = cls(codegen, name, bitcode)
+        name, _, (machine_code, _) = state
+        self = cls(codegen, name)
         self.enable_object_caching()
         self._set_compiled_object(machine_code)
         self._finalize_final_module()
         return self
-
-    def _get_module_for_linking(self) -> Any:
-        if self._shared_module is None:
-            self._shared_module = llvmlite.binding.parse_bitcode(self._bitcode)
-        return self._shared_module
 
     def get_pointer_to_function(self, name: str) -> int:
         """Returns the address of the function of this name, which must be in this code."""
@@ -125,7 +116,7 @@ class _KernelCache(_Cache):
         """Keep a compiled function."""
         if not data.library.has_dynamic_globals:
             self.names.append(self._name(sig))
-            entries.save(self.names[-1], dumps(data._reduce()))
+            entries.save(self.names[-1], dumps(_slim(*data._reduce())))
 
     def enable(self) -> None:
         """Nothing: it is always on."""
@@ -146,6 +137,14 @@ class _KernelCache(_Cache):
         return f"{sources_digest(code.co_filename)}/{kernel}-{digest}{entries.SUFFIX}"
 
 
+def _slim(library: Any, *rest: Any) -> tuple[Any, ...]:
+    """A compiled function as numba reduces it, less bitcode and annotations in words, which are three quarters of its bytes."""
+    name, kind, (machine_code, _) = library
+    made = list(rest)
+    made[_ANNOTATION] = ""
+    return ((name, kind, (machine_code, b"")), *made)
+
+
 def _stable(option: Any) -> str:
     """An option in words that are the same in every process: sets of texts are in another order in each."""
     return repr(sorted(option) if isinstance(option, set | frozenset) else option)
@@ -159,6 +158,16 @@ class KernelDispatcher(Dispatcher):
     def enable_caching(self) -> None:
         """Look for compiled overloads in `entries`, and keep new ones there."""
         self._cache = _KernelCache(self)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """The call by a function that is being compiled: it links the code of this one, which entries lack."""
+        types = tuple(self._compiler.fold_argument_types(args, kws)[1])
+        self.compile(types)
+        loaded = self.overloads.get(types)
+        if loaded is not None and isinstance(loaded.library, _Loaded):
+            with target_override(NAME):
+                self.overloads[types] = self._compiler.compile(types, None)
+        return super().get_call_template(args, kws)
 
     def compile(self, sig: Any) -> Any:
         """Load or compile the overload for these types."""

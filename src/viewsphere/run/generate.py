@@ -32,7 +32,7 @@ from viewsphere.run.status import Status, status
 from viewsphere.run.tasks import KernelTask, Kind, ModelTask
 from viewsphere.run.unpainted import unpainted
 from viewsphere.run.unused import unused
-from viewsphere.run.warm import is_compiled
+from viewsphere.run.warm import is_compiled, precompile, told_to
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
@@ -314,13 +314,12 @@ def _render_shots(work: Missing, crew: Crew, keep_going: bool, tell: Listener, p
     first = next(work.rows(), None)
     if first is not None:
         Stages().check_scenery(portion.plan)
-        tell(Progress("kernels", 0, 1))
         with portion.plan.recipe.located():
             shot = portion.shot(first, StoredBoxes(store))
         if not is_compiled(shot):
+            precompile(shot, told_to(tell))
             for outcome in crew.run(Listed((Job("kernels", first.subject, KernelTask(shot)),))):
                 _accept(outcome, False, skipped)
-        tell(Progress("kernels", 1, 1))
 
     def report() -> None:
         tell(Progress("frames", resumed + rendered, total, resumed, crew.under_way, crew.nodes))

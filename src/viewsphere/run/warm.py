@@ -7,7 +7,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
@@ -18,10 +18,13 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.errors import UserError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.kernels import entries
 from viewsphere.kernels.digests import package_digest
 from viewsphere.kernels.garbage import pause_collection
+from viewsphere.kernels.overloads import needed, table
+from viewsphere.kernels.precompile import Told, compile_all
 from viewsphere.labels import channels
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.exposure import Exposure, Sweep
@@ -33,6 +36,9 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.model.tracks import Tracks
 from viewsphere.model.traits import Traits
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.opening import prepare
+from viewsphere.run.progress import Listener, Progress
 from viewsphere.run.stages import render_sample
 from viewsphere.sampling.camera import looking
 from viewsphere.sampling.engine_digest import engine_digest
@@ -52,6 +58,69 @@ MARKS = "marks"
 PACKAGE = Path(plugins.__file__).parent
 
 
+def precompile(shot: Shot, tell: Told) -> None:
+    """Compile on all cores the kernels that a shot's frames call, unless they are compiled. `tell` is given their number, and
+    how many are done; kernels that the table lacks are compiled when they are called.
+    """
+    if is_compiled(shot):
+        return
+    with _alone(entries.kernel_folder()):
+        done = _compiled_before()
+        waiting = [overload for overload in needed(features(shot)) if overload.name not in done]
+        if waiting and not is_compiled(shot):
+            compile_all(waiting, tell)
+            done |= {overload.name for overload in waiting}
+            entries.save(_list_of("compiled"), "\n".join(sorted(done)).encode())
+
+
+def precompile_for(recipe: Recipe, tell: Told) -> None:
+    """`precompile` for the first shot of a recipe, whose models are not read for it; nothing for a recipe with errors, which
+    its reader reports.
+    """
+    mark = _list_of(recipe.digest[:16])
+    if has_all() or entries.load(mark) is not None:
+        return
+    with suppress(UserError), recipe.located():
+        precompile(sketched(recipe), tell)
+        entries.save(mark, b"")
+
+
+def sketched(recipe: Recipe) -> Shot:
+    """The first shot of a recipe as if all models were a metre large: it calls the same kernels, and no model is read."""
+    return next(iter(prepare(recipe).shots(lambda key, step=None: box_vertices((-0.5,) * 3, (0.5,) * 3))))
+
+
+def told_to(listener: Listener) -> Told:
+    """A listener to the compilation of kernels, as one to a run."""
+    return lambda done, total: listener(Progress("kernels", done, total))
+
+
+def compile_table(tell: Told) -> int:
+    """Compile the whole table, as for a wheel, and note that nothing is left to compile; gives the number of kernels that could
+    not be compiled.
+    """
+    left = len(table()) - len(compile_all(table(), tell))
+    if not left:
+        entries.save(_list_of("all"), b"")
+    return left
+
+
+def is_precompiled(shot: Shot) -> bool:
+    """Whether the kernels that a shot's frames call are compiled, as far as the table knows."""
+    known = {overload.name for overload in needed(features(shot))}
+    return is_compiled(shot) or (bool(known) and known <= _compiled_before())
+
+
+def _compiled_before() -> set[str]:
+    listed = entries.load(_list_of("compiled"))
+    return set() if listed is None else set(listed.decode().splitlines())
+
+
+def _list_of(what: str) -> str:
+    """The entry for a list that holds for this state of viewsphere and this build."""
+    return f"{MARKS}/{what}-{package_digest(PACKAGE)[:16]}{entries.SUFFIX}"
+
+
 def compile_kernels(shot: Shot) -> None:
     """See to it that the kernels a shot needs are compiled.
 
@@ -59,10 +128,10 @@ def compile_kernels(shot: Shot) -> None:
     kernels, the list of their entries. Later nothing is loaded, as long as these are there, and viewsphere, numba, Python, the
     processor and what the shot uses, about as strongly, are the same.
     """
+    if is_compiled(shot):
+        return
     small = _small(shot)
     mark = _mark(small)
-    if _is_true(mark):
-        return
     with _alone(entries.kernel_folder()):
         if _is_true(mark):
             return
@@ -97,8 +166,13 @@ def _alone(folder: Path) -> Generator[None]:
 
 
 def is_compiled(shot: Shot) -> bool:
-    """Whether the kernels a shot needs are compiled; none is loaded to tell."""
-    return _is_true(_mark(_small(shot)))
+    """Whether the kernels a shot needs are compiled; none is loaded to tell. Wheels bring all."""
+    return has_all() or _is_true(_mark(_small(shot)))
+
+
+def has_all() -> bool:
+    """Whether all kernels are compiled for this state of viewsphere: wheels bring them, `compile_table` makes them."""
+    return entries.load(_list_of("all")) is not None
 
 
 def load_kernels(shot: Shot) -> None:
@@ -162,6 +236,29 @@ def _outline(value: JsonValue) -> JsonValue:
     if isinstance(value, int | float) and value and not isinstance(value, bool):
         return [value > 0, math.floor(math.log10(abs(value)))]
     return value
+
+
+def features(shot: Shot) -> frozenset[str]:
+    """Features of a shot that decide which kernels its frames call: the paths of what is there, with values that are words, and
+    the engine's options.
+    """
+    small = _small(shot)
+    told = small.model_dump(mode="json", exclude={"engine_options"})
+    options = (f"engine_options.{name}={value}" for name, value in sorted(small.engine_options.items()))
+    return frozenset((*_paths("", told), *options))
+
+
+def _paths(path: str, value: JsonValue) -> Iterator[str]:
+    if isinstance(value, dict):
+        for name, part in value.items():
+            yield from _paths(f"{path}.{name}" if path else name, part)
+    elif isinstance(value, list):
+        for part in value:
+            yield from _paths(f"{path}[]", part)
+    elif isinstance(value, str):
+        yield f"{path}={value}"
+    elif value:
+        yield path
 
 
 @pause_collection()
