@@ -40,7 +40,7 @@ class Limit(Generic[Number]):
     def __get__(self, owner: object, kind: type | None = None) -> Number:
         text, number = os.environ.get(self.variable, ""), type(self.default)
         try:
-            value = _parsed(text, number) if text else self.default
+            value = parsed(text, number) if text else self.default
         except ValueError:
             value = number(0)
         if not 0 < value < math.inf:
@@ -49,11 +49,16 @@ class Limit(Generic[Number]):
         return value
 
 
-def _parsed(text: str, number: type[Number]) -> Number:
-    """The number in a text; raises ValueError where there is none."""
+def parsed(text: str, number: type[Number]) -> Number:
+    """The number in a text, a whole one also with a unit of bytes; raises ValueError where there is none."""
     head = text.rstrip("bBkKmMgGtTi")
     unit = UNITS.get(text[len(head) :].lower())
-    return number(text) if unit is None or number is not int else number(round(float(head) * unit))
+    if unit is None or number is not int:
+        return number(text)
+    size = float(head) * unit
+    if not math.isfinite(size):
+        raise ValueError(text)
+    return number(size)
 
 
 class Limits:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from viewsphere.cli import datasets, doctor, joining, making
+from viewsphere.cli import cache, datasets, doctor, joining, making
 from viewsphere.cli.arguments import Version
 from viewsphere.cli.next_step import Command
 
@@ -35,6 +35,7 @@ for command in (
     datasets.check,
     datasets.report,
     datasets.view,
+    cache.cache,
     doctor.doctor,
 ):
     app.command(cls=Command)(command)
