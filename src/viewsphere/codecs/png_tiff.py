@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ _FOREIGN_TIFF = "TIFF: expected viewsphere's own, found a damaged file or anothe
 
 _WIDTH, _HEIGHT, _BITS, _COMPRESSION, _PHOTOMETRIC, _OFFSET = 256, 257, 258, 259, 262, 273
 _SAMPLES, _ROWS, _BYTES, _PLANAR, _EXTRA, _FORMAT = 277, 278, 279, 284, 338, 339
+_SIZE_AT = 8 + 2 + 12 * 8 + 8  # of the strip's bytes in a TIFF's head: the value of the ninth entry
 _SAMPLE_FORMATS = {np.dtype(np.int32): 2, np.dtype(np.float32): 3}
 
 
@@ -190,6 +192,13 @@ def encode_tiff(array: NDArray[Any]) -> bytes:
 
 def _tiff_head(height: int, width: int, components: int, dtype: np.dtype[Any], size: int) -> bytes:
     """All that comes before the strip of so many bytes."""
+    head = _tiff_layout(height, width, components, dtype)
+    return head[:_SIZE_AT] + struct.pack("<I", size) + head[_SIZE_AT + 4 :]
+
+
+@lru_cache(maxsize=16)
+def _tiff_layout(height: int, width: int, components: int, dtype: np.dtype[Any]) -> bytes:
+    """The head of a strip of no bytes: equal for all files of one shape."""
     tags = {
         _WIDTH: ("I", [width]),
         _HEIGHT: ("I", [height]),
@@ -199,7 +208,7 @@ def _tiff_head(height: int, width: int, components: int, dtype: np.dtype[Any], s
         _OFFSET: ("I", [0]),
         _SAMPLES: ("H", [components]),
         _ROWS: ("I", [height]),
-        _BYTES: ("I", [size]),
+        _BYTES: ("I", [0]),
         _PLANAR: ("H", [1]),
         _FORMAT: ("H", [_SAMPLE_FORMATS[dtype]] * components),
     }

@@ -25,6 +25,7 @@ class ShotFiles:
         self._folder, self._painter = folder, painter
         self._shard = _Shard(folder / SHARD) if kinds.shots == "tar" else None
         self._seals: dict[str, Seal] = {}
+        self._folders = set[Path]()
 
     def __enter__(self) -> Self:
         return self
@@ -58,7 +59,9 @@ class ShotFiles:
         if inside in self._seals:
             raise _second(inside)
         place = self._folder / inside
-        place.parent.mkdir(exist_ok=True)
+        if place.parent not in self._folders:
+            place.parent.mkdir(exist_ok=True)
+            self._folders.add(place.parent)
         return place
 
     def _manifest(self) -> Manifest:
