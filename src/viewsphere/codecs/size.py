@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path, PurePath
@@ -33,6 +34,8 @@ def opened(file: Path | IO[bytes]) -> Generator[Image]:
     from PIL import Image
 
     with ExitStack() as then:
+        then.enter_context(warnings.catch_warnings())
+        warnings.simplefilter("ignore")  # Pillow's, of tags that it skips, would stand among our own lines
         stream = then.enter_context(open_file(file, "MAX_PICTURE_BYTES")) if isinstance(file, PurePath) else file
         limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # Pillow has no other way; ours is checked at once
         try:
