@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -64,11 +65,17 @@ def write_entry(file: Path, about: Any, arrays: Arrays) -> None:
 def making(file: Path) -> Generator[Path]:
     """A path at which to write an entry's file, which appears when the block has ended; raises OSError as writing does."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    sweep(file.parent, PREFIX)
+    _sweep_once(file.parent, os.getpid())
     with aside(file.parent, PREFIX) as place:
         half = place / file.name
         yield half
         publish(half, file)
+
+
+@cache
+def _sweep_once(folder: Path, process: int) -> None:
+    """Remove what dead processes left in a folder: the first time that a process writes there, since it lists all entries."""
+    sweep(folder, PREFIX)
 
 
 def publish(half: Path, file: Path) -> None:
