@@ -20,7 +20,7 @@ from viewsphere.cli.arguments import (
     split,
     with_options,
 )
-from viewsphere.cli.terminal import ProgressBar, print_formats, print_json, print_report, print_status, say
+from viewsphere.cli.terminal import ProgressBar, print_formats, print_json, print_report, print_status, say, waiting
 from viewsphere.errors import UserError
 from viewsphere.run.crew_size import cores
 
@@ -143,7 +143,8 @@ def check(
             repaired = repair(folder, workers=crew, listener=bar.show, **options)
         done, report = repaired.done, repaired.report
     else:
-        done, report = (), prove(Dataset(folder), workers=crew, **options)
+        with waiting(f"checking {folder}", quiet=json_):
+            done, report = (), prove(Dataset(folder), workers=crew, **options)
     if json_:
         print_json({**({"repaired": list(done)} if mend else {}), **report.to_json()})
     else:

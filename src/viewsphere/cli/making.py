@@ -33,6 +33,7 @@ from viewsphere.cli.terminal import (
     print_plan,
     print_summary,
     say,
+    waiting,
     write_picture,
 )
 from viewsphere.errors import StoreError, UserError
@@ -380,7 +381,7 @@ def render(
     """Render a recipe into a data set. Run it again to resume: finished frames are never rendered twice."""
     if recipe is None or output is None:
         raise UserError(for_render(recipe, output))
-    with importing():
+    with waiting(f"planning {recipe}", quiet=json_), importing():
         from viewsphere.run.generate import generate
         from viewsphere.run.opening import to_append
         from viewsphere.run.share import shard_named
