@@ -2,6 +2,7 @@
 
     <cache>/<kind>/<digest>.arrays    an entry of `arrays`: JSON and numpy arrays, checked by a digest, mapped into memory
     <cache>/<kind>/...                other files of a kind, such as compiled kernels
+    <cache>/written                   how much was written since the budget was last checked, see `budget`
 
 `budget` deletes the entries that were used longest ago. Other folders of the cache hold downloads, which stay.
 """

@@ -88,7 +88,7 @@ def read_arrays(file: Path) -> Content:
         head = json.loads(bytes(whole[begin : begin + length]))
         data = whole[begin + length + len(_filling(begin + length)) :]
         return Content(head["about"], {name: _array(data, *place) for name, place in head["arrays"].items()})
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
         raise DamagedError(f"{file}: damaged ({error})") from None
 
 

@@ -15,17 +15,25 @@ from pathlib import Path
 from stat import S_ISREG
 
 from viewsphere.aside import sweep
-from viewsphere.caches import KINDS, cache_of
+from viewsphere.caches import KINDS, cache_folder, cache_of
 from viewsphere.limits import limits
 
 KEPT_SHARE = 0.9
 """Share of the limit that pruning leaves, so that the next entries need no further pruning."""
 
 CHECKED_SHARE = 1 / 32
-"""Share of the limit that a process writes between two looks at the whole cache: a look takes 2 ms for 1,000 entries."""
+"""Share of the limit that all processes write between two looks at the whole cache: a look takes 2 ms for 1,000 entries."""
 
-_written: dict[int, int] = {}
-"""Bytes that this process, by its number, has written since its last look; none where it has not looked yet."""
+LEDGER = "written"
+"""A file of the cache that says how much was written since the last look: its length, in units of `UNIT` of the limit."""
+
+UNIT = 1 / 4096
+
+READ_BY_PATH = frozenset({".glb"})
+"""Endings of files that others open by their path, so that pruning spares the ones in use."""
+
+SPARED_S = 1200.0
+"""Seconds after its last use in which such a file counts as in use: twice `entries.RECENT_S`."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +59,32 @@ def entries(kinds: Iterable[str] = tuple(KINDS)) -> Iterator[Entry]:
                         yield Entry(file, kind, about.st_size, about.st_mtime)
 
 
-def note_written(size: int) -> None:
-    """Count the bytes of a new entry, and prune the cache if this process has written enough since it last looked."""
-    process = os.getpid()
-    written = _written.get(process)
-    _written[process] = size if written is None else written + size
-    if written is None or _written[process] > limits.CACHE_LIMIT * CHECKED_SHARE:
-        _written[process] = 0
-        if sum(entry.size for entry in entries()) > limits.CACHE_LIMIT:
-            prune(int(limits.CACHE_LIMIT * KEPT_SHARE))
+def make_room(size: int) -> None:
+    """Count the bytes of an entry that is about to appear, and prune the cache once enough was written since the last look.
+
+    Bytes count before they are there, and whichever process writes them: so neither many short processes nor killed ones
+    outgrow the limit. Raises OSError where the cache cannot be written.
+    """
+    if _is_look_due(size):
+        held = sum(entry.size for entry in entries()) + size
+        if held > limits.CACHE_LIMIT * (1 - CHECKED_SHARE):
+            prune(int(limits.CACHE_LIMIT * KEPT_SHARE) - size)
+
+
+def _is_look_due(size: int) -> bool:
+    """Whether a `CHECKED_SHARE` has been written; then the ledger begins anew."""
+    units = min(int(size / (limits.CACHE_LIMIT * UNIT)) + 1, int(1 / UNIT))
+    # Appending is atomic: no lock is needed. Where machines share the folder, they may count too little at times.
+    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    ledger = os.open(cache_folder() / LEDGER, flags, 0o666)
+    try:
+        os.write(ledger, bytes(units))
+        is_due = os.fstat(ledger).st_size >= CHECKED_SHARE / UNIT
+        if is_due:
+            os.ftruncate(ledger, 0)
+    finally:
+        os.close(ledger)
+    return is_due
 
 
 def prune(limit: int) -> list[Entry]:
@@ -71,7 +96,18 @@ def prune(limit: int) -> list[Entry]:
     now = time.time() + 60  # machines that share a cache differ by some seconds
     newest_first = sorted(entries(), key=lambda entry: (entry.used > now, -entry.used, str(entry.file)))
     sums = accumulate(entry.size for entry in newest_first)
-    return _delete(entry for entry, total in zip(newest_first, sums, strict=True) if total > limit)
+    return _delete(
+        entry for entry, total in zip(newest_first, sums, strict=True) if total > limit and not _is_in_use(entry, now)
+    )
+
+
+def takes(size: int) -> bool:
+    """Whether an entry of so many bytes leaves room for others: a larger one would drive all of them out."""
+    return size <= limits.CACHE_LIMIT * KEPT_SHARE
+
+
+def _is_in_use(entry: Entry, now: float) -> bool:
+    return entry.file.suffix in READ_BY_PATH and now - SPARED_S < entry.used <= now
 
 
 def clear(kinds: Iterable[str] = tuple(KINDS)) -> list[Entry]:

@@ -79,10 +79,13 @@ def _sweep_once(folder: Path, process: int) -> None:
 
 
 def publish(half: Path, file: Path) -> None:
-    """Make a whole file an entry of the cache, and keep the cache within its limit; raises OSError as renaming does."""
+    """Make a whole file an entry of the cache, and keep the cache within its limit; raises OSError as renaming does. An entry
+    that alone would fill the cache is left out.
+    """
     size = half.stat().st_size
-    half.replace(file)
-    budget.note_written(size)
+    if budget.takes(size) or file.suffix in budget.READ_BY_PATH:
+        budget.make_room(size)
+        half.replace(file)
 
 
 def note_use(file: Path) -> None:

@@ -1,0 +1,44 @@
+"""Files of other machines are told from local ones by the longest mount above them."""
+
+import pytest
+
+from viewsphere.caches import mounts
+
+TABLE = r"""
+/dev/sda1 / ext4 rw 0 0
+server:/home /home nfs4 rw 0 0
+tmpfs /home/me/fast tmpfs rw 0 0
+//server/share /mnt/a\040b cifs rw 0 0
+x /srv fuse.sshfs rw 0 0
+broken
+"""
+
+
+@pytest.fixture(autouse=True)
+def table(tmp_path, monkeypatch):
+    (tmp_path / "mounts").write_text(TABLE)
+    monkeypatch.setattr(mounts, "MOUNTS", tmp_path / "mounts")
+    mounts._mounts.cache_clear()
+    yield tmp_path / "mounts"
+    mounts._mounts.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("file", "is_local"),
+    [
+        ("/var/cache/a", True),
+        ("/home/me/a", False),
+        ("/home/me/fast/a", True),
+        ("/home/me/faster/a", False),
+        ("/homes/a", True),
+        ("/mnt/a b/c", False),
+        ("/srv/a", False),
+    ],
+)
+def test_the_longest_mount_decides(file, is_local):
+    assert mounts.is_local(file) == is_local
+
+
+def test_without_a_table_nothing_is_known_to_be_local(table):
+    table.unlink()
+    assert not mounts.is_local("/var/cache/a")
