@@ -214,3 +214,18 @@ def test_cutouts_of_several_meshes_stay_their_own():
         size = 64 // len(alpha)
         expected = np.kron(alpha / 255 >= 0.5, np.ones((size, size), bool))
         assert np.array_equal(rasterize(geometry, camera, object_id=object_id).triangle >= 0, expected)
+
+
+def test_cutouts_of_a_mesh_that_many_things_show_are_held_once():
+    material = Material(alpha_mode="MASK", base_color_texture=Texture(0))
+    image, _ = grid(np.random.default_rng(3), 8, 8)
+    one = card(material, image)
+    alike, copies = placed(*[one] * 5, cube(0.1)), placed(*[card(material, image) for _ in range(5)], cube(0.1))
+    assert len(copies.cutouts.texels) == 5 * len(alike.cutouts.texels) == 5 * 64
+    assert len(copies.cutouts.corners) == 5 * len(alike.cutouts.corners)
+    assert len(alike.cutouts.layout) == len(alike.cutouts.levels) == 1
+    camera = orbit_camera(lens(64, 64, fx=64, fy=64), distance=2.0)
+    for object_id in (None, 1, 3, 5):
+        seen = [rasterize(geometry, camera, object_id=object_id) for geometry in (alike, copies)]
+        assert seen[0].triangle.tobytes() == seen[1].triangle.tobytes()
+        assert seen[0].inverse_depth.tobytes() == seen[1].inverse_depth.tobytes()

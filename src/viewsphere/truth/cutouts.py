@@ -71,28 +71,43 @@ def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[Cutouts, NDArra
         if mixed.any():
             rows[chosen[mixed]] = len(cutouts.corners) + np.arange(mixed.sum())
             kept = Cutouts(own.texels, own.layout, own.levels, own.material[mixed], own.corners[mixed])
-            cutouts = _appended(cutouts, kept)
+            cutouts = _joined([cutouts, kept])
     return cutouts, rows
 
 
+def cutouts_of(meshes: Sequence[Mesh], label_alpha: float | None) -> list[tuple[Cutouts, NDArray[np.int32]]]:
+    """`mesh_cutouts` of each mesh; a mesh that several things show is looked at once."""
+    known = {id(mesh): mesh_cutouts(mesh, label_alpha) for mesh in {id(mesh): mesh for mesh in meshes}.values()}
+    return [known[id(mesh)] for mesh in meshes]
+
+
 def stack_cutouts(parts: Sequence[tuple[Cutouts, NDArray[np.int32]]]) -> tuple[Cutouts, NDArray[np.int32]]:
-    """The cut-outs of all meshes as one, and for each triangle (T,) SURFACE, NEVER or its row of `corners` there."""
-    cutouts, rows = NO_CUTOUTS, [np.zeros(0, np.int32)]
+    """The cut-outs of all meshes as one, and for each triangle (T,) SURFACE, NEVER or its row of `corners` there. Cut-outs that
+    occur again, as those of a mesh that several things show, are there once.
+    """
+    firsts, distinct, count = dict[int, int](), list[Cutouts](), 0
+    rows = [np.zeros(0, np.int32)]
     for own, own_rows in parts:
-        rows.append(np.where(own_rows >= 0, own_rows + len(cutouts.corners), own_rows).astype(np.int32))
-        cutouts = _appended(cutouts, own)
-    return cutouts, np.concatenate(rows)
+        if id(own) not in firsts:
+            firsts[id(own)] = count
+            distinct.append(own)
+            count += len(own.corners)
+        rows.append(np.where(own_rows >= 0, own_rows + np.int32(firsts[id(own)]), own_rows))
+    return _joined(distinct), np.concatenate(rows)
 
 
-def _appended(a: Cutouts, b: Cutouts) -> Cutouts:
-    layout = b.layout.copy()
-    layout[:, 0] += len(a.texels)
+def _joined(parts: Sequence[Cutouts]) -> Cutouts:
+    """One after another; all offsets and numbers are those of the whole."""
+    texels = np.cumsum([0, *(len(part.texels) for part in parts)]).tolist()
+    layouts = np.cumsum([0, *(len(part.layout) for part in parts)]).tolist()
+    placed = [part.layout + np.array([first, 0, 0, 0, 0]) for part, first in zip(parts, texels, strict=False)]
+    numbered = [part.material + np.int32(first) for part, first in zip(parts, layouts, strict=False)]
     return Cutouts(
-        np.concatenate([a.texels, b.texels]),
-        np.concatenate([a.layout, layout]),
-        np.concatenate([a.levels, b.levels]),
-        np.concatenate([a.material, b.material + np.int32(len(a.layout))]),
-        np.concatenate([a.corners, b.corners]),
+        np.concatenate([NO_CUTOUTS.texels, *(part.texels for part in parts)]),
+        np.concatenate([NO_CUTOUTS.layout, *placed]),
+        np.concatenate([NO_CUTOUTS.levels, *(part.levels for part in parts)]),
+        np.concatenate([NO_CUTOUTS.material, *numbered]),
+        np.concatenate([NO_CUTOUTS.corners, *(part.corners for part in parts)]),
     )
 
 

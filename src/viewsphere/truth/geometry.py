@@ -16,7 +16,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.model.classes import GROUND, stuff_of, thing_class
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing
-from viewsphere.truth.cutouts import ENDLESS, NEVER, NO_CUTOUTS, Cutouts, mesh_cutouts, stack_cutouts
+from viewsphere.truth.cutouts import ENDLESS, NEVER, NO_CUTOUTS, Cutouts, cutouts_of, stack_cutouts
 from viewsphere.truth.sparse import Spare
 
 BACKGROUND = 0
@@ -341,7 +341,7 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
     if not any(material.alpha_mode == "BLEND" for mesh in meshes for material in mesh.materials):
         return geometry
     ground = geometry.triangle_cutout[geometry.triangle_start[-1] :]
-    cutouts, rows = stack_cutouts([*(mesh_cutouts(mesh, None) for mesh in meshes), (NO_CUTOUTS, ground)])
+    cutouts, rows = stack_cutouts([*cutouts_of(meshes, None), (NO_CUTOUTS, ground)])
     return replace(geometry, cutouts=cutouts, triangle_cutout=rows)
 
 
@@ -353,7 +353,7 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
     held = list(zip(things, meshes, strict=True))
     labels = _joined([_labels(p, m) for p, m in held[:objects]], np.int32, 6)
     around = [labels[:, 3], *(_classes(p, m) for p, m in held[objects:])]
-    cutouts, rows = stack_cutouts([mesh_cutouts(m, label_alpha) for m in meshes])
+    cutouts, rows = stack_cutouts(cutouts_of(meshes, label_alpha))
     is_used = np.zeros(vertex_start[-1], np.bool_)
     is_used[triangles] = True
     part = Geometry(
