@@ -120,7 +120,7 @@ def test_damaged_entries_are_built_again(spec, tmp_path):
     folder = tmp_path / "cache"
     first = load_normalised(spec, folder=folder)
     entries = sorted(folder.iterdir())
-    assert {entry.suffix for entry in entries} == {".json", ".arrays"}
+    assert {entry.suffix for entry in entries} == {".arrays"}
     for entry in entries:
         whole = entry.read_bytes()
         for damaged in (b"", whole[: len(whole) // 2], b"x" * len(whole)):
@@ -162,3 +162,24 @@ def test_missing_models_are_reported_by_the_reader(spec, tmp_path):
 def test_the_environment_moves_the_cache(monkeypatch, tmp_path):
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
     assert cache_folder() == tmp_path / "models"
+
+
+def test_what_a_file_tells_is_asked_again_where_an_entry_is_damaged(monkeypatch, write, tmp_path):
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    file, beside, asked = write("m/a.glb", b"model"), write("m/beside.bin", b"1"), []
+
+    def ask():
+        asked.append(1)
+        return {"seconds": 2.5}, [file, beside]
+
+    for _ in range(2):
+        assert cache.kept(file, "timeline", ask) == {"seconds": 2.5}
+    assert len(asked) == 1
+    (entry,) = cache_folder().iterdir()
+    whole = entry.read_bytes()
+    entry.write_bytes(whole.replace(b"2.5", b"3.5"))
+    assert cache.kept(file, "timeline", ask) == {"seconds": 2.5}
+    assert entry.read_bytes() == whole
+    write("m/beside.bin", b"2")
+    cache.kept(file, "timeline", ask)
+    assert len(asked) == 3

@@ -400,5 +400,5 @@ def test_the_reader_writes_nothing_elsewhere(spec, tmp_path, monkeypatch):
     before = {p for p in tmp_path.rglob("*") if "cache" not in p.parts}
     load_normalised(spec)
     assert {p for p in tmp_path.rglob("*") if "cache" not in p.parts} == before
-    assert {p.suffix for p in cache_folder().iterdir()} == {".json", ".arrays"}
+    assert {p.suffix for p in cache_folder().iterdir()} == {".arrays"}
     assert reader_program.LOG not in {p.name for p in cache_folder().rglob("*")}

@@ -1,7 +1,7 @@
 """Normalised meshes kept by content: a model is read once, and again when any of its files, settings or
 readers change.
 
-An entry is two files: `<first>.json` lists the files that the model named when it was last read, and
+An entry is two files: `<first>.arrays` lists the files that the model named when it was last read, and
 `<second>.arrays` holds the mesh. The first name is the digest of the model's bytes, its settings and the
 readers; the second adds the bytes of the files listed. So an entry is never stale, and two folders with equal
 files share it. What is not in the cache is read in a process of its own (`isolated`).
@@ -10,7 +10,6 @@ files share it. What is not in the cache is read in a process of its own (`isola
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -26,15 +25,15 @@ from viewsphere.assets.inside import split_source
 from viewsphere.assets.isolated import read_apart
 from viewsphere.assets.load import check_source
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.mesh_file import read_mesh
+from viewsphere.assets.mesh_file import read_mesh, unpacked
 from viewsphere.assets.normalise import normalise, placed
 from viewsphere.assets.part_points import part_points
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.caches import cache_of
-from viewsphere.caches.entries import SUFFIX, note_use, publish
+from viewsphere.caches.entries import SUFFIX, publish, read_entry, write_entry
 from viewsphere.errors import ModelError
-from viewsphere.files import open_file, read_bytes, read_text
+from viewsphere.files import open_file, read_bytes
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
@@ -138,28 +137,21 @@ def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = Non
 
 def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) -> Any:
     """What `ask` says of a file, plain data, and which files it read for it; from the cache as long as they stay the same."""
-    folder = cache_folder()
     try:
         with open_file(path) as file:
             own = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return ask()[0]
-    entry = folder / f"{hashlib.sha256(f'{readers_digest()} {about} {path.name} {own}'.encode()).hexdigest()}.json"
-    with suppress(OSError, ValueError, TypeError, KeyError):
-        held = json.loads(read_text(entry))
-        if held["state"] == _second_digest(own, path, held["files"]):
-            return held["told"]
+    name = hashlib.sha256(f"{readers_digest()} {about} {path.name} {own}".encode()).hexdigest()
+    entry = _named(cache_folder(), name)
+    held = read_entry(entry)
+    with suppress(ValueError, TypeError, KeyError):
+        if held is not None and held.about["state"] == _second_digest(own, path, held.about["files"]):
+            return held.about["told"]
     told, files = ask()
     names = _names(path, files)
-    keep(entry, json.dumps({"told": told, "files": names, "state": _second_digest(own, path, names)}))
+    write_entry(entry, {"told": told, "files": names, "state": _second_digest(own, path, names)}, {})
     return told
-
-
-def keep(entry: Path, text: str) -> None:
-    """Write an entry of the cache, which appears whole or not at all; a cache that cannot be written is no error."""
-    with suppress(OSError), _aside(entry.parent) as place:
-        (place / "told.json").write_text(text, "utf-8", newline="\n")
-        publish(place / "told.json", entry)
 
 
 def _batches(frames: Sequence[int]) -> Iterable[Sequence[int]]:
@@ -249,24 +241,27 @@ def _second_digest(first: str, path: Path, names: Iterable[str]) -> str:
 
 
 def _is_stored(folder: Path, first: str, path: Path) -> bool:
-    try:
-        names = json.loads(read_text(folder / f"{first}.json"))
-        return (folder / f"{_second_digest(first, path, names)}{SUFFIX}").is_file()
-    except (OSError, ValueError):
-        return False
+    held = read_entry(_named(folder, first))
+    with suppress(ValueError, TypeError):
+        return held is not None and _named(folder, _second_digest(first, path, held.about)).is_file()
+    return False
 
 
 def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | None:
     """The mesh in the cache and its facts, None when they are not there or damaged."""
     try:
-        names = json.loads(read_text(folder / f"{first}.json"))
-        file = folder / f"{_second_digest(first, path, names)}{SUFFIX}"
-        mesh, facts = read_mesh(file, path)
-        note_use(file)
-        note_use(folder / f"{first}.json")
-        return mesh, replace(facts, files=tuple(path.parent / name for name in names))
+        names = read_entry(_named(folder, first))
+        held = None if names is None else read_entry(_named(folder, _second_digest(first, path, names.about)))
+        if names is None or held is None:
+            return None
+        mesh, facts = unpacked(held, path)
+        return mesh, replace(facts, files=tuple(path.parent / name for name in names.about))
     except Exception:  # whatever is wrong with an entry, the answer is to build it again
         return None
+
+
+def _named(folder: Path, name: str) -> Path:
+    return folder / f"{name}{SUFFIX}"
 
 
 def _names(path: Path, files: Iterable[Path]) -> list[str]:
@@ -285,8 +280,6 @@ def _from(root: str, file: str) -> str:
 def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Path) -> None:
     """Move a mesh's file into the cache; each of the two files appears whole or not at all."""
     names = _names(path, files)
-    aside = mesh.with_name("files.json")
     with suppress(OSError):
-        publish(mesh, folder / f"{_second_digest(first, path, names)}{SUFFIX}")
-        aside.write_text(json.dumps(names), "utf-8", newline="\n")
-        publish(aside, folder / f"{first}.json")
+        publish(mesh, _named(folder, _second_digest(first, path, names)))
+        write_entry(_named(folder, first), names, {})

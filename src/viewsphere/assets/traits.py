@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import cast
 
 import numpy as np
 
-from viewsphere.assets.cache import ZOO, cache_folder, frame_of, keep, readers_digest
+from viewsphere.assets.cache import ZOO, frame_of, readers_digest
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.primitive import FileFacts
@@ -19,8 +17,9 @@ from viewsphere.assets.skin import grouped
 from viewsphere.assets.spread_points import spread_points
 from viewsphere.assets.surface import Surface
 from viewsphere.assets.symmetries import find, lacking
+from viewsphere.caches.arrays import Content
+from viewsphere.caches.entries import kept
 from viewsphere.errors import ModelError, RecipeError
-from viewsphere.files import read_text
 from viewsphere.geometry.diameter import diameter
 from viewsphere.model.keypoints import Keypoints, Place
 from viewsphere.model.mistakes import nearest, shown
@@ -111,12 +110,13 @@ def found_symmetries(mesh: Mesh) -> Symmetries:
     digest = hashlib.sha256(readers_digest().encode())
     for array in (mesh.vertices, mesh.triangles):
         digest.update(repr(array.shape).encode() + array.tobytes())
-    entry = cache_folder() / f"{digest.hexdigest()}.json"
-    with suppress(OSError, ValueError):
-        return Symmetries.model_validate(json.loads(read_text(entry)))
-    found = find(Surface.of(mesh))
-    keep(entry, found.model_dump_json())
-    return found
+    return kept(
+        "models",
+        digest.hexdigest(),
+        lambda: find(Surface.of(mesh)),
+        lambda found: Content(found.model_dump(mode="json"), {}),
+        lambda content: Symmetries.model_validate(content.about),
+    )
 
 
 def far_points(mesh: Mesh, across: float, keypoints: Keypoints) -> Iterator[str]:

@@ -76,6 +76,7 @@ def _is_look_due(size: int) -> bool:
     units = min(int(size / (limits.CACHE_LIMIT * UNIT)) + 1, int(1 / UNIT))
     # Appending is atomic: no lock is needed. Where machines share the folder, they may count too little at times.
     flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    cache_folder().mkdir(parents=True, exist_ok=True)
     ledger = os.open(cache_folder() / LEDGER, flags, 0o666)
     try:
         os.write(ledger, bytes(units))

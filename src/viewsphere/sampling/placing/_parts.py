@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.cache import keep
-from viewsphere.caches import cache_of
-from viewsphere.files import read_text
+from viewsphere.caches.arrays import Content
+from viewsphere.caches.entries import kept
 from viewsphere.sampling.physics import needed
 from viewsphere.sampling.placing import Shape
 
@@ -38,12 +36,11 @@ def convex_parts(shape: Shape) -> list[Float]:
         return [shape.hull]
     vertices, triangles = shape.surface()
     digest = hashlib.sha256(json.dumps(SETTINGS).encode() + vertices.tobytes() + triangles.tobytes()).hexdigest()
-    entry = cache_of("parts") / f"{digest}.json"
-    with suppress(OSError, ValueError):
-        return [np.array(part) for part in json.loads(read_text(entry))]
-    parts = _parted(vertices, triangles)
-    keep(entry, json.dumps([part.tolist() for part in parts]))
-    return parts
+    return kept("parts", digest, lambda: _parted(vertices, triangles), _plain, lambda content: list(content.arrays.values()))
+
+
+def _plain(parts: list[Float]) -> Content:
+    return Content(None, {f"{i}": part for i, part in enumerate(parts)})
 
 
 def _parted(vertices: Float, triangles: NDArray[np.int32]) -> list[Float]:
