@@ -6,7 +6,8 @@ instance PNG, float32 depth and normals, annotations. `--scaling` measures how c
 docs/images/scaling.svg. `--labels` measures each label (bench_labels.py), `--motion` sequences (bench_motion.py), `--bounces`
 light between surfaces (bench_bounces.py), `--town` a drive through a town (bench_town.py), `--physics` what falls until it lies
 still (bench_physics.py), `--training` how fast frames reach a training loop (bench_training.py, with PyTorch),
-`--exports` 25 formats at once (bench_exports.py), `--cycles` and `--endurance` the Cycles engine (bench_cycles.py).
+`--exports` 25 formats at once (bench_exports.py), `--rivals` other renderers (bench_rivals.py), `--cycles` and `--endurance`
+the Cycles engine (bench_cycles.py).
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ PARTS_OF_COLOUR = (
 )
 EMBREE = "Embree, one ray a pixel"
 STAGES = ("truth: raster", "truth: channels", "colour", "annotations", "files")
+AA = {4: "4x edge anti-aliasing", 1: "no anti-aliasing"}
 Rival = tuple[str, Callable[[Camera], Any]]
 """A name for the table, and the function that draws a frame."""
 
@@ -251,7 +253,12 @@ def in_folder(args: argparse.Namespace, folder: Path) -> None:
         exports(args.frames, folder)
         return
     write_reference(folder)
-    if args.motion:
+    if args.rivals:
+        from bench_rivals import rivals
+
+        ours = {f"viewsphere, {name}": measure(args.frames, n, folder)[0].median("whole frame") for n, name in AA.items()}
+        rivals(folder, args.frames, ours, args.only)
+    elif args.motion:
         from bench_motion import motion
 
         motion(folder)
@@ -292,6 +299,8 @@ def main() -> None:
     options.add_argument("--physics", action="store_true", help="measure what falls until it lies still")
     options.add_argument("--labels", action="store_true", help="measure what each label costs, with 1 and 20 objects")
     options.add_argument("--exports", action="store_true", help="measure 25 formats in one pass, and what they encode")
+    options.add_argument("--rivals", action="store_true", help="measure other renderers, each in an environment of its own")
+    options.add_argument("--only", nargs="+", default=[], metavar="NAME", help="of them these: open3d, vtk, mitsuba, ...")
     options.add_argument("--training", action="store_true", help="measure reading and rendering for a training loop")
     options.add_argument("--cycles", type=int, metavar="FRAMES", help="measure the Cycles engine beside BlenderProc's way")
     options.add_argument("--threads", type=int, default=0, help="of BlenderProc's Blender, beside --cycles; 0: all cores")
@@ -308,7 +317,7 @@ def main() -> None:
     if args.labels or args.town or args.physics:
         in_memory(args)
         return
-    if args.motion or args.bounces or args.exports or args.training:
+    if args.motion or args.bounces or args.exports or args.training or args.rivals:
         with tempfile.TemporaryDirectory() as name:
             in_folder(args, Path(name))
         return
