@@ -4,7 +4,9 @@
 
 Each rival is installed by pip in a virtual environment of its own, `.venv/rivals/NAME`, and draws in a process of its own
 (bench_rivals_here.py, bench_blenderproc.py); one that cannot be installed, or does not draw here, is reported as such. Figures
-are medians of CPU time over all threads, and none includes reading the model. What each gives differs: see the table's column.
+are medians of CPU time over all threads, and none includes reading the model. What each gives
+differs: see the table's column. VTK, pyrender and Open3D draw the
+car alone; Mitsuba has the ground, and one texture.
 """
 
 from __future__ import annotations
@@ -55,7 +57,10 @@ RIVALS = (
     Rival("Open3D, rays", "open3d", ("open3d",), "triangle ids, depth, normals; no colour, no files"),
     Rival("VTK, physically based", "vtk", ("vtk",), "colour without shadows or anti-aliasing; no labels, no files"),
     Rival(
-        "Mitsuba, 1 sample", "mitsuba", ("mitsuba", "numpy"), "path-traced colour, noisy, of one texture; no labels, no files"
+        "Mitsuba, 1 sample",
+        "mitsuba",
+        ("mitsuba==3.5.2", "numpy<2"),
+        "path-traced colour, noisy, of one texture; no labels, no files",
     ),
     Rival(
         "pyrender", "pyrender", ("pyrender", "trimesh", "numpy<2"), "colour without shadows, depth; no other labels, no files"

@@ -1,8 +1,8 @@
 """Draw the benchmark's frames with another renderer: PYTHON bench_rivals_here.py NAME FOLDER, by a Python that has it.
 
 FOLDER holds what `bench_rivals.py` wrote: `model.glb`, `mesh.npz` (the same triangles in the world), `color.png` and
-`told.json` (poses, camera, sun). Prints the CPU seconds of each frame, all threads of this process, as JSON; the first one is
-left out.
+`told.json` (poses, camera, sun, ground). Prints the CPU seconds of each frame but the first, all threads of this process, as
+JSON.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def pyrender(folder: Path, told: Any) -> Draw:
         scene.set_pose(node, to_world @ scene.get_pose(node))
     middle = camera["width"] / 2, camera["height"] / 2
     eye = scene.add(gl.IntrinsicsCamera(camera["fx"], camera["fx"], *middle, znear=0.05, zfar=1000))
-    scene.add(gl.DirectionalLight(intensity=3.0), pose=looking_along(told["sun"]["direction"]))
+    scene.add(gl.DirectionalLight(intensity=3.0), pose=turned_to(told["sun"]["direction"]))
     renderer = gl.OffscreenRenderer(camera["width"], camera["height"])
 
     def draw(rotation: Any, center: Any) -> Any:
@@ -85,7 +85,8 @@ def vtk(folder: Path, told: Any) -> Draw:
         actor.SetUserTransform(to_world)
     sun = v.vtkLight()
     sun.SetLightTypeToSceneLight()
-    sun.SetPosition(*(-np.array(told["sun"]["direction"])))
+    sun.SetPosition(*told["sun"]["direction"])
+    sun.SetIntensity(3.0)
     renderer.RemoveAllLights()
     renderer.AddLight(sun)
     eye, grab = renderer.GetActiveCamera(), v.vtkWindowToImageFilter()
@@ -123,13 +124,17 @@ def mitsuba(folder: Path, told: Any) -> Draw:
     kept.update()
     car.write_ply(str(folder / "car.ply"))
     look = {"type": "principled", "base_color": {"type": "bitmap", "filename": str(folder / "color.png")}, "roughness": 0.4}
-    sun = {"type": "directional", "direction": told["sun"]["direction"], "irradiance": told["sun"]["energy"]}
+    way = [-value for value in told["sun"]["direction"]]
+    sun = {"type": "directional", "direction": way, "irradiance": told["sun"]["energy"]}
+    flat = np.diag([told["ground"]["size"] / 2, told["ground"]["size"] / 2, 1, 1])
+    flat[2, 3] = told["ground"]["z"]
     world = {
         "type": "scene",
+        "ground": {"type": "rectangle", "to_world": mi.ScalarTransform4f(flat)},
         "integrator": {"type": "path", "max_depth": 3},
         "car": {"type": "ply", "filename": str(folder / "car.ply"), "bsdf": {"type": "twosided", "look": look}},
         "sun": sun,
-        "sky": {"type": "constant"},
+        "sky": {"type": "constant", "radiance": 0.3},
     }
     scene, to_world = mi.load_dict(world), mi.ScalarTransform4f
     fov = float(np.degrees(2 * np.arctan(camera["width"] / 2 / camera["fx"])))
@@ -150,9 +155,9 @@ def opengl_pose(rotation: Any, center: Any) -> Any:
     return pose
 
 
-def looking_along(direction: Any) -> Any:
-    """World from light (4, 4) of one that shines along a direction."""
-    z = -np.array(direction) / np.linalg.norm(direction)
+def turned_to(direction: Any) -> Any:
+    """World from light (4, 4) of one that stands in a direction."""
+    z = np.array(direction) / np.linalg.norm(direction)
     x = np.cross([0.0, 0.0, 1.0] if abs(z[2]) < 0.9 else [1.0, 0.0, 0.0], z)
     pose = np.eye(4)
     pose[:3, 2], pose[:3, 0] = z, x / np.linalg.norm(x)
