@@ -76,7 +76,7 @@ class Failed(Exception):
 def ran(command: list[Any]) -> str:
     """What a command prints; raises Failed with the last line of its errors."""
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60 * MINUTES, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=60 * MINUTES)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise Failed(str(error)) from error
     if done.returncode:
