@@ -1,10 +1,11 @@
 """Writes the table of kernels that viewsphere calls, src/viewsphere/kernels/overloads.json.
 
-    scripts/kernels [--check]
+    scripts/kernels [--add]
 
 A process for each recipe and each variant of a plain one notes the kernels that a tiny frame calls, and one for each recipe
 those of a few small frames with models, exports and checks. A kernel's needs are the features that all frames share that call
-it, as few as tell them from the others. Takes some minutes.
+it, as few as tell them from the others. Then all are compiled, which gives their seconds. Takes half an hour of a core; with
+`--add`, which tries the variants alone and keeps the table's other rows, a few minutes.
 """
 
 from __future__ import annotations
@@ -14,8 +15,11 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -50,7 +54,7 @@ VARIANTS: Mapping[str, dict[str, Any]] = {
     "noise": {"scene": {"effects": {"shot_noise": 0.2, "read_noise": 0.1}}},
     "lens": {"scene": {"effects": {"vignetting": 0.3, "chromatic_aberration": 0.2}}},
     "focus": {"scene": {"effects": {"depth_of_field": 0.5}}},
-    "background": {"scene": {"background": {"color": "#808080"}, "ground": None}},
+    "background": {"scene": {"background": {"color": "#808080"}, "ground": "off"}},
     "transparent": {"scene": {"background": {"transparent": True}}},
 }
 
@@ -119,9 +123,28 @@ def needs(name: str, runs: Iterable[Mapping[str, Any]]) -> tuple[str, ...] | Non
     return tuple(sorted(shared.difference(frozenset.intersection(*(features for features, _ in shots)))))
 
 
+def timed(made: Iterable[Overload]) -> list[Overload]:
+    """The overloads with the CPU seconds of their compilation, less those that cannot be compiled any more."""
+    import viewsphere.run.warm  # noqa: F401, which imports what kernels need
+
+    rows = list[Overload]()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["VIEWSPHERE_CACHE"] = folder
+        for each in made:
+            begun = time.process_time()
+            try:
+                each.compile()
+            except Exception as error:  # as numba has many
+                print(f"left out: {each.module}.{each.kernel}: {type(error).__name__}", file=sys.stderr)
+            else:
+                rows.append(replace(each, seconds=round(time.process_time() - begun, 1)))
+    return rows
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--run", nargs=2, help=argparse.SUPPRESS)
+    options.add_argument("--add", action="store_true", help="try no recipes, and keep what the table has")
     options.add_argument("--jobs", type=int, default=os.cpu_count())
     args = options.parse_args()
     if args.run:
@@ -132,16 +155,17 @@ def main() -> None:
         with recipe.located():
             print(json.dumps({"tiny": tiny, "small": small}[kind](recipe)))
         return
-    recipes = [str(file) for file in sorted((ROOT / "recipes").glob("*.yaml"))]
+    recipes = [] if args.add else [str(file) for file in sorted((ROOT / "recipes").rglob("*.yaml"))]
     texts = [*map(json.dumps, VARIANTS.values()), *recipes]
     with ThreadPoolExecutor(args.jobs) as pool:
-        runs = [
-            each for each in pool.map(run, [("tiny", text) for text in texts] + [("small", text) for text in texts]) if each
-        ]
+        runs = [each for each in pool.map(run, [(kind, text) for kind in ("tiny", "small") for text in texts]) if each]
+    kept = {each.name: each for each in overloads.table()} if args.add else {}
     names = sorted({name for each in runs for name in each["used"]})
-    made = [Overload(*name.split(":", 2), needs(name, runs)) for name in names]
+    found = {name: Overload(*name.split(":", 2), needs(name, runs)) for name in names}
+    made = timed((found | kept).values())
     overloads.write(made)
-    print(f"{len(made)} overloads, {sum(each.needs is not None for each in made)} of frames")
+    seconds, of_frames = sum(each.seconds for each in made), sum(each.needs is not None for each in made)
+    print(f"{len(made)} overloads, {of_frames} of frames, {seconds:.0f} CPU-seconds")
 
 
 if __name__ == "__main__":
