@@ -12,12 +12,13 @@ from itertools import islice
 import numpy as np
 
 from viewsphere.assets.alpha import with_alpha_modes
+from viewsphere.assets.coordinates import check_coordinates
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.mtl import read_materials
 from viewsphere.assets.obj_text import Library, read_texts
 from viewsphere.assets.polygon_proof import cut_polygons
-from viewsphere.assets.primitive import GREATEST, FileFacts, Float, Int, Primitive, assemble, compact
+from viewsphere.assets.primitive import FileFacts, Float, Int, Primitive, assemble, compact
 from viewsphere.assets.smoothing import creased
 from viewsphere.assets.srgb import linear
 from viewsphere.assets.text import number_of, numeric_words, statements, uncommented
@@ -148,6 +149,7 @@ def _whole(folder: ModelFolder, source: _Source) -> tuple[Primitive, Int]:
     corners = np.array([table.setdefault(token, len(table)) for token in source.corners])
     indices = _corner_indices(folder, source, list(table), (len(positions), len(uv), len(vectors)))
     at, uv_at, normal_at = indices.T
+    check_coordinates(folder, positions, at, line_of=lambda row: source.where("v", row))
     cut, owner = cut_polygons(folder, positions[at], corners, np.array(source.counts))
     whole = Primitive(
         part="",
@@ -211,11 +213,6 @@ def _without_faces(folder: ModelFolder, source: _Source) -> ModelError:
 def _vertices(folder: ModelFolder, source: _Source) -> tuple[Float, Float | None]:
     """Positions (V, 3) and linear colours (V, 4) or None; a fourth number alone is a weight of curves."""
     values = _padded(_rows(folder, source, "v", 3, 6), 6, np.nan)
-    unusable = np.flatnonzero(~(np.abs(values[:, :3]) < GREATEST).all(axis=1))
-    if unusable.size:
-        row = int(unusable[0])
-        wrong = f"vertex {row + 1:,} has a NaN or infinite coordinate ({source.v[row].strip()[:60]!r}); export the model again"
-        raise folder.error(wrong, source.where("v", row))
     given = np.isfinite(values[:, 3:6]).all(axis=1, keepdims=True)
     if any(line.startswith("#MRGB") for line in source.lines):
         folder.warn("colours of ZBrush (#MRGB) are not read; export colours as `v x y z r g b`")

@@ -233,7 +233,7 @@ def _words(error: ErrorDetails, fields: Sequence[str]) -> str:
         case "too_short" | "too_long":
             limit = f"at least {context['min_length']}" if kind == "too_short" else f"at most {context['max_length']}"
             return f"expected {limit} of them; found {context['actual_length']}"
-        case "model_type" | "dict_type" | "model_attributes_type":
+        case "model_type" | "dict_type" | "model_attributes_type" | "union_tag_not_found":
             return f"expected a mapping; found {shown(found)}"
         case "tuple_type" | "list_type":
             return f"expected a list; found {shown(found)}{_listed(found)}"

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at
+from viewsphere.model.mistakes import at, nearest
 from viewsphere.model.numbers import Portion
 from viewsphere.model.weather import Fog, Lamps, Light, Rain, Snow, Wet
 from viewsphere.recipe.draws import Drawn, span
@@ -59,7 +59,9 @@ def _short(name: str, words: tuple[str, ...]) -> BeforeValidator:
             return "off"
         is_number = isinstance(value, (int, float, list, tuple)) and not isinstance(value, bool)
         if isinstance(value, str) and value not in words:
-            raise ValueError(f"expected {', '.join(words)}, a number ({name}), or a mapping; found {value!r}")
+            raise ValueError(
+                f"expected {', '.join(words)}, a number ({name}), or a mapping; found {value!r}{nearest(value, words)}"
+            )
         return {name: value} if is_number else value
 
     return BeforeValidator(read)

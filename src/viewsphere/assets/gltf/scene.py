@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.assets.coordinates import check_coordinates
 from viewsphere.assets.gltf.animation import Posed
 from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.field import Field
@@ -277,11 +278,14 @@ def _primitive(document: Document, entry: Field) -> Primitive | None:
     material = entry.integer("material") if "material" in entry else len(document.root.items("materials"))
     if "material" in entry:
         document.root.at("materials", material)
+    triangles = _triangles(document, entry, mode, count)
+    place = entry.where.removeprefix(f"{document.folder.model}: ")
+    check_coordinates(document.folder, positions, triangles, f"{place}: ")
     return Primitive(
         part="",
         material=material,
         positions=positions,
-        triangles=_triangles(document, entry, mode, count),
+        triangles=triangles,
         normals=_attribute(document, attributes, "NORMAL", (3,), count),
         uv0=_attribute(document, attributes, "TEXCOORD_0", (2,), count),
         uv1=_attribute(document, attributes, "TEXCOORD_1", (2,), count),

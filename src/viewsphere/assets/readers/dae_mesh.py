@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.coordinates import check_coordinates
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.polygon_holes import without_holes
 from viewsphere.assets.polygon_proof import cut_polygons
@@ -60,6 +61,7 @@ class _Input:
     set: int
     offset: int
     values: Float
+    source: str
 
 
 def _inputs(folder: ModelFolder, element: Any, sources: dict[str, Any], shared: dict[str, list[Any]]) -> list[_Input]:
@@ -74,7 +76,8 @@ def _inputs(folder: ModelFolder, element: Any, sources: dict[str, Any], shared: 
             semantic = str(inner.get("semantic"))
             before = sum(one.semantic == semantic for one in inputs)
             number = whole(folder, inner, "set", whole(folder, entry, "set", before))
-            inputs.append(_Input("POSITION" if semantic == "VERTEX" else semantic, number, offset, _values(folder, source)))
+            kind = "POSITION" if semantic == "VERTEX" else semantic
+            inputs.append(_Input(kind, number, offset, _values(folder, source), str(source.get("id"))[:80]))
     return inputs
 
 
@@ -139,6 +142,7 @@ def _faces(folder: ModelFolder, element: Any, inputs: Sequence[_Input]) -> DaeFa
     if not len(counts):
         return None
     _check(folder, index, inputs)
+    check_coordinates(folder, position.values, index[:, position.offset], f"source {position.source!r}: ")
     key = row_numbers(*index.T)
     _, first, corners = np.unique(key, return_index=True, return_inverse=True)
     rows = index[first]

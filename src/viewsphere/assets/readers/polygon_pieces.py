@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from viewsphere.assets.coordinates import check_coordinates
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.polygon_proof import cut_polygons
@@ -102,6 +103,7 @@ def _whole(folder: ModelFolder, polygons: Polygons) -> Polygons:
     if corners.size and (corners.min() < 0 or corners.max() >= total):
         wrong = corners.min() if corners.min() < 0 else corners.max()
         raise folder.error(f"a face names vertex {wrong}, expected 0 to {total - 1}; the file may be truncated")
+    check_coordinates(folder, polygons.positions, corners)
     kept = polygons.counts >= 3
     if kept.all():
         return polygons

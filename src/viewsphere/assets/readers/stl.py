@@ -7,6 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.coordinates import check_coordinates
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
@@ -61,7 +62,9 @@ def _binary(folder: ModelFolder, data: bytes) -> Primitive:
         raise folder.error(f"promises {count:,} triangles, has bytes for {room:,}: truncated or damaged")
     folder.check("MAX_TRIANGLES", count, "triangles")
     facets = np.frombuffer(data, FACET, count, HEADER)
-    return _piece(folder.model.stem, facets["corners"].astype(np.float64), _magics_colors(data[:80], facets["attribute"]))
+    return _piece(
+        folder, folder.model.stem, facets["corners"].astype(np.float64), _magics_colors(data[:80], facets["attribute"])
+    )
 
 
 def _magics_colors(header: bytes, attribute: NDArray[np.uint16]) -> Float | None:
@@ -80,7 +83,7 @@ def _text_solids(folder: ModelFolder, data: bytes) -> list[Primitive]:
     solids = list(SOLID.finditer(text))
     ends = [*(solid.start() for solid in solids[1:]), len(text)]
     pieces = [
-        _piece(_name(solid[1]) or folder.model.stem, _text_corners(folder, text[solid.end() : end]), None)
+        _piece(folder, _name(solid[1]) or folder.model.stem, _text_corners(folder, text[solid.end() : end]), None)
         for solid, end in zip(solids, ends, strict=True)
     ]
     folder.check("MAX_TRIANGLES", sum(len(piece.triangles) for piece in pieces), "triangles")
@@ -106,12 +109,13 @@ def _text_corners(folder: ModelFolder, text: bytes) -> Float:
     return numbers.reshape(-1, 3, 3)
 
 
-def _piece(name: str, corners: Float, colors: Float | None) -> Primitive:
-    count = 3 * len(corners)
+def _piece(folder: ModelFolder, name: str, corners: Float, colors: Float | None) -> Primitive:
+    positions, triangles = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    check_coordinates(folder, positions, triangles, f"solid {name!r}: ", corners=3)
     return Primitive(
         part=name,
         material=0,
-        positions=corners.reshape(-1, 3),
-        triangles=np.arange(count).reshape(-1, 3),
+        positions=positions,
+        triangles=triangles,
         colors=None if colors is None else np.repeat(colors, 3, axis=0),
     )

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.assets.coordinates import check_coordinates
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.primitive import Float, Int
 
@@ -75,6 +76,7 @@ def _triangles(folder: ModelFolder, element: Any, mesh: Any) -> Triangles:
     corners = _numbers(folder, [(t.get("v1"), t.get("v2"), t.get("v3")) for t in rows], np.int64, where)
     if corners.size and not (corners.min() >= 0 and corners.max() < len(positions)):
         raise folder.error(f"{where}: a triangle names vertex {corners.max()}, expected 0 to {len(positions) - 1}")
+    check_coordinates(folder, positions, corners, f"{where}: ")
     group, index = str(element.get("pid") or ""), element.get("pindex", NOTHING)
     groups = [str(t.get("pid") or group) for t in rows]
     # A property of the first corner alone is that of all three.

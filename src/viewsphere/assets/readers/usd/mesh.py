@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.assets.coordinates import check_coordinates
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.polygon_proof import cut_polygons
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
@@ -91,6 +92,7 @@ def _polygons(folder: ModelFolder, prim: Any, time: Any) -> tuple[Float, Int, In
         raise folder.error(f"{prim.GetPath()}: polygons need {counts.sum():,} corners, found {len(corners):,}: damaged")
     if corners.size and (corners.min() < 0 or corners.max() >= len(points)):
         raise folder.error(f"{prim.GetPath()}: a face names point {corners.max()}, expected 0 to {len(points) - 1}")
+    check_coordinates(folder, points, corners, f"{prim.GetPath()}: ")
     kept = _is_kept(mesh, counts, time)
     if not kept.all():
         corners = corners[: counts.sum()][np.repeat(kept, counts)]
