@@ -170,6 +170,7 @@ def compiled(cache, source=None):
     """The number of kernels that a new process compiles."""
     environment = {**os.environ, "VIEWSPHERE_CACHE": str(cache), "PYTHONHASHSEED": "random", "TMPDIR": str(cache)}
     environment |= {"PYTHONPATH": str(source)} if source else {}
+    cache.mkdir(exist_ok=True)
     run = subprocess.run([sys.executable, "-c", USE], env=environment, capture_output=True, text=True, check=True)
     return int(run.stdout), run.stderr
 
@@ -187,6 +188,22 @@ def test_a_kernel_is_compiled_once_wherever_its_source_lies(tmp_path, root):
     lens = tmp_path / "moved" / "viewsphere" / "geometry" / "kernels_lens.py"
     lens.write_text(lens.read_text() + "\n# another\n")
     assert compiled(tmp_path, tmp_path / "moved")[0] == 1
+
+
+@pytest.mark.slow
+def test_kernels_that_a_package_brings_are_used(tmp_path):
+    import viewsphere
+
+    package = tmp_path / "installed" / "viewsphere"
+    shutil.copytree(Path(viewsphere.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__", "web"))
+    assert compiled(tmp_path / "built", package.parent)[0] == 1
+    shutil.copytree(tmp_path / "built" / "kernels", package / "kernels" / "shipped")
+    assert compiled(tmp_path / "first", package.parent) == (0, "")
+    assert not list((tmp_path / "first").rglob("*.kernel"))
+    (shipped,) = (package / "kernels" / "shipped").rglob("*.kernel")
+    shipped.write_bytes(shipped.read_bytes()[:-1])
+    assert compiled(tmp_path / "first", package.parent)[0] == 1
+    assert compiled(tmp_path / "first", package.parent)[0] == 0
 
 
 class Hostile:
