@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from light_stage import LightStage, Samples, ball, cuboid, distances, flat, poin
 
 from quick import quick
 from viewsphere import zoo
+from viewsphere.engines.raster import occlusion
 from viewsphere.engines.raster.occlusion import NO_OCCLUSION, bake_occlusion, sky_directions, with_ground_light
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
@@ -170,3 +172,20 @@ def test_directions_share_the_sphere():
     np.testing.assert_allclose(np.linalg.norm(d, axis=1), 1, atol=1e-6)
     np.testing.assert_allclose(d.T @ d / len(d), np.eye(3) / 3, atol=0.01)
     np.testing.assert_allclose(d[:24, 2].mean(), 0.5, atol=1e-3)
+
+
+def test_points_that_surfaces_read_are_the_same_in_blocks_and_at_once(monkeypatch):
+    rng = np.random.default_rng(0)
+    vertices = np.zeros((600, 16), np.float32)
+    vertices[:, 11:14], vertices[:, :3] = rng.random((600, 3)), rng.normal(size=(600, 3))
+    near = rng.integers(0, 597, 300)
+    triangles = np.column_stack([near, near + 1, near + 2]).astype(np.uint32)
+    casters = SimpleNamespace(
+        surfaces=SimpleNamespace(vertices=vertices, triangles=triangles), extent=SimpleNamespace(triangles=len(triangles))
+    )
+    at_once = occlusion._read_points(casters, np.zeros(3), 3.0, np.array([10, 10, 10]))
+    monkeypatch.setattr(occlusion, "_SIDES", 7)
+    monkeypatch.setattr(occlusion, "_MOST_MARKED", 5)
+    in_blocks = occlusion._read_points(casters, np.zeros(3), 3.0, np.array([10, 10, 10]))
+    assert np.array_equal(in_blocks, at_once)
+    assert 0 < at_once.sum() < at_once.size

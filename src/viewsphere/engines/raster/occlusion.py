@@ -33,6 +33,7 @@ _MOST_OPEN_CELLS = 60_000  # where scenery may read any of them
 _PAD, _WIDE_PAD = 3, 6  # cells around the targets, without and with scenery
 _PUSH = 1.6  # cells between a surface and where it reads the volume
 _FLOOR = 128  # cells of the ground's map, each way
+_SIDES = 1 << 16  # triangles measured at once: all 2 million of a crowd at once take 200 MB
 _MOST_MARKED = 200_000  # points of surfaces at a time
 _MOST_MARKS = 50_000_000  # points of all surfaces; for more of them, all points of the volume are computed instead
 _DEEPEST = 0.92  # the rest is light that objects and ground throw back and forth
@@ -272,6 +273,12 @@ def _spread(volume: Float32, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return known | fresh
 
 
+def _longest(points: Float32, triangles: NDArray[np.uint32]) -> Float32:
+    """The longest side of each triangle (3, T) of these points (3, V)."""
+    a, b, c = (points[:, corners] for corners in triangles)
+    return np.sqrt(np.max([(d * d).sum(axis=0) for d in (b - a, c - b, a - c)], axis=0))
+
+
 def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[np.int_]) -> NDArray[np.bool_]:
     """The points of the volume that samples of the targets will read, on both sides of their surfaces.
 
@@ -281,15 +288,16 @@ def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[n
     vertices = casters.surfaces.vertices.T
     # Where and which way: lengths in cells.
     known = np.concatenate([(vertices[11:14] - corner[:, None]) * cells, vertices[:3]], dtype=np.float32)
-    a, b, c = (known[:3, corners] for corners in triangles)
-    longest = np.sqrt(np.max([(d * d).sum(axis=0) for d in (b - a, c - b, a - c)], axis=0))
-    parts = np.maximum(np.ceil(1.5 * longest), 1)
+    blocks = (triangles[:, start : start + _SIDES] for start in range(0, triangles.shape[1], _SIDES))
+    parts = np.concatenate([np.maximum(np.ceil(1.5 * _longest(known[:3], block)), 1) for block in blocks])
     if (parts * parts).sum(dtype=np.float64) > _MOST_MARKS:
         return np.ones(shape, np.bool_)
     is_first = np.zeros(shape, np.bool_)
     is_corner = np.zeros(vertices.shape[1], np.bool_)
     is_corner[triangles[:, parts == 1]] = True
-    _mark(known[:, is_corner], is_first)
+    marked = np.flatnonzero(is_corner)
+    for start in range(0, len(marked), _MOST_MARKED):
+        _mark(known[:, marked[start : start + _MOST_MARKED]], is_first)
     for n in np.unique(parts[parts > 1]).astype(int).tolist():
         f, g = np.mgrid[: n + 1, : n + 1].reshape(2, -1)[:, :, None].astype(np.float32) / n
         f, g = f[f + g < 1 + 0.5 / n], g[f + g < 1 + 0.5 / n]
