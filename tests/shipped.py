@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from itertools import islice
 
+import pytest
+
 import viewsphere as vs
+from built_once import built_once
 from command_line import viewsphere
+from small import ROOT
 
 MOST_PIXELS = 13e6
 """Of a recipe that is rendered whole; a larger one takes minutes, and its frames differ little."""
@@ -34,3 +38,24 @@ def rendered(file, folder):
     assert all((folder / "out" / entry.name).is_dir() for entry in vs.Recipe.load(file).formats)
     checked = viewsphere("check", folder / "out", "--sample", "3")
     assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
+@pytest.fixture(scope="module", autouse=True)
+def models_built_once():
+    """For a module that imports it: models of the zoo are built once for all its recipes."""
+    with built_once():
+        yield
+
+
+def each_renders(*folders):
+    """A test that renders every recipe of these folders of recipes/."""
+    files = sorted(file for folder in folders for file in (ROOT / "recipes" / folder).glob("*.yaml"))
+    assert files
+
+    @pytest.mark.shipped
+    @pytest.mark.slow
+    @pytest.mark.parametrize("file", files, ids=lambda file: file.stem)
+    def test(file, tmp_path):
+        rendered(file, tmp_path)
+
+    return test

@@ -1,24 +1,7 @@
 """Every recipe of recipes/ and recipes/labels renders as it is shipped."""
 
-import pytest
+from shipped import each_renders, models_built_once
 
-from built_once import built_once
-from shipped import rendered
-from small import ROOT
+__all__ = ["models_built_once"]
 
-pytestmark = [pytest.mark.shipped, pytest.mark.slow]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _built_once():
-    with built_once():
-        yield
-
-
-@pytest.mark.parametrize(
-    "file",
-    sorted(file for folder in ("", "labels") for file in (ROOT / "recipes" / folder).glob("*.yaml")),
-    ids=lambda file: file.stem,
-)
-def test_a_recipe_renders_as_it_is_shipped(file, tmp_path):
-    rendered(file, tmp_path)
+test_a_recipe_renders_as_it_is_shipped = each_renders(".", "labels")

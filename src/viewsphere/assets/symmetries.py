@@ -7,8 +7,8 @@ inside of a model, where nobody sees it, counts as well.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import cast
 
@@ -16,15 +16,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.surface import DistanceField, Surface
-from viewsphere.geometry.rotation import product, rotation_about, transform
+from viewsphere.assets.symmetry_lines import (
+    APART,
+    COARSE,
+    FIT,
+    NICE,
+    TOLERANCE,
+    Line,
+    are_near,
+    is_symmetry,
+    lines_around,
+    misfit,
+    nice_axis,
+    turn_around,
+    turns_around,
+    usual_axes,
+)
+from viewsphere.geometry.rotation import rotation_about, transform
 from viewsphere.geometry.rotation_group import largest_group
 from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.symmetries import Continuous, Symmetries
 
 Float = NDArray[np.float64]
-
-TOLERANCE = 0.01
-"""Share of the diameter by which a symmetry may move a point of the surface away from the surface."""
 
 ORDERS = tuple(range(2, 17))
 """How often a turn may be repeated until the model is as it was. A prism of more sides is round, as far as `TOLERANCE` goes."""
@@ -44,32 +57,12 @@ TURNS = 16
 ALIKE = 0.1
 """Share of the largest moment by which two moments of the surface differ at most where an axis between theirs may be one."""
 
-COARSE = 3.0
-"""Tolerances by which turns around lines may be off that are only near to the one sought."""
-
 AXES = 40_000
 """Directions of half a ball, about 0.01 radians apart."""
-
-APART = 0.09
-"""Radians by which an axis is at most off another that stands for it."""
-
-FIT = 0.1
-"""Tolerances by which orders of an axis may fit worse than the best."""
-
-NICE = 1e-3
-"""Radians by which an axis may be off one of the object's own, which then takes its place."""
-
-FEW = 600
-"""Points that lines are fitted to."""
 
 SOLIDS = (59, 23, 11)
 """Turns of the icosahedron, the cube and the tetrahedron. A surface that is round but for noise or bumps near the tolerance has
 other turns beside these, of no group.
-"""
-
-EARLY, HOPELESS = 3, 2.0
-"""A fit ends after so many steps if its line is still off by more than so many tolerances: three steps take the line of a
-symmetry from 0.09 radians to well within one.
 """
 
 RANKED = 128
@@ -81,29 +74,18 @@ icosahedron, which has the most axes of one order. Without a limit, a nearly rou
 """
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
-    """A line along `axis` (3,), of length 1, through `offset` (3,), metres; and how often a turn around it is repeated until
-    all is as it was: 0 if every turn leaves it so.
-    """
-
-    axis: Float
-    offset: Float
-    order: int = 0
-
-
 def find(surface: Surface) -> Symmetries:
     """All symmetries of a surface (within `TOLERANCE`), in object axes and metres.
 
     A ball has the three axes of the object as continuous ones; anything else that is round has one, and one half turn if its
     ends are alike. All else has its rotations, by axes: the largest group of them that holds all its products.
     """
-    usual, lines = _usual(surface), list[Line]()
-    round_ones = list(_around(surface, usual, [GOLDEN * i for i in (1, 2, 3)], lines, _as_round))
+    usual, lines = usual_axes(surface), list[Line]()
+    round_ones = list(lines_around(surface, usual, [GOLDEN * i for i in (1, 2, 3)], lines, _as_round))
     if round_ones:
         return _turned(surface, round_ones)
     for order, candidates in _candidates(surface, usual):
-        for line in islice(_around(surface, candidates, [2 * math.pi / order], lines, _as_it_is), PRIMES[order]):
+        for line in islice(lines_around(surface, candidates, [2 * math.pi / order], lines, _as_it_is), PRIMES[order]):
             if not line.order:
                 return _turned(surface, [line])
             lines.append(line)
@@ -141,7 +123,7 @@ def _fittest(surface: Surface, lines: Sequence[Line]) -> Iterator[Float]:
     if sum(line.order - 1 for line in lines) <= SOLIDS[0]:
         yield np.array([*_turns(lines)]).reshape(-1, 4, 4)
         return
-    ranked = sorted(lines, key=lambda line: _misfit(surface, line, 2 * math.pi / line.order))
+    ranked = sorted(lines, key=lambda line: misfit(surface, line, 2 * math.pi / line.order))
     ends = np.cumsum([line.order - 1 for line in ranked])
     for most in SOLIDS:
         yield np.array([*_turns(ranked[: np.searchsorted(ends, most, "right")])]).reshape(-1, 4, 4)
@@ -190,10 +172,10 @@ def _turned(surface: Surface, lines: Sequence[Line]) -> Symmetries:
     if len(lines) > 1:
         return Symmetries(continuous=tuple(Continuous(axis=_plain(own), offset=offset) for own in np.eye(3)))
     least = np.eye(3)[np.abs(line.axis).argmin()]
-    axis = _nice(least - line.axis * float((least * line.axis).sum()))
+    axis = nice_axis(least - line.axis * float((least * line.axis).sum()))
     places = (line.offset, _middle(surface, line))
-    across = min((Line(axis, place, 2) for place in places), key=lambda one: _misfit(surface, one, math.pi))
-    flips = [*_turns([across])] if _is_one(surface, across, [math.pi]) else []
+    across = min((Line(axis, place, 2) for place in places), key=lambda one: misfit(surface, one, math.pi))
+    flips = [*_turns([across])] if is_symmetry(surface, across, [math.pi]) else []
     discrete = tuple(_plain_motion(surface, flip) for flip in flips)
     return Symmetries(discrete=discrete, continuous=(Continuous(axis=_plain(line.axis), offset=offset),))
 
@@ -207,7 +189,7 @@ def _middle(surface: Surface, line: Line) -> Float:
 def _turns(lines: Iterable[Line]) -> Iterator[Float]:
     """The rotations (4, 4) about lines of these orders, without the identity."""
     for line in lines:
-        yield from (_motion(line, 2 * math.pi * i / line.order) for i in range(1, line.order))
+        yield from (turn_around(line, 2 * math.pi * i / line.order) for i in range(1, line.order))
 
 
 def _plain_motion(surface: Surface, motion: Float) -> Matrix4:
@@ -226,34 +208,13 @@ def _metres(surface: Surface, numbers: ArrayLike) -> Vector:
     return _plain(numbers, 6 - math.floor(math.log10(surface.diameter)))
 
 
-def _motion(line: Line, angle: float) -> Float:
-    """The turn (4, 4) around a line."""
-    return _motions(line.axis[None], line.offset, angle)[0]
-
-
-def _motions(axes: Float, offset: Float, angle: float) -> Float:
-    """The turns (N, 4, 4) around axes (N, 3) through one point: Rodrigues' formula."""
-    x, y, z = axes.T
-    cross = np.array([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]]).transpose(2, 0, 1)
-    turns = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * product(cross, cross)
-    motions = np.tile(np.eye(4), (len(axes), 1, 1))
-    motions[:, :3, :3], motions[:, :3, 3] = turns, offset - (turns * offset).sum(axis=2)
-    return motions
-
-
 def _angles() -> list[float]:
     return [GOLDEN * i for i in range(1, TURNS + 1)]
 
 
-def _is_one(surface: Surface, line: Line, angles: Iterable[float], tolerances: float = 1.0) -> bool:
-    """Whether all turns by these angles, and back, are symmetries within so many tolerances."""
-    limit = tolerances * TOLERANCE * surface.diameter
-    return all(surface.are_near([_motion(line, angle), _motion(line, -angle)], limit).all() for angle in angles)
-
-
 def _as_round(surface: Surface, line: Line) -> Line | None:
     """The line, if every turn around it is a symmetry."""
-    return replace(line, order=0) if _is_one(surface, line, _angles()) else None
+    return replace(line, order=0) if is_symmetry(surface, line, _angles()) else None
 
 
 def _as_it_is(surface: Surface, line: Line) -> Line | None:
@@ -261,22 +222,10 @@ def _as_it_is(surface: Surface, line: Line) -> Line | None:
     are within the tolerance.
     """
     limit = TOLERANCE * surface.diameter
-    off = {n: _misfit(surface, line, 2 * math.pi / n) for n in ORDERS if _is_one(surface, line, [2 * math.pi / n])}
+    off = {n: misfit(surface, line, 2 * math.pi / n) for n in ORDERS if is_symmetry(surface, line, [2 * math.pi / n])}
     if not off:
         return None
     return _as_round(surface, line) or replace(line, order=max(n for n in off if off[n] <= min(off.values()) + FIT * limit))
-
-
-def _misfit(surface: Surface, line: Line, angle: float) -> float:
-    """The root mean square of distances of points, turned, from the surface, metres, each counted up to the tolerance."""
-    limit = TOLERANCE * surface.diameter
-    squares = surface.closest(surface.points[:FEW], _motion(line, angle), limit)[0]
-    return math.sqrt(float(np.minimum(squares, limit * limit).mean()))
-
-
-def _usual(surface: Surface) -> Float:
-    """The object's own axes, and those of the surface's moments, (6, 3)."""
-    return np.array([*np.eye(3), *map(_nice, np.linalg.eigh(surface.spread)[1].T)])
 
 
 def _candidates(surface: Surface, usual: Float) -> Iterator[tuple[int, Float]]:
@@ -307,108 +256,10 @@ def _half_ball() -> Float:
 
 def _best(surface: Surface, field: DistanceField, axes: Float, order: int) -> Float:
     """The axes (N, 3), at most `STARTS`, around which turns of an order fit best, the best first; none near to a better one."""
-    misfits = field.misfits(_motions(axes, surface.center, 2 * math.pi / order), surface.points[:RANKED])
+    misfits = field.misfits(turns_around(axes, surface.center, 2 * math.pi / order), surface.points[:RANKED])
     left = axes[np.argsort(misfits, kind="stable")[: np.isfinite(misfits).sum()]]
     best = list[Float]()
     while len(left) and len(best) < STARTS:
         best.append(left[0])
-        left = left[~_near(left, left[0])]
+        left = left[~are_near(left, left[0])]
     return np.array(best).reshape(-1, 3)
-
-
-def _around(
-    surface: Surface,
-    candidates: Float,
-    angles: Sequence[float],
-    known: Sequence[Line],
-    proved: Callable[[Surface, Line], Line | None],
-) -> Iterator[Line]:
-    """The lines around which turns by these angles are symmetries, near to candidates (N, 3) for their axes, as `proved` has
-    them; but for those near to known ones.
-    """
-    limit, left, found = COARSE * TOLERANCE * surface.diameter, candidates, [line.axis for line in known]
-    for axis in found:
-        left = left[~_near(left, axis)]
-    for angle in angles:
-        left = left[surface.are_near(_motions(left, surface.center, angle), limit)]
-    while len(left):
-        line = _fitting(surface, Line(left[0], surface.center), angles)
-        left = left[~_near(left, left[0])]
-        is_new = not (found and _near(np.array(found), line.axis).any())
-        if is_new and (line := proved(surface, line)):
-            left = left[~_near(left, line.axis)]
-            found.append(line.axis)
-            yield line
-
-
-def _near(axes: Float, axis: Float) -> NDArray[np.bool_]:
-    """Which of the axes (N, 3) are about the same line's."""
-    return np.abs((axes * axis).sum(axis=1)) > math.cos(APART)
-
-
-def _fitting(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
-    """The line near to this one that fits best; itself, if it is one of the surface's moments and hardly fits worse."""
-    settled, limit = _settled(surface, line, angles), TOLERANCE * surface.diameter
-    if not (np.abs(_usual(surface) - line.axis).max(axis=1) == 0).any():
-        return settled
-    usual, best = (sum(_misfit(surface, one, angle) for angle in angles) for one in (line, settled))
-    return line if usual <= best + FIT * limit * len(angles) else settled
-
-
-def _settled(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
-    """The line near to this one around which turns take points best to planes of the surface: Gauss-Newton's method.
-
-    Its offset is the point nearest to the surface's centroid.
-    """
-    points, limit = surface.points[:FEW], 2 * COARSE * TOLERANCE * surface.diameter
-    for step in range(10):
-        if step == EARLY and not _is_one(surface, line, angles, HOPELESS):
-            break
-        slopes, off = zip(*(_slopes(surface, line, angle, points, limit) for angle in angles), strict=True)
-        slope, rest = np.concatenate(slopes, axis=1), np.concatenate(off)
-        squares = np.array([[float((a * b).sum()) for b in slope] for a in slope])
-        squares += np.eye(4) * (1e-9 * squares.trace() + np.finfo(float).tiny)
-        u, v, s, t = np.linalg.solve(squares, (slope * rest).sum(axis=1)).tolist()
-        turn = min(1.0, APART / max(math.hypot(u, v), 1e-12))
-        first, second = _across(line.axis)
-        line = Line(
-            _unit(line.axis + turn * (u * first + v * second)), line.offset + surface.diameter * (s * first + t * second)
-        )
-        if max(abs(u), abs(v), abs(s), abs(t)) < 1e-11:
-            break
-    axis, center = _nice(line.axis), surface.center
-    return Line(axis, line.offset + axis * float(((center - line.offset) * axis).sum()))
-
-
-def _slopes(surface: Surface, line: Line, angle: float, points: Float, limit: float) -> tuple[Float, Float]:
-    """How points that are turned move off the surface (4, N) when the line tilts and shifts across, and how far they are off it
-    (N,); both are 0 beyond the limit.
-    """
-    motion, step = _motion(line, angle), 1e-6
-    squares, there, normals = surface.closest(points, motion, limit)
-    normals = normals * np.isfinite(squares)[:, None]
-    moved = transform(motion, points)
-    others = [Line(_unit(line.axis + step * way), line.offset) for way in _across(line.axis)]
-    others += [Line(line.axis, line.offset + step * surface.diameter * way) for way in _across(line.axis)]
-    slopes = [((transform(_motion(other, angle), points) - moved) * normals).sum(axis=1) / step for other in others]
-    return np.array(slopes), ((there - moved) * normals).sum(axis=1)
-
-
-def _across(axis: Float) -> tuple[Float, Float]:
-    """Two directions at right angles to an axis, and to one another."""
-    own = np.eye(3)[np.abs(axis).argmin()]
-    first = _unit(own - axis * float((own * axis).sum()))
-    return first, np.cross(axis, first)
-
-
-def _nice(axis: Float) -> Float:
-    """The axis with its longest side positive; or that of the object that it hardly differs from."""
-    axis = _unit(axis)
-    longest = np.abs(axis).argmax()
-    own = np.eye(3)[longest]
-    axis = axis * np.sign(axis[longest])
-    return own if np.abs(axis - own).max() < NICE else _unit(axis.round(9))
-
-
-def _unit(vector: Float) -> Float:
-    return vector / math.sqrt((vector * vector).sum())
