@@ -101,6 +101,16 @@ def exchange():
     bpy.ops.export_scene.gltf(filepath=str(FOLDER / "draco.glb"), export_draco_mesh_compression_enable=True)
 
 
+def sides():
+    """A face of one side, and one of two, in a .blend file."""
+    anew()
+    for place, name in enumerate(("single", "double")):
+        made = material(name)
+        made.use_backface_culling = name == "single"
+        put(name, grid(name, made), at(3 * place))
+    save("sides.blend")
+
+
 def evaluated():
     """What has to be evaluated, an object of each kind."""
     anew()
@@ -392,7 +402,7 @@ def bad():
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "later.blend"), check_existing=False, compress=False)
 
 
-for make in (exchange, evaluated, posed, pointed, painted, occluded, linked, bad):
+for make in (exchange, sides, evaluated, posed, pointed, painted, occluded, linked, bad):
     make()
 print(json.dumps(sorted(file.name for file in FOLDER.iterdir())), flush=True)
 sys.stdout.flush()

@@ -108,6 +108,11 @@ def test_each_format_stands_as_it_was_made(made, name):
         np.testing.assert_allclose([*red.base_color, red.metallic, red.roughness], [0.8, 0.1, 0.1, 1, 1, 0.25], atol=2e-3)
 
 
+def test_backface_culling_is_the_single_side_of_a_material(made):
+    mesh, _ = load_model(made / "sides.blend")
+    assert {part: material_of(mesh, part).double_sided for part in mesh.parts} == {"single": False, "double": True}
+
+
 def test_what_is_rendered_is_there_and_nothing_else(evaluated):
     expected = {
         "smooth", "not in the window", "text", "tube", "ball", "keyed", "moving", "one/part", "two/part", "parent", "child",
