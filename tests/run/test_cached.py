@@ -1,0 +1,58 @@
+"""Data sets have the same bytes with a cold cache, a warm one, a damaged one, and none."""
+
+import pytest
+
+from small import small_recipe, tree_hash
+from viewsphere.caches import budget
+from viewsphere.engines.raster import bounces
+from viewsphere.kernels.entries import kernel_folder
+from viewsphere.run.generate import generate
+
+SKY = {"daylight": {"turbidity": 2.5}}
+ROOM = {
+    "models": [{"source": "zoo:chair", "category": "chair", "scale": {"length": 0.3}}],
+    "viewpoints": {"azimuth": [30], "elevation": [20], "distance": 1.0},
+    "camera": {"size": [48, 32], "fov_deg": 40},
+    "engine": {"name": "raster", "bounces": "on"},
+    "scene": {"sky": SKY, "sun": {"azimuth_deg": 75, "elevation_deg": 42}, "ground": True},
+    "channels": ["rgb", "depth", "instances"],
+    "formats": ["native"],
+}
+
+
+@pytest.fixture
+def rendered(tmp_path, monkeypatch):
+    """Renders the room as a new process would, and counts how often its light is baked."""
+    baked = []
+    bake = bounces._baked
+    monkeypatch.setattr(bounces, "_baked", lambda lighting: baked.append(1) or bake(lighting))
+
+    def render(name):
+        for kept in (bounces._bake, bounces._look, bounces.tree_of_hall):
+            kept.cache_clear()
+        baked.clear()
+        generate(small_recipe(**ROOM), tmp_path / name, workers=0)
+        return tree_hash(tmp_path / name), len(baked)
+
+    return render
+
+
+@pytest.mark.slow
+def test_the_cache_changes_no_byte(rendered, tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kernel_folder()))
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    cold, times = rendered("cold")
+    assert times >= 1  # one more where kernels are compiled first, for which a tiny scene is baked
+    kinds = {entry.kind for entry in budget.entries()}
+    assert kinds >= {"light", "zoo"}
+    assert rendered("warm") == (cold, 0)
+    for entry in budget.entries(("light", "zoo")):
+        whole = bytearray(entry.file.read_bytes())
+        whole[len(whole) // 2] ^= 4
+        entry.file.write_bytes(whole)
+    assert rendered("damaged") == (cold, 1)
+    assert rendered("mended") == (cold, 0)
+    budget.clear()
+    monkeypatch.setenv("VIEWSPHERE_CACHE_LIMIT", "1")
+    assert rendered("without") == (cold, 1)
+    assert not [*budget.entries()]
