@@ -1,10 +1,10 @@
 """Builds the sdist and the wheels, checks them, and tries them on every Python that viewsphere supports.
 
-    scripts/package [--output dist] [--no-kernels]
+    scripts/package [--output dist] [--kernels all | newest | none]
 
 One wheel is for any machine, and compiles kernels when they are called. On Linux with an x86-64 processor there is one more for
 each Python: it holds the kernels that were compiled beside each numba of `scripts/kernel_builds.txt`, which is brought up to
-date at each release.
+date at each release. `--kernels newest`, as CI has it, takes the last of these alone: each takes a minute of processor time.
 
 uv looks for each Python on this machine (on the PATH and among pyenv's), and downloads it where it may; those that cannot be
 had are named and skipped. What the archives must and must not hold, `tests/test_package.py` says.
@@ -64,10 +64,10 @@ def builds() -> list[list[str]]:
     return [line.split() for line in lines if line.strip() and not line.startswith("#")]
 
 
-def with_kernels(pure: Path, python: str, work: Path) -> Path | None:
-    """The wheel of a Python: the pure one and kernels beside each build; None where there is no such Python here."""
+def with_kernels(pure: Path, python: str, work: Path, beside: list[list[str]]) -> Path | None:
+    """The wheel of a Python: the pure one and kernels beside each of these builds; None where there is no such Python here."""
     kernels = work / "kernels"
-    for number, exact in enumerate(builds()):
+    for number, exact in enumerate(beside):
         own, made = environment(work), work / f"venv-{number}"
         if not make_venv(python, made, own):
             return None
@@ -150,14 +150,14 @@ def commands() -> Iterator[list[str]]:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--output", type=Path, default=ROOT / "dist")
-    options.add_argument("--no-kernels", action="store_true", help="only the wheel for any machine")
+    options.add_argument("--kernels", choices=["all", "newest", "none"], default="all", help="builds of numba that wheels hold")
     args = options.parse_args()
     pure = build(args.output)
     wheels: dict[str, Path] = {}
-    if not args.no_kernels and sys.platform == "linux" and TARGET.cpu == COMMON:
+    if args.kernels != "none" and sys.platform == "linux" and TARGET.cpu == COMMON:
         for python in pythons():
             with tempfile.TemporaryDirectory(prefix="viewsphere-kernels-") as work:
-                made = with_kernels(pure, python, Path(work))
+                made = with_kernels(pure, python, Path(work), builds()[-1:] if args.kernels == "newest" else builds())
             if made is not None:
                 wheels[python] = made
                 print(f"{made.name}: {made.stat().st_size / 1e6:.1f} MB")
