@@ -38,6 +38,13 @@ def test_an_entry_is_read_as_it_was_written(root):
     assert [file.name for file in (root / NAME).parent.iterdir()] == [Path(NAME).name]
 
 
+def test_reading_an_entry_notes_that_it_was_used(root):
+    entries.save(NAME, b"code")
+    os.utime(root / NAME, (1e9, 1e9))
+    entries.load(NAME)
+    assert (root / NAME).stat().st_mtime > 1.5e9
+
+
 @pytest.mark.parametrize("keep", [0, 1, 31, 32, 33, -1])
 def test_a_truncated_entry_is_none(root, keep):
     entries.save(NAME, os.urandom(500))

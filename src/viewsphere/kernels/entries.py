@@ -23,6 +23,7 @@ from stat import S_ISREG, S_IWGRP, S_IWOTH
 
 from viewsphere.aside import STALE_S
 from viewsphere.caches import cache_of
+from viewsphere.caches.entries import note_use
 
 SHIPPED = Path(__file__).with_name("shipped")
 """Entries that wheels bring; sources have none."""
@@ -53,6 +54,8 @@ def load(name: str) -> bytes | None:
     for folder in (SHIPPED, *folders()):
         data = _read(folder, name)
         if data is not None and hashlib.sha256(data[_DIGEST:]).digest() == data[:_DIGEST]:
+            if folder != SHIPPED:
+                note_use(folder / name)
             return zlib.decompress(data[_DIGEST:])
     return None
 
