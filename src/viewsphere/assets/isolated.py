@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from viewsphere.aside import temporary
 from viewsphere.assets import endings
 from viewsphere.assets.load import BLENDER_SUFFIXES, check_source
 from viewsphere.assets.reader import LOG, OUTCOME, Job, mesh_name, read
@@ -37,6 +38,19 @@ def read_apart(spec: ModelSpec, frames: Sequence[int], folder: Path) -> tuple[li
     if "error" in outcome:
         raise ModelError(outcome["error"])
     return [folder / mesh_name(i) for i in range(max(len(frames), 1))], [Path(file) for file in outcome["files"]]
+
+
+def timeline_apart(path: Path, confined: bool) -> tuple[dict[str, Any], list[Path]]:
+    """The timeline of a USD file, which usd-core reads in a short-lived process, and the files that it names; otherwise as
+    `read_apart`.
+    """
+    spec = ModelSpec(key="timeline", source=str(path), category="model", category_id=1, confined=confined)
+    with temporary("reading") as folder:
+        job = Job(spec.model_dump(mode="json"), str(folder), limits.MAX_READ_SECONDS, limits.MAX_READ_BYTES, is_timeline=True)
+        outcome = read(job) if os.environ.get(READ_HERE) == "1" else _run(job)
+    if "error" in outcome:
+        raise ModelError(outcome["error"])
+    return outcome["timeline"], [Path(file) for file in outcome["files"]]
 
 
 def _run(job: Job) -> dict[str, Any]:

@@ -59,7 +59,8 @@ IMPORTED = (
 @dataclass(frozen=True)
 class Job:
     """What to read (a ModelSpec's fields), where the result goes, seconds, bytes, and whether Blender is what reads it.
-    `frames` of its animation, which ascend, are read; none: the file as it stands.
+    `frames` of its animation, which ascend, are read; none: the file as it stands. With `is_timeline`, only the timeline of a
+    USD file is read.
     """
 
     spec: dict[str, Any]
@@ -68,6 +69,7 @@ class Job:
     memory: int
     by_blender: bool = False
     frames: tuple[int, ...] = ()
+    is_timeline: bool = False
 
     def to_json(self) -> str:
         """The job as one line of JSON."""
@@ -177,6 +179,8 @@ def read(job: Job) -> dict[str, Any]:
 
     spec = ModelSpec.model_validate(job.spec)
     try:
+        if job.is_timeline:
+            return _read_timeline(spec)
         files = _read_model(spec, job)
     except ModelError as error:
         return {"error": str(error)}
@@ -211,6 +215,16 @@ def _read_model(spec: ModelSpec, job: Job) -> Sequence[Path]:
         write_mesh(folder / mesh_name(number), normalise(raw, facts, spec, first), placed(raw, facts, spec, first))
         files |= dict.fromkeys(facts.files)
     return tuple(files)
+
+
+def _read_timeline(spec: ModelSpec) -> dict[str, Any]:
+    """The timeline of a USD file, and the files that it names."""
+    from viewsphere.assets.folder import ModelFolder
+    from viewsphere.assets.readers.usd.animated import timeline
+
+    folder = ModelFolder(Path(spec.source), spec.confined)
+    told = timeline(folder)
+    return {"timeline": told, "files": [str(file) for file in folder.files]}
 
 
 def mesh_name(number: int) -> str:

@@ -15,7 +15,8 @@ from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.gltf.animation import timeline
 from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.inside import split_source
-from viewsphere.assets.load import ANIMATED_SUFFIXES, GLTF, check_animated
+from viewsphere.assets.isolated import timeline_apart
+from viewsphere.assets.load import ANIMATED_SUFFIXES, GLTF, USD, check_animated, needs_blender
 from viewsphere.assets.via_blender import asked, read_named, remember_layers, started
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import ModelError
@@ -90,7 +91,7 @@ class Blenders:
             told = kept(file, f"timeline here {clip} {fps}", lambda: self._of_gltf(file, confined, clip, fps))
         else:
             told = self.told(path, confined, "timeline", {"clip": clip, "fps": fps})
-        return Timeline(told["first"], told["last"], told["fps"], told["moves"], tuple(Clip(**clip) for clip in told["clips"]))
+        return _timeline_of(told)
 
     def _of_gltf(
         self, file: Path, confined: bool, clip: str | None, fps: float | None
@@ -114,14 +115,23 @@ class Blenders:
         return answer
 
 
+def _timeline_of(told: Mapping[str, Any]) -> Timeline:
+    return Timeline(told["first"], told["last"], told["fps"], told["moves"], tuple(Clip(**clip) for clip in told["clips"]))
+
+
 def animation_of(path: Path, confined: bool) -> Timeline | None:
-    """The timeline of a file in which something moves, None for any other; Blender is only asked of files that may move.
+    """The timeline of a file in which something moves, None for any other. Blender reads those of files that may move; of USD
+    files, usd-core where it is installed.
 
     Raises ModelError where Blender has no answer, or there is none.
     """
-    folder = ModelFolder(split_source(path)[0], confined)
-    if not _may_move(folder):
+    file = split_source(path)[0]
+    if not _may_move(ModelFolder(file, confined)):
         return None
+    suffix = file.suffix[1:].lower()
+    if suffix in USD and not needs_blender(suffix):
+        line = _timeline_of(kept(file, f"timeline by usd-core {confined}", lambda: timeline_apart(file, confined)))
+        return line if line.moves else None
     with Blenders.none_yet() as blenders:
         line = blenders.timeline(path, confined)
     return line if line.moves else None
