@@ -54,7 +54,6 @@ PARTS_OF_COLOUR = (
 )
 EMBREE = "Embree, one ray a pixel"
 STAGES = ("truth: raster", "truth: channels", "colour", "annotations", "files")
-AA = {4: "4x edge anti-aliasing", 1: "no anti-aliasing"}
 Rival = tuple[str, Callable[[Camera], Any]]
 """A name for the table, and the function that draws a frame."""
 
@@ -253,12 +252,7 @@ def in_folder(args: argparse.Namespace, folder: Path) -> None:
         exports(args.frames, folder)
         return
     write_reference(folder)
-    if args.rivals:
-        from bench_rivals import rivals
-
-        ours = {f"viewsphere, {name}": measure(args.frames, n, folder)[0].median("whole frame") for n, name in AA.items()}
-        rivals(folder, args.frames, ours, args.only)
-    elif args.motion:
+    if args.motion:
         from bench_motion import motion
 
         motion(folder)
@@ -299,12 +293,11 @@ def main() -> None:
     options.add_argument("--physics", action="store_true", help="measure what falls until it lies still")
     options.add_argument("--labels", action="store_true", help="measure what each label costs, with 1 and 20 objects")
     options.add_argument("--exports", action="store_true", help="measure 25 formats in one pass, and what they encode")
-    options.add_argument("--rivals", action="store_true", help="measure other renderers, each in an environment of its own")
-    options.add_argument("--only", nargs="+", default=[], metavar="NAME", help="of them these: open3d, vtk, mitsuba, ...")
     options.add_argument("--training", action="store_true", help="measure reading and rendering for a training loop")
     options.add_argument("--cycles", type=int, metavar="FRAMES", help="measure the Cycles engine beside BlenderProc's way")
     options.add_argument("--threads", type=int, default=0, help="of BlenderProc's Blender, beside --cycles; 0: all cores")
     options.add_argument("--endurance", type=int, metavar="FRAMES", help="tell the memory of one Blender over so many frames")
+    options.add_argument("--rivals", nargs="*", metavar="NAME", help="measure other renderers, each installed on its own")
     options.add_argument("--json", type=Path, help="write the figures here too")
     args = options.parse_args()
     keep_freed_memory()  # workers set the same
@@ -317,13 +310,25 @@ def main() -> None:
     if args.labels or args.town or args.physics:
         in_memory(args)
         return
-    if args.motion or args.bounces or args.exports or args.training or args.rivals:
+    if args.motion or args.bounces or args.exports or args.training:
         with tempfile.TemporaryDirectory() as name:
             in_folder(args, Path(name))
         return
     if args.cycles or args.endurance:
         slow(args)
         return
+    if args.rivals is not None:
+        from bench_rivals import rivals
+
+        figures = rivals(args.rivals, max(1, args.frames // 4), processor())
+    else:
+        figures = stages_of_a_frame(args)
+    if args.json:
+        args.json.write_text(json.dumps(figures, indent=1))
+
+
+def stages_of_a_frame(args: argparse.Namespace) -> dict[str, Any]:
+    """The times of the reference frame's stages, printed and returned."""
     figures: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -339,8 +344,7 @@ def main() -> None:
             one, two = rates(folder, 4 * args.frames).values()
             print(f"\n{one:.1f} frames/s with one worker, {two:.1f} with two: {two / one:.2f} times")
             figures["frames a second"] = one, two
-    if args.json:
-        args.json.write_text(json.dumps(figures, indent=1))
+    return figures
 
 
 if __name__ == "__main__":
