@@ -83,6 +83,19 @@ def test_rendered_pictures_come_back_from_every_reader(seed):
         np.testing.assert_array_equal(back, array)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_specks_on_nothing_come_back(seed):
+    """Behind a run of zeros a pixel of four rare bytes takes the most bits that one pixel can take."""
+    rng = np.random.default_rng(seed)
+    array = np.zeros((240, 320, 4), np.uint8)
+    array[60:180, 80:240] = (100 + 20 * np.sin(np.arange(160) / 40))[None, :, None]
+    for _ in range(200):
+        array[rng.integers(240), rng.integers(320)] = rng.integers(1, 256, 4)
+    data = encode_png(array, rendered=True)
+    np.testing.assert_array_equal(np.asarray(pillow(data)), array)
+    np.testing.assert_array_equal(decode_png(data), array)
+
+
 @pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.uint16])
 def test_what_is_no_picture_of_colours_is_written_as_ever(dtype):
     array = random_picture((20, 30), dtype)

@@ -58,6 +58,14 @@ def test_output_that_nobody_takes_is_no_success():
     assert (run.returncode, run.stderr) == (2, b"")
 
 
+@pytest.mark.skipif(os.name != "posix", reason="a shell of POSIX's")
+@pytest.mark.parametrize("stream", ["1", "2"])
+def test_a_process_without_a_stream_that_it_does_not_need_succeeds(stream):
+    script = "from viewsphere.run.exit_at_once import exit_at_once; exit_at_once(0)"
+    command = f"'{sys.executable}' -c '{script}' {stream}>&-"
+    assert subprocess.run(command, shell=True, timeout=DEADLINE).returncode == 0
+
+
 @pytest.mark.parametrize(
     ("does", "status"),
     [("return None", 0), ("return 130", 130), ("sys.exit()", 0), ("sys.exit(3)", 3), ("return False", 0)],

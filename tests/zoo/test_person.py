@@ -1,5 +1,6 @@
 """People of the zoo: a closed, skinned surface on 24 joints, feet that stand still, and all that holds for rigged files."""
 
+import errno
 import hashlib
 import json
 import struct
@@ -195,6 +196,20 @@ def test_its_file_plays_without_blender_and_rests_in_a_pose_that_nobody_is_rigge
     np.testing.assert_allclose(found, one.posed(pose), atol=1e-5)
     assert now.vertices.shape == mesh.vertices.shape and abs(now.bounds[0, 2]) < 0.02
     np.testing.assert_array_equal(zoo.build("person", np.random.default_rng(1)).vertices, mesh.vertices)
+
+
+@pytest.mark.slow
+def test_a_cache_that_cannot_be_written_costs_time_only(monkeypatch, tmp_path):
+    whole = zoo.file_of(spec_of()).read_bytes()
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "full"))
+
+    def full(file):
+        raise OSError(errno.ENOSPC, "No space left on device", str(file))
+
+    monkeypatch.setattr(zoo, "making", full)
+    files = [zoo.file_of(spec_of()) for _ in range(2)]
+    assert files[0] == files[1] and not (tmp_path / "full").exists()
+    assert files[0].read_bytes() == whole
 
 
 def test_inspect_lists_its_clips():

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere import plugins
-from viewsphere.aside import aside, sweep, temporary
+from viewsphere.aside import aside, temporary
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.isolated import read_apart
 from viewsphere.assets.load import check_source
@@ -31,7 +31,7 @@ from viewsphere.assets.part_points import part_points
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.caches import cache_of
-from viewsphere.caches.entries import SUFFIX, publish, read_entry, write_entry
+from viewsphere.caches.entries import SUFFIX, publish, read_entry, sweep_once, write_entry
 from viewsphere.errors import ModelError
 from viewsphere.files import open_file, read_bytes
 from viewsphere.limits import limits
@@ -163,7 +163,7 @@ def _batches(frames: Sequence[int]) -> Iterable[Sequence[int]]:
 def _aside(folder: Path) -> Generator[Path]:
     """A new folder in the cache (in the system's folder for such, if that cannot be written) that does not stay."""
     with ExitStack() as then:
-        then.callback(sweep, folder, PREFIX)
+        then.callback(sweep_once, folder, PREFIX, os.getpid())
         try:
             folder.mkdir(parents=True, exist_ok=True)
             place = then.enter_context(aside(folder, PREFIX))

@@ -15,6 +15,7 @@ import json
 import math
 import mmap
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BufferedReader
@@ -39,8 +40,8 @@ LINE = 64
 
 _DIGEST_BYTES, _LENGTH_BYTES = 16, 8
 _START = len(MAGIC) + _DIGEST_BYTES
-_NUMBERS = "?bBhHiIlLqQefd"
-"""numpy's characters of dtypes that arrays may have."""
+_NUMBERS = re.compile("[<>|][biuf][1248]")
+"""numpy's names of dtypes that arrays may have: what it makes of other texts is not foreseen."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -113,11 +114,17 @@ def _bytes(values: NDArray[Any]) -> memoryview:
 
 
 def _array(data: memoryview, dtype: str, shape: list[int], at: int) -> NDArray[Any]:
-    kind = np.dtype(dtype)
-    count = math.prod(shape)
-    if kind.char not in _NUMBERS or min(shape, default=0) < 0 or at < 0 or at + count * kind.itemsize > len(data):
+    kind, count = number_type(dtype), math.prod(shape)
+    if min(shape, default=0) < 0 or at < 0 or at + count * kind.itemsize > len(data):
         raise ValueError(f"an array of {dtype} {shape} at {at}")
     return np.frombuffer(data, kind, count, at).reshape(shape) if count else np.empty(shape, kind)
+
+
+def number_type(name: str) -> np.dtype[Any]:
+    """The dtype of numbers that has this name; raises ValueError for others, and TypeError for what is no text."""
+    if not _NUMBERS.fullmatch(name):
+        raise ValueError(f"numbers of type {name!r}")
+    return np.dtype(name)
 
 
 def _mapped(stream: BufferedReader, file: Path) -> memoryview:

@@ -29,6 +29,11 @@ LEDGER = "written"
 
 UNIT = 1 / 4096
 
+KERNELS, KERNELS_S = "kernels", 30 * 86_400.0
+"""The kind that is deleted last, unless it was not used for so many seconds: it is small beside light and takes long to make,
+and workers read it again hours after a run has begun.
+"""
+
 READ_BY_PATH = frozenset({".glb"})
 """Endings of files that others open by their path, so that pruning spares the ones in use."""
 
@@ -89,13 +94,16 @@ def _is_look_due(size: int) -> bool:
 
 
 def prune(limit: int) -> list[Entry]:
-    """Delete the entries that were used longest ago until the others have at most `limit` bytes; return the deleted ones.
+    """Delete the entries that were used longest ago, kernels last, until the others have at most `limit` bytes; return the
+    deleted ones.
 
     An entry whose time lies in the future, as after a jump of the clock, counts as the oldest.
     """
     _sweep_all()
     now = time.time() + 60  # machines that share a cache differ by some seconds
-    newest_first = sorted(entries(), key=lambda entry: (entry.used > now, -entry.used, str(entry.file)))
+    newest_first = sorted(
+        entries(), key=lambda entry: (_is_deleted_first(entry, now), entry.used > now, -entry.used, str(entry.file))
+    )
     sums = accumulate(entry.size for entry in newest_first)
     return _delete(
         entry for entry, total in zip(newest_first, sums, strict=True) if total > limit and not _is_in_use(entry, now)
@@ -109,6 +117,10 @@ def takes(size: int) -> bool:
 
 def _is_in_use(entry: Entry, now: float) -> bool:
     return entry.file.suffix in READ_BY_PATH and now - SPARED_S < entry.used <= now
+
+
+def _is_deleted_first(entry: Entry, now: float) -> bool:
+    return entry.kind != KERNELS or entry.used < now - KERNELS_S
 
 
 def clear(kinds: Iterable[str] = tuple(KINDS)) -> list[Entry]:

@@ -33,7 +33,7 @@ def kept(kind: str, digest: str, make: Callable[[], T], pack: Callable[[T], Cont
     file = cache_of(kind) / f"{digest}{SUFFIX}"
     content = read_entry(file)
     if content is not None:
-        with suppress(ValueError, TypeError, KeyError, IndexError):  # of another version, in spite of its digest
+        with suppress(ValueError, LookupError, TypeError, AttributeError, RecursionError):  # hostile, in spite of its digest
             return unpack(content)
     result = make()
     packed = pack(result)
@@ -65,7 +65,7 @@ def write_entry(file: Path, about: Any, arrays: Arrays) -> None:
 def making(file: Path) -> Generator[Path]:
     """A path at which to write an entry's file, which appears when the block has ended; raises OSError as writing does."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    _sweep_once(file.parent, os.getpid())
+    sweep_once(file.parent, PREFIX, os.getpid())
     with aside(file.parent, PREFIX) as place:
         half = place / file.name
         yield half
@@ -73,9 +73,9 @@ def making(file: Path) -> Generator[Path]:
 
 
 @cache
-def _sweep_once(folder: Path, process: int) -> None:
+def sweep_once(folder: Path, prefix: str, process: int) -> None:
     """Remove what dead processes left in a folder: the first time that a process writes there, since it lists all entries."""
-    sweep(folder, PREFIX)
+    sweep(folder, prefix)
 
 
 def publish(half: Path, file: Path) -> None:

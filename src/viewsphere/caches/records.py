@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.caches.arrays import Arrays, Content
+from viewsphere.caches.arrays import Arrays, Content, number_type
 
 
 def pack_records(value: Any) -> Content:
@@ -50,7 +50,7 @@ def _unpacked(about: Any, arrays: Arrays, types: dict[str, type]) -> Any:
     if kind == "array":
         return arrays[held]
     if kind == "number":
-        return np.dtype(held[0]).type(held[1])
+        return number_type(held[0]).type(held[1])
     name, values = (None, held) if kind == "tuple" else held
     parts = [_unpacked(part, arrays, types) for part in values]
     return tuple(parts) if name is None else types[name](*parts)

@@ -52,7 +52,7 @@ def deflate_lines(lines, step, words, room, out):
                     symbol, extra, width_of_extra = _length_symbol(length)
                     at, waiting, bits = _put(codes[U(symbol)], out, at, waiting, bits)
                     waiting |= np.uint64(extra) << np.uint64(bits)
-                    bits += width_of_extra + 1  # and a bit, 0, for the distance 1
+                    at, waiting, bits = send(out, at, waiting, bits + width_of_extra + 1)  # and a bit, 0, for the distance 1
                 x = stop
                 continue
             waiting, bits = _append(codes[U(word & np.uint32(255))], waiting, bits)

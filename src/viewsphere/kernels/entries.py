@@ -19,7 +19,7 @@ import zlib
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from stat import S_ISREG, S_IWGRP, S_IWOTH
+from stat import S_ISLNK, S_ISREG, S_IWGRP, S_IWOTH
 
 from viewsphere.aside import STALE_S
 from viewsphere.caches import cache_of
@@ -73,14 +73,16 @@ def save(name: str, content: bytes) -> None:
 
 def has(name: str) -> bool:
     """Whether there is an entry of this name, whole or not, where it would be loaded from."""
-    return any((folder / name).is_file() and _is_trusted(folder, name) for folder in (SHIPPED, *folders()))
+    return any(_is_trusted(folder, name) and os.access(folder / name, os.R_OK) for folder in (SHIPPED, *folders()))
 
 
 def is_private(about: os.stat_result) -> bool:
     """Whether only this user and root can write a file or folder, as far as the system knows owners."""
-    if not hasattr(os, "geteuid"):
-        return True
-    return about.st_uid in (0, os.geteuid()) and not about.st_mode & (S_IWGRP | S_IWOTH)
+    return _is_owned(about) and (not hasattr(os, "geteuid") or not about.st_mode & (S_IWGRP | S_IWOTH))
+
+
+def _is_owned(about: os.stat_result) -> bool:
+    return not hasattr(os, "geteuid") or about.st_uid in (0, os.geteuid())
 
 
 def _read(folder: Path, name: str) -> bytes | None:
@@ -102,7 +104,9 @@ def _is_trusted(folder: Path, name: str) -> bool:
 
 def _is_own(folder: Path) -> bool:
     try:
-        about = folder.lstat() if folder != kernel_folder() else folder.stat()  # users may link their cache elsewhere
+        about = folder.lstat()
+        if S_ISLNK(about.st_mode) and folder == kernel_folder() and _is_owned(about):  # users may link their cache elsewhere
+            about = folder.stat()
     except OSError:
         return False
     if not is_private(about):

@@ -19,8 +19,9 @@ def exit_at_once(status: int) -> NoReturn:
     threading._shutdown()  # pyright: ignore # Python's own end calls the same two functions first
     atexit._run_exitfuncs()  # pyright: ignore
     for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except (OSError, ValueError, AttributeError):  # full, closed, or none
-            status = status or UNWRITTEN
+        if stream is not None and not stream.closed:  # it had none to begin with, or was closed when all was written
+            try:
+                stream.flush()
+            except (OSError, ValueError):  # full
+                status = status or UNWRITTEN
     os._exit(status)

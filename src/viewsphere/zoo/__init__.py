@@ -9,7 +9,10 @@ and played as any other. Sub-packages hold the parts that families are built fro
 
 from __future__ import annotations
 
+import atexit
 import hashlib
+import os
+from contextlib import ExitStack
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -108,7 +111,7 @@ def clips_of(family: str) -> tuple[str, ...]:
 def file_of(spec: ModelSpec) -> Path | None:
     """The GLB file of a model of a family that moves, made unless the cache has it; None for all others.
 
-    Raises UserError for an unknown family, and OSError where the cache cannot be written.
+    Raises UserError for an unknown family, and OSError where neither the cache nor a temporary folder can be written.
     """
     import numpy as np
 
@@ -116,15 +119,35 @@ def file_of(spec: ModelSpec) -> Path | None:
     if not spec.source.startswith(ZOO) or not clips_of(family):
         return None
     file = cache_of("zoo") / f"{family}-{_digest(family)}-{spec.seed}.glb"
-    if not file.is_file():
+    spare = _spare_files(os.getpid())
+    if os.access(file, os.R_OK):  # `is_file` fails in a folder that cannot be read
+        note_use(file)
+    elif file not in spare:
         from viewsphere.assets.glb import rigged_glb_bytes
 
         data = rigged_glb_bytes(_built(family, np.random.default_rng(spec.seed)))
-        with making(file) as half:
-            half.write_bytes(data)
-    else:
-        note_use(file)
-    return file
+        try:
+            with making(file) as half:
+                half.write_bytes(data)
+        except OSError:  # the cache is full, or cannot be written
+            own = _own_folder(os.getpid()) / file.name
+            own.write_bytes(data)
+            spare[file] = own
+    return spare.get(file, file)
+
+
+@cache
+def _spare_files(_process: int) -> dict[Path, Path]:
+    """Files of this process in place of those that the cache did not take."""
+    return {}
+
+
+@cache
+def _own_folder(_process: int) -> Path:
+    """A folder of this process, for such files."""
+    then = ExitStack()
+    atexit.register(then.close)
+    return then.enter_context(temporary("zoo"))
 
 
 def _built(family: str, rng: np.random.Generator) -> Any:

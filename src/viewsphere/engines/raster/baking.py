@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import xxhash
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
@@ -126,14 +127,14 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
     middle = np.array(lengths.origin) + lengths.unit * (casters.extent.low + casters.extent.high) / 2
     scene = lamplight(scene, arranged.things, arranged.whole, middle)
     lights = bake_lights(distant, scene.lights, casters, lengths.unit, has_ground, options.shadow_resolution)
-    floor, albedo = _floor(scene.ground, lengths, still_lengths(packed.arranged), len(surfaces.looks) - 1)
+    floor, albedo, ground = _floor(scene.ground, lengths, still_lengths(packed.arranged), len(surfaces.looks) - 1)
     lamps = lamps_on_ground(lights, casters.extent)
     surrounding = bake_surrounding(scene.sky, scene.sun, albedo, distant, even_light(scene.lights), lamps)
     if packed.arranged.is_sequence:
         occlusion = shades.bake(packed.arranged, casters, lengths.unit, has_ground, options.ambient_occlusion)
     else:
         occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
-    hall = halls.of(packed.arranged, packed.rows, casters, floor, lengths, has_ground, options.bounces)
+    hall = halls.of(packed.arranged, packed.rows, casters, floor, ground, lengths, has_ground, options.bounces)
     bounces = NO_BOUNCES if hall is None else bake_bounces(hall, surrounding, lights)
     if hall is not None and hall.has_map:
         occlusion = of_ground_alone(occlusion)
@@ -198,10 +199,12 @@ def _is_see_through(looks: Float32) -> NDArray[np.bool_]:
 
 def _floor(
     ground: Ground | None, lengths: Lengths, around: Lengths, material: int
-) -> tuple[Float32, NDArray[np.float64] | None]:
-    """`Baked.floor`, and the ground's mean colour; zeros and None where there is none. around: the extent of all there is."""
+) -> tuple[Float32, NDArray[np.float64] | None, Hashable]:
+    """`Baked.floor`, the ground's mean colour, and a value equal for grounds made of the same; zeros and None where there is
+    none. around: the extent of all there is.
+    """
     if ground is None:
-        return np.zeros(13, np.float32), None
+        return np.zeros(13, np.float32), None, None
     made, images = ground_material(ground)
     how = 2.0 if ground.catcher else float(only_scatters(ground))
     color = linear(ground.color).tolist()
@@ -209,4 +212,5 @@ def _floor(
     middle = (np.array(around.origin) - lengths.origin) / lengths.unit
     slabs = SLABS * ground.has_slabs
     floor = np.array([*frame, material, how, *color, *middle, lengths.unit / around.unit, slabs], np.float32)
-    return floor, ground_albedo(made, images)
+    pictures = (xxhash.xxh3_128_hexdigest(np.ascontiguousarray(image.pixels).data) for image in images)
+    return floor, ground_albedo(made, images), (made, *pictures)

@@ -61,12 +61,14 @@ class Halls:
         rows: Rows,
         casters: Casters,
         floor: Float32,
+        ground: Hashable,
         lengths: Lengths,
         has_ground: bool,
         bounces: Literal["auto", "on", "fine", "off"],
     ) -> Hall | None:
         """The scenery that stands still, which lights whatever else is there; in a picture without scenery all targets. None
-        where light is not to bounce: it shall not, or only indoors. All calls have the same `bounces`.
+        where light is not to bounce: it shall not, or only indoors. ground: equal for grounds made of the same. All calls have
+        the same `bounces`.
         """
         if bounces == "off" or (bounces == "auto" and not arranged.has_scenery):
             return None
@@ -75,7 +77,7 @@ class Halls:
             return None
         height = arranged.geometry.ground_z if has_ground else None
         ground_z = None if height is None else (height - lengths.origin[2]) / lengths.unit
-        key = (own.things, own.meshes), lengths, ground_z, floor.tobytes()
+        key = (own.things, own.meshes), lengths, ground_z, floor.tobytes(), ground
         has_map = ground_z is not None and not arranged.has_scenery
         limits = own.which, own.low, own.high
         surfaces = casters.surfaces._replace(normals=arranged.geometry.triangle_normals_of(_still(arranged)))

@@ -156,6 +156,16 @@ def test_entries_from_the_future_are_the_oldest_until_they_are_used():
     assert [entry.file for entry in budget.prune(3 * file_of(0).stat().st_size)] == [file_of(2)]
 
 
+def test_kernels_that_are_in_use_are_deleted_last():
+    kernels = [cache_of("kernels") / name for name in ("in_use", "of_last_year")]
+    for file, days in zip(kernels, (1, 365), strict=True):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(bytes(1000))
+        os.utime(file, (time.time() - days * 86_400,) * 2)
+    write(0)
+    assert {entry.file for entry in budget.prune(1500)} == {kernels[1], file_of(0)}
+
+
 def test_an_entry_that_would_fill_the_cache_is_left_out(monkeypatch):
     monkeypatch.setenv("VIEWSPHERE_CACHE_LIMIT", "10kB")
     write("small")
