@@ -162,12 +162,14 @@ def _digest(family: str) -> str:
 
 @cache
 def _sources() -> str:
-    """Digest of all sources that models of the zoo are made by, and of what numpy's sines depend on: the processor's type."""
+    """Digest of all sources that models of the zoo are made by, and of what their numbers depend on: the processor's type and
+    the kernels' build.
+    """
     from viewsphere.assets.cache import readers_digest
-    from viewsphere.kernels.build import HOST
+    from viewsphere.kernels.build import PAINTER
 
     own = Path(__file__).parent
-    digest = hashlib.sha256(f"{readers_digest()} {HOST}".encode())
+    digest = hashlib.sha256(f"{readers_digest()} {PAINTER}".encode())
     for source in [*sorted(own.rglob("*.py")), *sorted(own.with_name("geometry").rglob("*.py"))]:
         digest.update(read_bytes(source))
     return digest.hexdigest()
