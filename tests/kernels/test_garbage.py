@@ -7,9 +7,9 @@ import pytest
 
 IMPORTING = """
 import gc
-from viewsphere.kernels.garbage import importing
+from viewsphere.kernels.garbage import pause_collection
 before, was = gc.get_freeze_count(), gc.isenabled()
-with importing():
+with pause_collection():
     assert not gc.isenabled()
     import decimal
 assert gc.isenabled() == was

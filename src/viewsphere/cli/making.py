@@ -37,7 +37,7 @@ from viewsphere.cli.terminal import (
     write_picture,
 )
 from viewsphere.errors import StoreError, UserError
-from viewsphere.kernels.garbage import importing
+from viewsphere.kernels.garbage import pause_collection
 from viewsphere.model.quantity import quantity
 from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
 from viewsphere.run.crew_size import cores
@@ -232,7 +232,7 @@ def plan(
     allow_scripts: AllowScripts = False,
 ) -> None:
     """Report what a recipe would make: models, poses, frames, splits. No mesh is read without --models or --estimate."""
-    with importing():
+    with pause_collection():
         from viewsphere.run.opening import check_formats, prepare
         from viewsphere.sampling.plan import check_sidecars
 
@@ -381,7 +381,7 @@ def render(
     """Render a recipe into a data set. Run it again to resume: finished frames are never rendered twice."""
     if recipe is None or output is None:
         raise UserError(for_render(recipe, output))
-    with waiting(f"planning {recipe}", quiet=json_), importing():
+    with waiting(f"planning {recipe}", quiet=json_), pause_collection():
         from viewsphere.run.generate import generate
         from viewsphere.run.opening import to_append
         from viewsphere.run.share import shard_named

@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperCommand
 
 from viewsphere.errors import UserError
-from viewsphere.kernels.garbage import importing
+from viewsphere.kernels.garbage import pause_collection
 
 RECIPES = ("[!.]*.yaml", "[!.]*.yml", "[!.]*/recipe.yaml", "recipes/*.yaml")
 MODELS = tuple(f"{folder}[!.]*.{suffix}" for folder in ("", "[!.]*/") for suffix in ("glb", "gltf", "obj", "ply", "stl"))
@@ -21,7 +21,7 @@ class Command(TyperCommand):
         """Parse the arguments by typer; raises UserError with a suggestion if arguments are required and none is given."""
         if not args and not ctx.resilient_parsing and any(p.required for p in self.params):
             raise UserError(for_command(ctx.info_name or ""))
-        with importing():  # while callbacks of options import
+        with pause_collection():  # while callbacks of options import
             return super().parse_args(ctx, args)  # pyright: ignore[reportArgumentType]
 
 

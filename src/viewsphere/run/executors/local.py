@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from viewsphere.errors import UserError, ViewsphereError
-from viewsphere.kernels.garbage import importing
+from viewsphere.kernels.garbage import pause_collection
 from viewsphere.run.executors._hands import OUT_OF_MEMORY, Hand, belong_to_parent, deaf, end_of
 from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored
 
@@ -103,7 +103,7 @@ class LocalCrew:
         heard()
 
     def _run_here(self, queue: Queue, heard: Callable[[], None]) -> Iterator[Outcome]:
-        with importing():
+        with pause_collection():
             from viewsphere.run.tasks import Worker
 
         self._here = self._here or Worker(self._root, self._portion)
@@ -180,7 +180,7 @@ class _Hand(Hand):
 def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
     """A worker's life: take a job, tell of each of its frames by their number so far, answer, until the other side is gone."""
     belong_to_parent()
-    with importing():
+    with pause_collection():
         from viewsphere.run.allocator import keep_freed_memory
         from viewsphere.run.tasks import Worker
 
