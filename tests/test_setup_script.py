@@ -39,7 +39,7 @@ def clone(tmp_path):
 
 
 def installed(clone, *words, programs="uv", status=0, **environment):
-    """What one call of the script asked its installer for, a line each."""
+    """The requests of one call of the script to its installer, a line each."""
     log = clone / "log"
     log.unlink(missing_ok=True)
     system = os.pathsep.join(["/usr/bin", "/bin"])

@@ -1,4 +1,4 @@
-"""What works without packages that extras bring, and the messages where they are needed."""
+"""The features that work without packages of extras, and the messages where extras are needed."""
 
 import subprocess
 import sys
@@ -26,7 +26,7 @@ def refused(call, *words):
 
 
 def said_without(body, folder):
-    """What a script prints in a process without the packages of extras."""
+    """The output of a script in a process without the packages of extras."""
     script = BLOCKED + textwrap.dedent(body)
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=folder, timeout=DEADLINE)
     assert run.returncode == 0, run.stderr

@@ -15,7 +15,7 @@ from viewsphere.errors import UserError
 Number = TypeVar("Number", int, float)
 
 UNITS = {"kb": 10**3, "mb": 10**6, "gb": 10**9, "tb": 10**12, "kib": 1 << 10, "mib": 1 << 20, "gib": 1 << 30, "tib": 1 << 40}
-"""What numbers of bytes may have behind them."""
+"""The units of numbers of bytes."""
 
 
 class Limit(Generic[Number]):

@@ -296,7 +296,7 @@ state = [
     *(numpy.geterr(), threading.active_count(), load.SUFFIXES, os.getpgid(0) == os.getppid()),
 ]
 """.strip().splitlines()
-"""What a file could leave behind for the next, as a reader sees it."""
+"""The state that a file could leave behind for the next, as a reader sees it."""
 
 SPOIL = """
 load.left = numpy.left = sys.left = os.environ["LEFT"] = "left"

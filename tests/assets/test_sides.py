@@ -28,7 +28,7 @@ def extra(value, profile):
 
 
 def sides(path):
-    """Whether each triangle of a file is double-sided."""
+    """A mask of the triangles of a file that are double-sided."""
     mesh, _ = load_model(path)
     return [mesh.materials[i].double_sided for i in mesh.triangle_material]
 

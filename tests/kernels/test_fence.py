@@ -1,4 +1,4 @@
-"""Which modules use numba's internals: `numba_target` always, `compiler` beside a numba that it is tested with."""
+"""The modules that use numba's internals: `numba_target` always, `compiler` beside a numba that it is tested with."""
 
 from __future__ import annotations
 

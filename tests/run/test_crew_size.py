@@ -67,7 +67,7 @@ def test_finished_shots_and_models_do_not_count(tmp_path):
 
 @pytest.fixture
 def hired(monkeypatch):
-    """How many workers each crew of the process has at its end."""
+    """The number of workers of each crew of the process at its end."""
     counts, dismiss = [], LocalCrew._dismiss
     monkeypatch.setattr(LocalCrew, "_dismiss", lambda crew: (counts.append(len(crew._hands)), dismiss(crew)))
     return counts

@@ -108,7 +108,7 @@ def test_people_without_room_are_left_out():
 
 
 def reaches(points: np.ndarray, family: str, own: tuple[np.ndarray, np.ndarray]) -> bool:
-    """Whether the box of what is as low as a car or person meets their box; of a tree, whether more than a leaf is in it."""
+    """True if the box of the parts as low as a car or person meets their box; of a tree, whether more than a leaf is in it."""
     if family == "tree":
         return bool(((points > own[0]) & (points < own[1])).all(axis=1).sum() > 4)
     low = points[points[:, 2] < own[1][2]]

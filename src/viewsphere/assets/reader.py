@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 MESH, OUTCOME, LOG = "mesh.arrays", "outcome.json", "log.txt"
 
 FORKS = sys.platform == "linux"
-"""Whether the program reads many files, each in a process forked from it."""
+"""True where the program reads many files, each in a process forked from it."""
 
 IDLE_SECONDS = 30.0
 """The program ends after so long without a job: it holds 50 MB, and starts again in 0.3 s of processor time."""
@@ -58,7 +58,7 @@ IMPORTED = (
 
 @dataclass(frozen=True)
 class Job:
-    """What to read (a ModelSpec's fields), where the result goes, seconds, bytes, and whether Blender is what reads it.
+    """A model to read (a ModelSpec's fields), the folder for the result, limits of seconds and bytes, and the reader: Blender or us.
     `frames` of its animation, which ascend, are read; none: the file as it stands. With `is_timeline`, only the timeline of a
     USD file is read.
     """

@@ -24,7 +24,7 @@ SINGLE_THREADED = {
 
 @dataclass(frozen=True)
 class Ended:
-    """How a job ended: the exit code of its process, minus the signal for one that was killed; whether it took too long."""
+    """The end of a job: the exit code of its process, or minus the signal that killed it; and whether it took too long."""
 
     code: int
     is_late: bool
@@ -32,7 +32,7 @@ class Ended:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a program inherits: another setting needs another program."""
+    """The settings that a reader inherits: other settings need another reader."""
 
     executable: str
     folder: str
@@ -40,7 +40,7 @@ class Setting:
 
     @classmethod
     def current(cls) -> Setting:
-        """That of this process."""
+        """Return the settings of this process."""
         folder = ""
         with suppress(OSError):  # it may have been deleted
             folder = os.getcwd()  # noqa: PTH109
@@ -74,7 +74,7 @@ class ReaderProcess:
             )
 
     def answer(self, job: Job) -> tuple[Ended, bool]:
-        """How a job ended, and whether the reader waits for another; one that has ended itself gives its own exit code."""
+        """Return the end of a job, and whether the reader waits for another. A reader that ended gives its own exit code."""
         assert self.process.stdin is not None and self.process.stdout is not None
         late = Event()
         timer = Timer(job.seconds, lambda: (late.set(), self.kill()))

@@ -56,7 +56,7 @@ def _of_faces(positions: Float, triangles: Int) -> tuple[Float, Float]:
 
 
 def _around_points(positions: Float, triangles: Int) -> tuple[Int, Int]:
-    """All corners, those around a point together and in the file's order, and the number of each one's point, ascending."""
+    """Return all corners, grouped by their point and in the file's order, and the ascending number of each corner's point."""
     point = _same_points(positions)[triangles.reshape(-1)]
     bits = len(point).bit_length()
     # Plain numbers, of which no two are equal, are sorted in a tenth of the time of a stable argsort.

@@ -150,7 +150,7 @@ def _off(surface: Surface, motion: Float) -> float:
 
 
 def _is_prism(lines: Sequence[Line]) -> bool:
-    """Whether the last line lies across the only one of an order above 2."""
+    """True if the last line lies across the only line of an order above 2."""
     along = [line.axis for line in lines if line.order > 2]
     return len(along) == 1 and abs(float((along[0] * lines[-1].axis).sum())) < math.sin(APART)
 

@@ -75,7 +75,7 @@ def lines_around(
 
 
 def are_near(axes: Float, axis: Float) -> NDArray[np.bool_]:
-    """Which of the axes (N, 3) are about the same line's."""
+    """A mask (N,) of the axes (N, 3) that are about equal to the line's axis."""
     return np.abs((axes * axis).sum(axis=1)) > math.cos(APART)
 
 
@@ -114,7 +114,7 @@ def _settled(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
 
 
 def _slopes(surface: Surface, line: Line, angle: float, points: Float, limit: float) -> tuple[Float, Float]:
-    """How points that are turned move off the surface (4, N) when the line tilts and shifts across, and how far they are off it
+    """The derivatives (4, N) of turned points' distances from the surface by the line's tilt and shift, and these distances
     (N,); both are 0 beyond the limit.
     """
     motion, step = turn_around(line, angle), 1e-6
@@ -135,7 +135,7 @@ def misfit(surface: Surface, line: Line, angle: float) -> float:
 
 
 def is_symmetry(surface: Surface, line: Line, angles: Iterable[float], tolerances: float = 1.0) -> bool:
-    """Whether all turns by these angles, and back, are symmetries within so many tolerances."""
+    """True if all turns by these angles, and back, are symmetries within so many tolerances."""
     limit = tolerances * TOLERANCE * surface.diameter
     return all(surface.are_near([turn_around(line, angle), turn_around(line, -angle)], limit).all() for angle in angles)
 

@@ -128,8 +128,8 @@ def number_type(name: str) -> np.dtype[Any]:
 
 
 def _mapped(stream: BufferedReader, file: Path) -> memoryview:
-    """All bytes of a file. A large one is mapped, and copied on write: processes share its memory. A file of another machine is
-    read, since that machine may delete it, which would end a process that maps it.
+    """Return all bytes of a file. A large file is mapped, and copied on write: processes share its memory. A file of another
+    machine is read, since that machine may delete it, which would end a process that maps it.
     """
     size = os.fstat(stream.fileno()).st_size
     if size >= MAPPED_BYTES and is_local(file):

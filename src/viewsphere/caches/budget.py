@@ -52,7 +52,7 @@ class Entry:
 
 
 def entries(kinds: Iterable[str] = tuple(KINDS)) -> Iterator[Entry]:
-    """All whole files of these kinds."""
+    """Yield the whole files of these kinds."""
     for kind in kinds:
         for folder, folders, names in os.walk(cache_of(kind)):
             folders[:] = (name for name in folders if "~" not in name)  # in which entries are being written, see `aside`
@@ -77,7 +77,7 @@ def make_room(size: int) -> None:
 
 
 def _is_look_due(size: int) -> bool:
-    """Whether a `CHECKED_SHARE` has been written; then the ledger begins anew."""
+    """True if a `CHECKED_SHARE` has been written; then the ledger begins anew."""
     units = min(int(size / (limits.CACHE_LIMIT * UNIT)) + 1, int(1 / UNIT))
     # Appending is atomic: no lock is needed. Where machines share the folder, they may count too little at times.
     flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
@@ -111,7 +111,7 @@ def prune(limit: int) -> list[Entry]:
 
 
 def takes(size: int) -> bool:
-    """Whether an entry of so many bytes leaves room for others: a larger one would drive all of them out."""
+    """True if an entry of so many bytes leaves room for others: a larger one would drive all of them out."""
     return size <= limits.CACHE_LIMIT * KEPT_SHARE
 
 

@@ -20,7 +20,7 @@ from viewsphere.caches.arrays import Arrays, Content, DamagedError, read_arrays,
 
 SUFFIX = ".arrays"
 PREFIX = "entry-"
-"""How folders of entries that are being written begin."""
+"""The prefix of folders in which entries are being written."""
 
 RECENT_S = 600.0
 """Seconds within which a second use of an entry is not noted: noting one writes to the disk."""

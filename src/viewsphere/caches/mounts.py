@@ -15,7 +15,7 @@ MOUNTS = Path("/proc/self/mounts")
 
 
 def is_local(file: Path) -> bool:
-    """Whether a file lies on a file system that is known to be of this machine alone."""
+    """True if a file lies on a file system that is known to belong to this machine alone."""
     path = os.path.realpath(file)
     best = max((mount for mount in _mounts() if _is_below(path, mount[0])), key=lambda mount: len(mount[0]), default=("", ""))
     return best[1] in LOCAL

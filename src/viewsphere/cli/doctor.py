@@ -180,7 +180,7 @@ def _lines(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _kernel_lines(kernels: dict[str, Any], speed: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
-    """Which kernels are used, and how fast they are here."""
+    """The kernels in use, and the time of a frame on this machine."""
     few = "compiled" if kernels["compiled"] else "not compiled yet: the first picture takes about 20 seconds longer"
     compiled = "all there, nothing is compiled" if kernels["complete"] else few
     unwritable = "" if kernels["writable"] else "cannot be written: set VIEWSPHERE_CACHE; "

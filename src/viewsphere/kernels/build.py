@@ -17,7 +17,7 @@ QUICKER = ("0.66", "0.67", "0.68")
 
 NUMBA, LLVMLITE = version("numba"), version("llvmlite")
 IS_STOCK = os.environ.get("VIEWSPHERE_STOCK_NUMBA", "0") != "0" or ".".join(NUMBA.split(".")[:2]) not in QUICKER
-"""Whether numba compiles kernels in its own way, as `VIEWSPHERE_STOCK_NUMBA=1` asks."""
+"""True if numba compiles kernels in its own way, as `VIEWSPHERE_STOCK_NUMBA=1` requests."""
 
 COMMON = "x86-64-v3"
 """The processor that kernels are compiled for on x86-64. Intel's have all it needs since 2013 (Haswell), AMD's since 2015."""
@@ -70,7 +70,7 @@ _PYTHON = f"{sys.implementation.cache_tag}{getattr(sys, 'abiflags', '')}"
 _NUMPY = version("numpy").partition(".")[0]  # its major versions type constants differently
 
 BUILD = (NUMBA, LLVMLITE, _PYTHON, _NUMPY, TRIPLE, TARGET.cpu, TARGET.features, IS_STOCK, os.environ.get("NUMBA_BOUNDSCHECK"))
-"""All besides sources that machine code depends on."""
+"""The versions and settings, besides sources, that machine code depends on."""
 
 PAINTER = f"{HOST}, kernels for {TARGET.cpu}, numba {NUMBA}{' stock' if IS_STOCK else ''}, llvmlite {LLVMLITE}"
 """The processor type and the kernel build: where both are equal, pictures are equal to the last bit."""

@@ -35,7 +35,7 @@ _LEVEL = 6  # 4.1 MB of a frame's kernels become 1.5; a faster level saves nothi
 
 
 def kernel_folder() -> Path:
-    """Where compiled kernels are kept: `$NUMBA_CACHE_DIR`, `$VIEWSPHERE_CACHE/kernels`, or in the user's cache folder."""
+    """Return the folder of compiled kernels: `$NUMBA_CACHE_DIR`, `$VIEWSPHERE_CACHE/kernels`, or in the user's cache folder."""
     if os.environ.get("NUMBA_CACHE_DIR"):
         return Path(os.environ["NUMBA_CACHE_DIR"])
     return cache_of("kernels")
@@ -72,12 +72,12 @@ def save(name: str, content: bytes) -> None:
 
 
 def has(name: str) -> bool:
-    """Whether there is an entry of this name, whole or not, where it would be loaded from."""
+    """True if an entry of this name, whole or damaged, lies where `load` looks."""
     return any(_is_trusted(folder, name) and os.access(folder / name, os.R_OK) for folder in (SHIPPED, *folders()))
 
 
 def is_private(about: os.stat_result) -> bool:
-    """Whether only this user and root can write a file or folder, as far as the system knows owners."""
+    """True if only this user and root can write a file or folder, as far as the system has owners."""
     return _is_owned(about) and (not hasattr(os, "geteuid") or not about.st_mode & (S_IWGRP | S_IWOTH))
 
 
@@ -98,7 +98,7 @@ def _read(folder: Path, name: str) -> bytes | None:
 
 
 def _is_trusted(folder: Path, name: str) -> bool:
-    """Whether the folders of an entry are this user's alone. A package is as trustworthy as the code beside it."""
+    """True if the folders of an entry belong to this user alone. A package is as trustworthy as the code beside it."""
     return folder == SHIPPED or (_is_own(folder) and _is_own((folder / name).parent))
 
 
@@ -124,7 +124,7 @@ def _warn(folder: Path) -> None:
 
 
 def _make(folder: Path) -> bool:
-    """Whether there is such a folder, which only this user can write, after an attempt to make it."""
+    """Make a folder, and return True if it exists and only this user can write it."""
     try:
         if not folder.is_dir():
             folder.parent.mkdir(parents=True, exist_ok=True)

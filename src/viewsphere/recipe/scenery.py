@@ -65,7 +65,7 @@ class PlaceEntry(Brief):
 
     @property
     def has_roads(self) -> bool:
-        """Whether it is a place of the zoo whose module says ROADS."""
+        """True for a place of the zoo whose module says ROADS."""
         return self.name in plugins.places() and getattr(plugins.place(self.name), "ROADS", False)
 
     @model_validator(mode="after")

@@ -37,7 +37,7 @@ def default_workers(work: Missing) -> int:
 
 
 def is_short(work: Missing) -> bool:
-    """Whether one shot is left, or less than SHORT_S of work. The models to be made count for both."""
+    """True if one shot is left, or less than SHORT_S of work. The models to be made count for both."""
     shots = sum(count for _, count in work.lines())
     seconds, models = _frame_seconds(work, shots), 0
     for cost in _model_seconds(work):
@@ -57,7 +57,7 @@ def _frame_seconds(work: Missing, shots: int) -> float:
 
 
 def _is_plain(recipe: Recipe) -> bool:
-    """Whether models stand alone, painted by our own engine."""
+    """True if models stand alone and our own engine paints them."""
     return recipe.engine.name == "raster" and recipe.scenes is None and not recipe.scene.is_composed
 
 

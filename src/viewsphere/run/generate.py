@@ -55,7 +55,7 @@ class Warnings:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run left: frames in the data set, frames it rendered itself, what it skipped, seconds, formats that are written,
+    """The result of a run: frames in the data set, frames it rendered itself, frames it skipped, seconds, written formats,
     notes, warnings, and how many frames are left to other shards.
     """
 
@@ -178,7 +178,7 @@ def _due(wanted: Sequence[FormatEntry], portion: Portion, has_rendered: bool, st
 
 
 def _is_done(entry: FormatEntry, dataset: Dataset, least: float | None, proved: bool) -> bool:
-    """Whether a format is written as it would be now and, if that is to be `proved`, all its files have their digests."""
+    """True if a format is written as it would be now and, with `proved`, all its files have their digests."""
     return is_written(entry, dataset, least) and not (proved and any(damaged_files(dataset.root / entry.name)))
 
 

@@ -1,4 +1,4 @@
-"""How fast this machine renders, measured in a second."""
+"""The speed of this machine, measured in a second."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ def compile_table(tell: Told) -> int:
 
 
 def is_precompiled(shot: Shot) -> bool:
-    """Whether the kernels that a shot's frames call are compiled, as far as the table knows."""
+    """True if the kernels that a shot's frames call are compiled, as far as the table lists them."""
     known = {overload.name for overload in needed(features(shot))}
     return is_compiled(shot) or (bool(known) and known <= _compiled_before())
 
@@ -166,12 +166,12 @@ def _alone(folder: Path) -> Generator[None]:
 
 
 def is_compiled(shot: Shot) -> bool:
-    """Whether the kernels a shot needs are compiled; none is loaded to tell. Wheels bring all."""
+    """True if the kernels that a shot needs are compiled; loads none. Wheels bring all."""
     return has_all() or _is_true(_mark(_small(shot)))
 
 
 def has_all() -> bool:
-    """Whether all kernels are compiled for this state of viewsphere: wheels bring them, `compile_table` makes them."""
+    """True if all kernels are compiled for this state of viewsphere: wheels bring them, `compile_table` makes them."""
     return entries.load(_list_of("all")) is not None
 
 
@@ -222,7 +222,7 @@ def _mark(small: Shot) -> str:
 
 
 def _is_true(mark: str) -> bool:
-    """Whether the kernels it lists are there."""
+    """True if the kernels that it lists exist."""
     listed = entries.load(mark)
     return listed is not None and all(map(entries.has, listed.decode().splitlines()))
 

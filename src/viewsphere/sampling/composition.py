@@ -232,12 +232,12 @@ class Composition(Sendable):
         return place_lanes(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
     def bays(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Bay, ...]:
-        """Where vehicles may park in the place where it stands, world axes; none where it has none."""
+        """The parking bays of the place where it stands, in world axes; empty for places without."""
         place = self.recipe.scene.place
         return place_bays(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
     def pavements(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
-        """Where people may walk in the place where it stands, world axes; none where it has none."""
+        """The pavements of the place where it stands, in world axes; empty for places without."""
         place = self.recipe.scene.place
         return place_pavements(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 

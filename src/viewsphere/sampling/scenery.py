@@ -171,7 +171,7 @@ def _carried(lane: Lane, world_from_place: NDArray[np.float64]) -> Lane:
 
 
 def place_bays(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Bay, ...]:
-    """Where vehicles may park in a place where it stands, world axes; none where it has none."""
+    """The parking bays of a place where it stands, in world axes; empty for places without."""
     if entry is None:
         return ()
     world_from_place = _world_from_place(recipe, entry, names)
@@ -180,7 +180,7 @@ def place_bays(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[
 
 
 def place_pavements(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Lane, ...]:
-    """Where people may walk in a place where it stands, world axes; none where it has none."""
+    """The pavements of a place where it stands, in world axes; empty for places without."""
     if entry is None:
         return ()
     world_from_place = np.array(_world_from_place(recipe, entry, names))

@@ -1,4 +1,4 @@
-"""Whether a USD file moves is read by usd-core, in a process of its own, without Blender."""
+"""The timeline of a USD file is read by usd-core, in a process of its own, without Blender."""
 
 import pytest
 

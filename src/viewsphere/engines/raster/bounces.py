@@ -106,7 +106,7 @@ class Hall:
 
     @property
     def content(self) -> Iterator[Any]:
-        """All that it is made of but for numbers that other things of a stage change, for a digest."""
+        """The content of the hall for a digest, without numbers that depend on other things of the stage."""
         (things, meshes), *others = cast("tuple[Any, ...]", self.key)
         yield from (thing.model_dump_json(exclude={"id"}) for thing in things)
         for mesh in meshes:
@@ -152,7 +152,7 @@ class _Lighting:
 
     @property
     def content(self) -> Iterator[Any]:
-        """All that it is made of, for a digest."""
+        """The content of the lighting for a digest."""
         yield from self.hall.content
         yield from (*self.lamps, *self.surrounding)
 
@@ -313,7 +313,7 @@ def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32
 
 @lru_cache(maxsize=1)
 def _look(hall: Hall) -> _Seen:
-    """All that depends on no light, from the cache where it is there."""
+    """Return the results that depend on no light, from the cache where it has them."""
     return kept_light(("seen", *hall.content), lambda: _looked(hall, tree_of_hall(hall)), SEEN)
 
 

@@ -74,7 +74,7 @@ class _Stand:
 
     @property
     def world_from_piece(self) -> Matrix4:
-        """Where it stands."""
+        """The pose of the piece in the world."""
         return standing(self.x, self.y, self.turn, self.z)
 
 

@@ -59,7 +59,7 @@ def parked(
 
 
 def _reaches_into(bay: Bay, crown: Crown, height: float) -> bool:
-    """Whether a crown reaches into a car of this height in a bay."""
+    """True if a crown reaches into a car of this height in a bay."""
     x, y, radius, clear = crown
     frame, (width, length) = bay.world_from_bay, bay.size
     dx, dy = x - frame[0][3], y - frame[1][3]

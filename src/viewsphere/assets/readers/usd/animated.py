@@ -1,4 +1,4 @@
-"""Whether anything in a USD file moves, and its frames, by usd-core."""
+"""The motion of a USD file and its frames, read by usd-core."""
 
 from __future__ import annotations
 
