@@ -58,7 +58,7 @@ IMPORTED = (
 
 @dataclass(frozen=True)
 class Job:
-    """A model to read (a ModelSpec's fields), the folder for the result, limits of seconds and bytes, and the reader: Blender or us.
+    """A model to read (a ModelSpec's fields), the folder for the result, limits of seconds and bytes, and if Blender reads it.
     `frames` of its animation, which ascend, are read; none: the file as it stands. With `is_timeline`, only the timeline of a
     USD file is read.
     """
