@@ -21,7 +21,7 @@ from viewsphere.engines.raster import tracing
 from viewsphere.engines.raster.directions import TURNS, dome
 from viewsphere.engines.raster.environment import Surrounding, sky_along
 from viewsphere.engines.raster.gathering import Gathering, Look, Round, Spots, look
-from viewsphere.engines.raster.kept_light import kept_light
+from viewsphere.engines.raster.kept_light import digest_of, kept_light
 from viewsphere.engines.raster.kernels_bounce import COLUMNS, terms
 from viewsphere.engines.raster.kernels_environment import LAMPS
 from viewsphere.engines.raster.kernels_lanterns import shine_at, shine_at_probes, shine_near
@@ -104,9 +104,13 @@ class Hall:
     has_map: bool
     is_fine: bool
 
-    @property
-    def content(self) -> Iterator[Any]:
-        """The content of the hall for a digest, without numbers that depend on other things of the stage."""
+    @cached_property
+    def digest(self) -> str:
+        """The digest of the hall's content, computed once: it reads all meshes and their pictures."""
+        return digest_of(self._content())
+
+    def _content(self) -> Iterator[Any]:
+        """The content of the hall, without numbers that depend on other things of the stage."""
         (things, meshes), *others = cast("tuple[Any, ...]", self.key)
         yield from (thing.model_dump_json(exclude={"id"}) for thing in things)
         for mesh in meshes:
@@ -151,10 +155,9 @@ class _Lighting:
     lights: Lights = field(compare=False)
 
     @property
-    def content(self) -> Iterator[Any]:
+    def content(self) -> tuple[Any, ...]:
         """The content of the lighting for a digest."""
-        yield from self.hall.content
-        yield from (*self.lamps, *self.surrounding)
+        return (self.hall.digest, *self.lamps, *self.surrounding)
 
 
 LIGHT = (Bounces, Lightmap, PatchLight)
@@ -190,7 +193,7 @@ def without_maps(lights: Lights) -> Lights:
 @lru_cache(maxsize=1)
 def tree_of_hall(hall: Hall) -> Tree:
     """The tree of a hall's triangles; it is there already where the hall is the last one whose light was baked."""
-    return kept_light(("tree", *hall.content), lambda: _tree_of(hall), (Tree,))
+    return kept_light(("tree", hall.digest), lambda: _tree_of(hall), (Tree,))
 
 
 def _tree_of(hall: Hall) -> Tree:
@@ -314,7 +317,7 @@ def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32
 @lru_cache(maxsize=1)
 def _look(hall: Hall) -> _Seen:
     """Return the results that depend on no light, from the cache where it has them."""
-    return kept_light(("seen", *hall.content), lambda: _looked(hall, tree_of_hall(hall)), SEEN)
+    return kept_light(("seen", hall.digest), lambda: _looked(hall, tree_of_hall(hall)), SEEN)
 
 
 def _looked(hall: Hall, tree: Tree) -> _Seen:

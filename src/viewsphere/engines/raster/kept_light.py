@@ -23,10 +23,11 @@ PACKAGES = ("engines", "surroundings", "materials", "geometry", "kernels")
 
 def kept_light(content: Iterable[Any], make: Callable[[], T], types: tuple[type, ...]) -> T:
     """The result of `make`, from the cache where it holds what was made of equal content. `types`: of the result's records."""
-    return kept("light", _digest(content), make, pack_records, lambda held: unpack_records(held, types))
+    return kept("light", digest_of(content), make, pack_records, lambda held: unpack_records(held, types))
 
 
-def _digest(content: Iterable[Any]) -> str:
+def digest_of(content: Iterable[Any]) -> str:
+    """The digest of arrays, bytes and values that `repr` tells apart, and of the sources."""
     digest = hashlib.sha256(_sources().encode())
     for part in content:
         if isinstance(part, np.ndarray):
