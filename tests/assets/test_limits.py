@@ -33,6 +33,7 @@ TESTED = {
     "MAX_MODELS": "test_models",
     "MAX_ENTRIES": "test_entries_walked",
     "MAX_REDRAWS": "test_framing",
+    "CACHE_LIMIT": "test_cache_entries",
     "MAX_VOXELS": "test_voxels",
     "MAX_LISTED_OBJECTS": "test_listed_sampler",
     "MAX_ANNOTATION_BYTES": "test_kitti_reading",

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from viewsphere.aside import of_this_process
-from viewsphere.caches import budget, cache_of, entries
+from viewsphere.caches import arrays, budget, cache_of
 from viewsphere.caches.arrays import Content
 from viewsphere.caches.entries import PREFIX, SUFFIX, kept, making, read_entry, write_entry
 
@@ -108,7 +108,7 @@ def test_a_cache_that_cannot_be_written_costs_time_only(cache, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(entries, "write_arrays", full)
+    monkeypatch.setattr(arrays, "write_arrays", full)
     assert made("a")
     assert not list(cache_of("light").iterdir())
 

@@ -427,9 +427,11 @@ def test_old_models_may_not_change_splits(tmp_path):
 
 
 def test_a_zoo_model_whose_code_changed_is_refused(out, monkeypatch):
+    from viewsphere import zoo
     from viewsphere.zoo import post_box
 
     drawn = post_box.post_box_random
+    monkeypatch.setattr(zoo, "_digest", lambda family: "of other sources")
     monkeypatch.setattr(post_box, "post_box_random", lambda rng: drawn(np.random.default_rng(int(rng.integers(9)))))
     before = state(out)
     with pytest.raises(StoreError, match=r"model 'post_box_000' \(zoo:post_box\) changed"):

@@ -80,9 +80,9 @@ def _is_look_due(size: int) -> bool:
     """True if a `CHECKED_SHARE` has been written; then the ledger begins anew."""
     units = min(int(size / (limits.CACHE_LIMIT * UNIT)) + 1, int(1 / UNIT))
     # Appending is atomic: no lock is needed. Where machines share the folder, they may count too little at times.
-    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    further = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     cache_folder().mkdir(parents=True, exist_ok=True)
-    ledger = os.open(cache_folder() / LEDGER, flags, 0o666)
+    ledger = os.open(cache_folder() / LEDGER, os.O_WRONLY | os.O_CREAT | os.O_APPEND | further, 0o666)
     try:
         os.write(ledger, bytes(units))
         is_due = os.fstat(ledger).st_size >= CHECKED_SHARE / UNIT

@@ -12,11 +12,13 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from viewsphere.aside import aside, sweep
 from viewsphere.caches import budget, cache_of
-from viewsphere.caches.arrays import Arrays, Content, DamagedError, read_arrays, write_arrays
+
+if TYPE_CHECKING:
+    from viewsphere.caches.arrays import Arrays, Content  # which imports numpy: listing the zoo does not
 
 SUFFIX = ".arrays"
 PREFIX = "entry-"
@@ -43,6 +45,8 @@ def kept(kind: str, digest: str, make: Callable[[], T], pack: Callable[[T], Cont
 
 def read_entry(file: Path) -> Content | None:
     """The content of an entry; None where there is none that is whole."""
+    from viewsphere.caches.arrays import DamagedError, read_arrays
+
     try:
         content = read_arrays(file)
     except DamagedError:
@@ -57,6 +61,8 @@ def read_entry(file: Path) -> Content | None:
 
 def write_entry(file: Path, about: Any, arrays: Arrays) -> None:
     """Write an entry where that is possible."""
+    from viewsphere.caches.arrays import write_arrays
+
     with suppress(OSError), making(file) as half:
         write_arrays(half, about, arrays)
 
