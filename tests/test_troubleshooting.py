@@ -62,6 +62,7 @@ FILES = {
     "here/a.txt": "no model",
     "here/a.fbx": "",
     "here/b.USD": "",
+    "here/c.abc": "",
     "here/plain.obj": "mtllib lost.mtl\nusemtl red\n" + TRIANGLE,
     "here/lost.obj": "mtllib lost.mtl\nusemtl a\n" + TRIANGLE,
     "here/away.obj": "mtllib away.mtl\nusemtl a\n" + TRIANGLE,

@@ -176,7 +176,7 @@ def test_things_fall_into_what_is_concave_where_parts_collide(tmp_path, monkeypa
         found.append(min(hull[:, 2].min() for hull in placed(small, poses)))
     assert found[0] > 0.45 or abs(found[0]) < 0.002  # on it, or beside
     assert 0.02 < found[1] < 0.1  # in it
-    assert len(list((tmp_path / "parts").glob("*.json"))) == 1
+    assert len(list((tmp_path / "parts").glob("*.arrays"))) == 1
 
 
 SIDES = [
