@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from viewsphere import zoo
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run import stages
 from viewsphere.run.stages import Stages
@@ -24,8 +23,8 @@ def test_the_real_size_is_the_one_set_or_that_of_the_file_before_scaling():
 
 def test_a_model_at_its_own_scale_is_built_once(monkeypatch):
     built = []
-    build = zoo.build
-    monkeypatch.setattr(zoo, "build", lambda *words: built.append(words) or build(*words))
+    build = stages.build_zoo_model
+    monkeypatch.setattr(stages, "build_zoo_model", lambda spec: built.append(spec) or build(spec))
     warm, spec = Stages(), DRIER.model_copy(update={"real_size": "file"})
     warm.model(spec)
     warm.real_size(spec)
@@ -35,8 +34,8 @@ def test_a_model_at_its_own_scale_is_built_once(monkeypatch):
 @pytest.mark.slow
 def test_models_used_last_are_kept_as_far_as_there_is_room(monkeypatch):
     built = []
-    build = zoo.build
-    monkeypatch.setattr(zoo, "build", lambda family, rng: built.append(family) or build(family, rng))
+    build = stages.build_zoo_model
+    monkeypatch.setattr(stages, "build_zoo_model", lambda spec: built.append(spec) or build(spec))
     specs = [DRIER.model_copy(update={"key": f"d{i}", "seed": i}) for i in range(12)]
     warm = Stages()
     for spec in (*specs, *specs):
