@@ -18,8 +18,8 @@ RECIPE = Recipe.model_validate(
     }
 )
 REFERENCE_MS = 63.0
-"""CPU milliseconds of a frame on the machine of docs/performance.md, an AMD EPYC: the least of 19 calls, 2026-11, while other
-programs kept its two cores busy, so that an idle one of its kind makes more.
+"""CPU milliseconds of a frame on the machine of docs/performance.md, an AMD EPYC, idle: the upper of five calls, 59 to 63,
+2026-11.
 """
 
 ENOUGH_S = 1.0
