@@ -85,6 +85,7 @@ BOMBS = {
     "loops.tif": tiff(64, 32, *strip(32, 100), (330, 4, 1, 8), (34665, 4, 1, 8), (34853, 4, 1, 8)),
     "counts.tif": tiff(64, 32, (273, 4, 2**31 - 1, 200), (278, 4, 1, 32), (279, 4, 2**32 - 1, 200)),
     "size.hdr": b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 9999999 +X 9999999\n",
+    "within.hdr": b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 7000 +X 14000\n" + b"\x10\x20\x30\x80" * 14_000,
     "size.png": png(10**6, 10**6),
     "text.png": png(16, 8, *[(b"iTXt", b"a\0\1\0\0\0" + ZEROS)] * 20),
 }

@@ -93,7 +93,8 @@ def _read_hdr(path: Path, head: HdrHead) -> Float32:
     exposure = np.prod(
         [float(value) for value in re.findall(rb"\nEXPOSURE *= *(\d+\.?\d*(?:[eE][-+]?\d\d?)?)", head.text)] or [1.0]
     )
-    pixels, done = decode_rows(body, head.rows, head.columns)
+    pixels = np.zeros((head.rows, head.columns, 3), np.float32)
+    done = decode_rows(body, np.zeros((head.columns, 4), np.uint8), pixels)
     if done < head.rows:
         raise _error(path, f"found one that ends or breaks off in row {done + 1} of {head.rows}; get or export it again")
     if head.first[:1] == (b"+" if head.is_upright else b"-"):
@@ -101,7 +102,8 @@ def _read_hdr(path: Path, head: HdrHead) -> Float32:
     if head.second[:1] == (b"-" if head.is_upright else b"+"):
         pixels = pixels[:, ::-1]
     pixels = pixels if head.is_upright else pixels.transpose(1, 0, 2)
-    return np.ascontiguousarray(pixels / np.float32(exposure if exposure > 0 else 1.0))
+    pixels /= np.float32(exposure if exposure > 0 else 1.0)
+    return np.ascontiguousarray(pixels)
 
 
 def _read_ordinary(path: Path) -> Float32:

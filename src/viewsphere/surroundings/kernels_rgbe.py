@@ -7,11 +7,13 @@ import numpy as np
 from viewsphere.kernels.jit import inner, njit
 
 
-@njit(_nrt=True)
-def decode_rows(data, rows, columns):
-    """Pixels (rows, columns, 3) float32 of a picture's bytes, and the number of its undamaged rows."""
-    out = np.zeros((rows, columns, 3), np.float32)
-    row = np.zeros((columns, 4), np.uint8)
+@njit
+def decode_rows(data, row, out):
+    """The number of undamaged rows among a picture's bytes, their pixels in out (rows, columns, 3) float32, which comes zeroed.
+
+    row (columns, 4) uint8 is room for one row. The caller brings out, so that rows which a cut file lacks take no memory.
+    """
+    rows, columns = out.shape[:2]
     at = 0
     for i in range(rows):
         is_new = at + 4 <= data.shape[0] and data[at] == 2 and data[at + 1] == 2 and data[at + 2] < 128
@@ -20,13 +22,13 @@ def decode_rows(data, rows, columns):
         else:
             at = _old_row(data, at, row)
         if at < 0:
-            return out, i
+            return i
         for j in range(columns):
             if row[j, 3] > 0:
                 scale = 2.0 ** (np.float64(row[j, 3]) - 136.0)
                 for c in range(3):
                     out[i, j, c] = (np.float64(row[j, c]) + 0.5) * scale
-    return out, rows
+    return rows
 
 
 @inner
