@@ -156,6 +156,8 @@ MISTAKES = [
     ({"scene": {"sun": "yes"}}, "scene.sun: 'yes' is unknown; did you mean 'on'? Valid: auto, on, off", ""),
     ({"rig": "yes"}, "rig: expected a mapping; found 'yes'", ""),
     ({"rig": 5}, "rig: expected a mapping; found 5", ""),
+    ({"rig": False}, "rig: expected a mapping; found false: leave the field out for none", ""),
+    ({"splits": "off"}, "splits: expected a mapping; found 'off': leave the field out for none", ""),
     ({"scene": {"background": "whit"}}, "scene.background: expected sky, environment, tr", "; did you mean 'white'?"),
     ({"scene": {"background": None}}, "scene.background: expected sky", "; put a '#' colour in quotes"),
     ({"scene": {"background": [255, 255, 255]}}, "scene.background: expected sky", "; found [255, 255, 255]"),

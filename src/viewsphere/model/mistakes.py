@@ -215,6 +215,10 @@ def _path_in(data: Any, location: Path) -> Path:
     return tuple(path)
 
 
+_ABSENT = ("no", "off", "none", "false")
+"""What users write for a mapping that they do not want."""
+
+
 def _words(error: ErrorDetails, fields: Sequence[str]) -> str:
     kind, found, context = error["type"], error["input"], error.get("ctx", {})
     match kind:
@@ -234,7 +238,8 @@ def _words(error: ErrorDetails, fields: Sequence[str]) -> str:
             limit = f"at least {context['min_length']}" if kind == "too_short" else f"at most {context['max_length']}"
             return f"expected {limit} of them; found {context['actual_length']}"
         case "model_type" | "dict_type" | "model_attributes_type" | "union_tag_not_found":
-            return f"expected a mapping; found {shown(found)}"
+            absent = ": leave the field out for none" if found is False or found in _ABSENT else ""
+            return f"expected a mapping; found {shown(found)}{absent}"
         case "tuple_type" | "list_type":
             return f"expected a list; found {shown(found)}{_listed(found)}"
         case "int_type" | "int_parsing" | "int_from_float":
