@@ -71,8 +71,7 @@ def test_a_worse_figure_fails_with_page_and_sentence(monkeypatch, tmp_path):
     monkeypatch.setattr(language, "LIMITS", limits)
     monkeypatch.setattr(language, "GROUPS", {"guides": (lambda: texts, ("speech",))})
     monkeypatch.setattr(sys, "argv", ["language", "--tighten"])
-    with pytest.raises(SystemExit, match=r"speech is 142.9; its limit is 1. .*
-  bad.md .*: Nobody knows what is said of it."):
+    with pytest.raises(SystemExit, match=r"speech is 142.9; its limit is 1. .*\n  bad.md .*: Nobody knows what is said of it."):
         language.main()
     assert json.loads(limits.read_text()) == {"guides": {"speech": 1.0}}
     assert joined(texts).figure("you") > 0
