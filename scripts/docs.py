@@ -165,9 +165,9 @@ LABEL_PICTURES = "images/labels"
 PROOFS = """# Proofs of labels
 
 Each label is compared with something that knows nothing of how it is made. The table has the largest difference that the tests
-find (`scripts/measure_labels`); one without a unit is a share, or a number of things that differ. Besides, `viewsphere check`
-computes every label of a data set again from the exported models, and casts Embree's rays at them. Labels are the same, byte
-for byte, on all engines. Passes are what engines paint; their errors are raster's.
+find (`benchmarks/measure_labels`); one without a unit is a share, or a number of things that differ. Besides, `viewsphere
+check` computes every label of a data set again from the exported models, and casts Embree's rays at them. Labels are the same,
+byte for byte, on all engines. Passes are what engines paint; their errors are raster's.
 
 Costs are CPU milliseconds at 640x480 with 20 objects. One of Embree's rays through each pixel takes {:g}; finding what all
 pixels show, which all labels share, takes {:g}. Meanings and axes are in [channels and annotations](channels.md).
@@ -195,7 +195,7 @@ def agree(what: str, found: Collection[str], wanted: Collection[str]) -> None:
     """Stop where something is missing, or is there and should not be."""
     for problem, names in (("lacks", {*wanted} - {*found}), ("has no use for", {*found} - {*wanted})):
         if names:
-            sys.exit(f"docs/{what} {problem} {', '.join(sorted(names))}: run scripts/measure_labels (and --pictures)")
+            sys.exit(f"docs/{what} {problem} {', '.join(sorted(names))}: run benchmarks/measure_labels (and --pictures)")
 
 
 OPTIONS = re.compile(r"(<!-- options of (\w+), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)

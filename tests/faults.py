@@ -1,4 +1,4 @@
-"""Runs that are hit by a fault at some moment, and what there is afterwards: shared by the tests and by scripts/faults.
+"""Runs that are hit by a fault at some moment, and what there is afterwards: shared by the tests and by benchmarks/faults.
 
 A work is a command that writes a data set; undisturbed it gives a tree, the model. A fault hits it while it writes. Afterwards
 no shot that was finished is lost, nothing that looks finished is torn, what it said is a line, and the same command makes the

@@ -1,5 +1,5 @@
 """Comparisons of labels with what knows nothing of how they are made, and of what programs read of exports with labels;
-`scripts/measure_labels` and `scripts/measure_formats` gather their differences.
+`benchmarks/measure_labels` and `benchmarks/measure_formats` gather their differences.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""scripts/bench --rivals: its table and figures, rivals that fail, and the car of one real rival beside ours."""
+"""benchmarks/bench --rivals: its table and figures, rivals that fail, and the car of one real rival beside ours."""
 
 import json
 import os
@@ -9,11 +9,12 @@ import pytest
 
 from small import ROOT
 
-sys.path.insert(0, str(ROOT / "scripts"))
+sys.path.insert(0, str(ROOT / "benchmarks"))
 import bench_rivals
 from bench_rivals import OURS, Rival, RivalFailedError, Row, installed, last_line, measured, table
 
-LOOP = f"import sys\nsys.path.insert(0, {str(ROOT / 'scripts' / 'rivals')!r})\nfrom view_loop import opened\nscene = opened()\n"
+RIVALS = str(ROOT / "benchmarks" / "rivals")
+LOOP = f"import sys\nsys.path.insert(0, {RIVALS!r})\nfrom view_loop import opened\nscene = opened()\n"
 DRAWS = LOOP + (
     "import numpy\n"
     "scene.ready('Fake 1.0', 'two greys')\n"

@@ -74,7 +74,8 @@ def test_the_wheel_holds_what_is_no_code(archives):
 def test_the_sdist_holds_what_tests_and_docs_need(archives):
     _, source, _ = archives
     assert {"PKG-INFO", "pyproject.toml", "README.md", "CITATION.cff", "SECURITY.md", "CHANGELOG.md"} <= source
-    assert {name for name in tracked("src", "tests", "docs", "recipes", "scripts") if (ROOT / name).exists()} <= source
+    kept = tracked("src", "tests", "docs", "recipes", "scripts", "benchmarks")
+    assert {name for name in kept if (ROOT / name).exists()} <= source
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from small import ROOT
 
-sys.path.insert(0, str(ROOT / "scripts"))
+sys.path.insert(0, str(ROOT / "benchmarks"))
 from cluster import Cluster, Load, simulate
 from simulate import page, stored
 

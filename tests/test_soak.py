@@ -1,4 +1,4 @@
-"""scripts/soak tells growth from noise; what it measures of short runs does not grow where nothing is kept warm."""
+"""benchmarks/soak tells growth from noise; what it measures of short runs does not grow where nothing is kept warm."""
 
 import sys
 from dataclasses import replace
@@ -9,7 +9,7 @@ import pytest
 
 from small import ROOT
 
-sys.path.insert(0, str(ROOT / "scripts"))
+sys.path.insert(0, str(ROOT / "benchmarks"))
 import soak
 
 COUNT = 160

@@ -1,6 +1,6 @@
 """Real faults, at moments drawn with a seed: nothing that was finished is lost or torn, and the work goes on to the same bytes.
 
-scripts/faults does the same many times over, and writes the table in docs/reliability.md.
+benchmarks/faults does the same many times over, and writes the table in docs/reliability.md.
 """
 
 from __future__ import annotations

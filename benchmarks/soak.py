@@ -1,6 +1,6 @@
 """Long runs of small frames, measured while they go on (Linux): memory, open files, what lies aside, and frames a second.
 
-    scripts/soak [--frames 20000] [--workers 1] [--kinds stills,sequences,memory] [--out build/soak]
+    benchmarks/soak [--frames 20000] [--workers 1] [--kinds stills,sequences,memory] [--out build/soak]
 
 Random scenes of more models than stay warm: still pictures and sequences of a stereo pair, each rendered by a run (of
 --workers 0 in its own process); and still pictures in memory. Ends with status 1 where, after a warm-up of a fifth of the
@@ -27,12 +27,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import BLUE, GREEN, INK, PALE, RED, line, polygon, svg, words
 from PIL import Image
 
 import viewsphere as vs
 from viewsphere.kernels.entries import kernel_folder
 from viewsphere.run.progress import Progress
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+from figures import BLUE, GREEN, INK, PALE, RED, line, polygon, svg, words
 
 KINDS = ("stills", "sequences", "memory")
 MOMENTS, LEAST_APART, WARM_UP, MOST_GROWTH = 200, 20, 0.2, 0.05

@@ -1,6 +1,6 @@
 """What physics costs: CPU seconds of one process until 20 zoo models lie still, three draws each; and how well they lie.
 
-    scripts/bench --physics
+    benchmarks/bench --physics
 
 Overlap is the deepest contact at rest; drift what one more second of gravity does to the farthest. Meshes and
 hulls are made before.

@@ -1,7 +1,7 @@
 """The figures of docs/format-list.md: what tests find that programs read of exports, into docs/formats.json.
 
-scripts/measure_formats                   # with the programs that the tests' environment has; scripts/docs then writes the page
-scripts/measure_formats --python PATH     # and by another Python, which has programs that this one cannot have, such as torch
+benchmarks/measure_formats                   # with the tests' environment; scripts/docs then writes the page
+benchmarks/measure_formats --python PATH     # also with another Python, whose packages (such as torch) .venv lacks
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """What 1, 10 and 100 million images cost, and how long they take on 10 to 10,000 nodes.
 
-    scripts/simulate                    the tables of docs/scale.md, from what was measured last
-    scripts/simulate --measure          measure again: shots of the reference scene, and how fast Ray hands out work
-    scripts/simulate --compare 2        a real run on so many Ray nodes of one CPU, beside what is predicted for it
+    benchmarks/simulate                    the tables of docs/scale.md, from what was measured last
+    benchmarks/simulate --measure          measure again: shots of the reference scene, and how fast Ray hands out work
+    benchmarks/simulate --compare 2        a real run on so many Ray nodes of one CPU, beside what is predicted for it
 
 Measured are seconds of each shot, its files and their bytes; a simulated run draws from these seconds. Failures, slow nodes and
 the limits of an object store are assumptions, named in ASSUMED.
@@ -35,8 +35,8 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 from ray_nodes import SMALL, ray_cluster  # noqa: E402, which is found now
 
-MEASURED, PAGE = ROOT / "scripts" / "measured.json", ROOT / "docs" / "scale.md"
-BEGIN, END = "<!-- scripts/simulate -->\n", "<!-- end -->\n"
+MEASURED, PAGE = ROOT / "benchmarks" / "measured.json", ROOT / "docs" / "scale.md"
+BEGIN, END = "<!-- benchmarks/simulate -->\n", "<!-- end -->\n"
 
 IMAGES = (10**6, 10**7, 10**8)
 SIMULATED = 10**7

@@ -1,6 +1,6 @@
 """CPU milliseconds and kilobytes of every way to write a channel, on a rendered frame: the table of docs/performance.md.
 
-    .venv/bin/python scripts/bench_files.py
+    .venv/bin/python benchmarks/bench_files.py
 
 The second column of pictures is of the frames with added noise (standard deviation 6 of 255). Best of twenty, three views, 640
 x 480.

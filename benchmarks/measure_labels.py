@@ -1,9 +1,9 @@
 """The figures of docs/proofs.md: what tests find labels to differ by, and what labels cost, into docs/labels.json.
 
-scripts/measure_labels               # both; scripts/docs then writes the page
-scripts/measure_labels --errors      # only the tests that compare labels with what is independent of them
-scripts/measure_labels --costs       # only CPU time
-scripts/measure_labels --pictures    # only the pictures, anew (label_pictures.py)
+benchmarks/measure_labels               # both; scripts/docs then writes the page
+benchmarks/measure_labels --errors      # only the tests that compare labels with what is independent of them
+benchmarks/measure_labels --costs       # only CPU time
+benchmarks/measure_labels --pictures    # only the pictures, anew (label_pictures.py)
 """
 
 from __future__ import annotations

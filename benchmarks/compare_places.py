@@ -1,6 +1,6 @@
 """Compares the raster engine with Blender's Cycles in five places: three rooms, a town by day and a wet street.
 
-    .venv/bin/python scripts/compare_places.py [--samples 1024] [--keep FOLDER] [--output docs/images/cycles_places.jpg]
+    .venv/bin/python benchmarks/compare_places.py [--samples 1024] [--keep FOLDER] [--output docs/images/cycles_places.jpg]
 
 Both engines render the same shot; Cycles weighs all of a pixel's samples alike, as viewsphere does, and follows light around 24
 corners. Prints the mean difference in display values (of 255) and SSIM (Wang et al. 2004, 1 is equal; from the package

@@ -1,7 +1,7 @@
 """Damages small files of every kind that viewsphere reads: each has to be read, or refused by an error of viewsphere's own.
 
-    scripts/fuzz [TARGET ...] [--inputs 1000] [--first 0] [--jobs 1]    # status 1 where there are findings
-    scripts/fuzz gltf --keep 1234 FOLDER                                # the files of one input, to look at
+    benchmarks/fuzz [TARGET ...] [--inputs 1000] [--first 0] [--jobs 1]    # status 1 where there are findings
+    benchmarks/fuzz gltf --keep 1234 FOLDER                                # the files of one input, to look at
 
 Foreign exceptions, crashes, inputs that take over 20 seconds of the processor or a gigabyte are findings, told once for each
 cause with the seed that makes them again. Inputs run in processes of their own (Linux); one that dies goes on behind the input

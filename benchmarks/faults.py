@@ -1,7 +1,7 @@
 """Hits runs with real faults at random moments, many times, and writes what came of it into docs/reliability.md.
 
-    scripts/faults [--share 1.0] [--seed 1]    # some 140 faults: half an hour on two cores
-    scripts/faults --cost                      # frames a second with --durability fsync, as a share of those without
+    benchmarks/faults [--share 1.0] [--seed 1]    # some 140 faults: half an hour on two cores
+    benchmarks/faults --cost                      # frames a second with --durability fsync, as a share of those without
 
 What a fault may not do is in tests/faults.py, which the tests share. Status 1 where it did.
 """
@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 from faults import SIGNALS, WORKS, Course, Tally, make_stock, recipe  # noqa: E402, which is found now
 
 PAGE = ROOT / "docs" / "reliability.md"
-TABLE = re.compile(r"(<!-- written by scripts/faults -->\n).*?(\n<!-- end -->)", re.DOTALL)
+TABLE = re.compile(r"(<!-- written by benchmarks/faults -->\n).*?(\n<!-- end -->)", re.DOTALL)
 HEAD = """\
 | fault | during | times | finished shots lost | files torn | equal bytes after | what it said |
 |---|---|---:|---:|---:|---|---|

@@ -1,6 +1,6 @@
 """Compares the labels of another revision with this one's, value by value, as read by `viewsphere.open`.
 
-    scripts/labels REVISION [--but FIELD ...] [--share 0.001]    # status 1 where anything else differs
+    benchmarks/labels REVISION [--but FIELD ...] [--share 0.001]    # status 1 where anything else differs
 
 Both revisions render the five paper recipes (two models and a part of the poses each), a street with company and, where Blender
 is set up, an animated file, with all channels. For each field that differs, a line gives the number of differing values (of
