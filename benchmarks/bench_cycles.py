@@ -26,9 +26,9 @@ from viewsphere.engines._blender.staging import CyclesStage
 from viewsphere.geometry.box import box_vertices
 from viewsphere.labels import annotated, observe, sight_of
 from viewsphere.model.shot import Shot
+from viewsphere.rendering.sky.sky import sky_pictures
+from viewsphere.rendering.sky.sun import sun_light
 from viewsphere.run.stages import Stages
-from viewsphere.surroundings.sky import sky_pictures
-from viewsphere.surroundings.sun import sun_light
 from viewsphere.truth.visibility import rasterize
 
 HERE = Path(__file__).parent

@@ -31,7 +31,6 @@ from viewsphere.blender.interpreter import find_blender
 from viewsphere.engines import Engine
 from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.box import box_vertices
-from viewsphere.imaging.view import develop
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
@@ -39,9 +38,10 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, Scene, Sky, SpotLight, Sun, ViewTransform
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.rendering.ground.material import SLABS, ground_material
+from viewsphere.rendering.ground.slab_picture import laid_with_slabs
+from viewsphere.rendering.view import develop
 from viewsphere.sampling.camera import looking
-from viewsphere.surroundings.ground import SLABS, ground_material
-from viewsphere.surroundings.slab_picture import laid_with_slabs
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 from viewsphere.zoo.household.vessels import vessel

@@ -10,9 +10,9 @@ from viewsphere.assets.folder import UnreadableError, decode_image
 from viewsphere.codecs.exr import decode_exr
 from viewsphere.codecs.pictures import decode_picture
 from viewsphere.errors import ViewsphereError
-from viewsphere.imaging.background import display_background
 from viewsphere.model.scene import Background
-from viewsphere.surroundings.environment_file import read_environment
+from viewsphere.rendering.background import display_background
+from viewsphere.rendering.sky.environment_file import read_environment
 
 MOST = 300 << 20
 """Bytes that a reader may take for one of these files: a tenth of what the smallest honest reading of their claims needs."""

@@ -136,7 +136,7 @@ ALLOWED = {
     "run/warm.py": "a lock",
     "store/moving.py": "os.open to bring a file to the disk",
     "store/shot_files.py": "os.open to write",
-    "surroundings/environment_file.py": "OpenEXR behind check_file",
+    "rendering/sky/environment_file.py": "OpenEXR behind check_file",
     "urls/__init__.py": "copyfile behind check_file",
     "urls/remote_path.py": "files at URLs",
     "cli/datasets.py": "webbrowser.open",

@@ -49,7 +49,7 @@ def test_an_exr_environment_names_its_extra(tmp_path):
     (said,) = said_without(
         """
         from viewsphere.assets.sphere import read_head
-        from viewsphere.surroundings.environment_file import read_environment
+        from viewsphere.rendering.sky.environment_file import read_environment
         messages = {refused(read_head, Path("sky.exr")), refused(read_environment, Path("sky.exr"))}
         print(*messages, sep="|")
         """,

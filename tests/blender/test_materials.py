@@ -17,8 +17,8 @@ from viewsphere.assets.mesh import WRAPS, Image, Material, Texture
 from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.exr import encode_exr
 from viewsphere.engines.raster.painting import paint
-from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model import scene as model
+from viewsphere.rendering.view import EXPOSURE
 from viewsphere.truth.visibility import rasterize
 
 pytestmark = pytest.mark.slow

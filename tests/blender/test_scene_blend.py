@@ -13,8 +13,8 @@ from viewsphere.engines import cycles
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.staging import camera_request
 from viewsphere.errors import RecipeError, UserError
-from viewsphere.imaging.view import develop
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.rendering.view import develop
 from viewsphere.run.stages import Stages
 from viewsphere.truth.visibility import rasterize
 

@@ -15,8 +15,8 @@ from viewsphere.engines.raster import kernels_light
 from viewsphere.engines.raster.environment import Surrounding, bake_surrounding, lobe_albedo
 from viewsphere.engines.raster.kernels_environment import BELOW
 from viewsphere.engines.raster.records import NO_BOUNCES
-from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.scene import Sky
+from viewsphere.rendering.view import EXPOSURE
 
 N = rows.BLOCK
 NAMES = "weigh", "add_light", "add_light_matte", "ambient", "ambient_matte", "compose"

@@ -13,12 +13,12 @@ from test_physics import SPEC, camera
 from shots import still_shot
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import cycles, raster
-from viewsphere.imaging.background import display_background
-from viewsphere.imaging.view import develop
 from viewsphere.model.camera import Distortion
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES
 from viewsphere.model.scene import Background, Finish, Ground, Scene
 from viewsphere.model.thing import Thing
+from viewsphere.rendering.background import display_background
+from viewsphere.rendering.view import develop
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("blender")]
 

@@ -16,8 +16,8 @@ from viewsphere.engines.raster.kernels_light import light_around
 from viewsphere.engines.raster.records import PictureRays
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Daylight, Environment, Sky, Sun
-from viewsphere.surroundings.daylight import air, daylight_picture
-from viewsphere.surroundings.sun import sun_light
+from viewsphere.rendering.sky.daylight import air, daylight_picture
+from viewsphere.rendering.sky.sun import sun_light
 
 N = rows.BLOCK
 lit_around = called(light_around)
@@ -335,7 +335,7 @@ def test_missing_file_is_said(tmp_path):
 @pytest.mark.slow
 @pytest.mark.skipif(not HDRI.is_dir(), reason="no models")
 def test_real_skies_light_as_their_pictures():
-    from viewsphere.surroundings.environment_file import read_environment
+    from viewsphere.rendering.sky.environment_file import read_environment
 
     for path in sorted(HDRI.iterdir()):
         sky = Environment(file=str(path))

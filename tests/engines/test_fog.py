@@ -13,11 +13,11 @@ from viewsphere.assets.mesh import Material
 from viewsphere.engines._blender.veiling import veil
 from viewsphere.engines.raster.painting import paint
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.imaging.air import Air
-from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.scene import Ground, Scene, Sky, Sun
 from viewsphere.model.weather import CONTRAST, Fog
-from viewsphere.surroundings.weather import METERED, clouded, floor_light, in_fog
+from viewsphere.rendering.view import EXPOSURE
+from viewsphere.rendering.weather.conditions import METERED, clouded, floor_light, in_fog
+from viewsphere.rendering.weather.fog import Air
 from viewsphere.truth.visibility import rasterize
 
 COLOR = np.array([0.8, 0.5, 0.3])

@@ -17,7 +17,7 @@ from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import AreaLight, Daylight, Ground, PointLight, Scene, Sky, SpotLight, Sun
 from viewsphere.model.thing import Thing
-from viewsphere.surroundings.daylight import air, daylight_picture, opening
+from viewsphere.rendering.sky.daylight import air, daylight_picture, opening
 
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
 

@@ -16,7 +16,7 @@ from viewsphere.engines.raster import occlusion
 from viewsphere.engines.raster.occlusion import NO_OCCLUSION, bake_occlusion, sky_directions, with_ground_light
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.surroundings.sun import Distant
+from viewsphere.rendering.sky.sun import Distant
 
 
 def camera(azimuth, elevation, distance, target):

@@ -21,10 +21,10 @@ from viewsphere.engines.raster import kernels_split
 from viewsphere.engines.raster.painting import paint
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.imaging.background import display_background
-from viewsphere.imaging.view import EXPOSURE, develop
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PASSES
 from viewsphere.model.scene import Background, Finish, Ground, Scene, Sun, ViewTransform
+from viewsphere.rendering.background import display_background
+from viewsphere.rendering.view import EXPOSURE, develop
 from viewsphere.truth.visibility import rasterize
 
 ALL = (*LIGHT_PASSES, *MATERIAL_PASSES)

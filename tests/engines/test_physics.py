@@ -20,7 +20,6 @@ from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster
 from viewsphere.engines.raster.painting import paint
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
-from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
@@ -37,6 +36,7 @@ from viewsphere.model.scene import (
     ViewTransform,
 )
 from viewsphere.model.thing import Thing
+from viewsphere.rendering.view import EXPOSURE
 from viewsphere.truth.visibility import rasterize
 
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)

@@ -15,11 +15,11 @@ from viewsphere.assets.srgb import linear as linear_light
 from viewsphere.engines import raster
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
-from viewsphere.imaging.view import EXPOSURE, KNEE
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, ViewTransform
 from viewsphere.model.thing import Thing
+from viewsphere.rendering.view import EXPOSURE, KNEE
 from viewsphere.truth.visibility import rasterize
 
 DARK = Sky(strength=0.0)

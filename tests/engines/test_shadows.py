@@ -15,8 +15,8 @@ from viewsphere.engines.raster import kernels_shadow as shadow
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.scene import AreaLight, HemisphereLight, PointLight, SpotLight, Sun
-from viewsphere.surroundings.sky import even_light
-from viewsphere.surroundings.sun import Distant, distant_sun
+from viewsphere.rendering.sky.sky import even_light
+from viewsphere.rendering.sky.sun import Distant, distant_sun
 
 SUN = Distant((0.48, 0.3, 0.82), (3.0, 2.0, 1.0), 0.53)
 OVERHEAD = Distant((0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 0.53)

@@ -13,8 +13,8 @@ from test_physics import camera, even, furnace, light_of, picture, sky_file, sta
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines.raster.painting import paint
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.scene import Ground, Scene, Sky
+from viewsphere.rendering.view import EXPOSURE
 from viewsphere.truth.visibility import rasterize
 
 GLASS = Material(base_color=(1.0, 1.0, 1.0, 1.0), roughness=0.0, transmission=1.0, thickness=0.01)

@@ -16,10 +16,10 @@ from viewsphere.assets.wetting import DARKEST, FILM, SMOOTH, UPRIGHT, darkened, 
 from viewsphere.engines.raster.painting import paint
 from viewsphere.engines.raster.wet_ground import WATER, mirror_in_water
 from viewsphere.geometry.camera import pixel_rays, project
-from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.scene import Ground, Scene, Sky
 from viewsphere.model.weather import Wet
-from viewsphere.surroundings.puddles import puddles
+from viewsphere.rendering.view import EXPOSURE
+from viewsphere.rendering.weather.puddles import puddles
 from viewsphere.truth.visibility import rasterize
 
 POOL = Wet(amount=1.0, puddles=1.0)

@@ -507,7 +507,7 @@ def coded() -> Pack:
 
 
 def _environment(path: Path) -> None:
-    from viewsphere.surroundings.environment_file import read_environment
+    from viewsphere.rendering.sky.environment_file import read_environment
 
     read_environment(path)
 

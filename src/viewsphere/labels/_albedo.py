@@ -12,7 +12,7 @@ from viewsphere.assets.repaint import repainted
 from viewsphere.assets.srgb import linear
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint
-from viewsphere.surroundings.ground import ground_frame, ground_material
+from viewsphere.rendering.ground.material import ground_frame, ground_material
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.shot_views import Painted
 from viewsphere.truth.sweeping import Hits

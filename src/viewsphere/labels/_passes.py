@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.imaging.view import develop, to_bytes
 from viewsphere.labels._label import Drawing, Picture
 from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.model.scene import ViewTransform
+from viewsphere.rendering.view import develop, to_bytes
 
 
 def picture(name: str, array: NDArray[np.float32]) -> Picture:

@@ -20,7 +20,7 @@ def check_skies(planned: Plan, tell: Callable[[int, int], None]) -> tuple[str, .
     chosen = list(files)[:: -(-len(files) // MOST_SKIES) or 1]
     notes: list[str] = []
     for done, file in enumerate(chosen):
-        from viewsphere.surroundings.environment_file import read_environment  # which takes a third of a second to load
+        from viewsphere.rendering.sky.environment_file import read_environment  # which takes a third of a second to load
 
         tell(done, len(chosen))
         notes += read_environment(Path(file)).notes

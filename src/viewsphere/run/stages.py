@@ -31,11 +31,11 @@ from viewsphere.model.sample import Float, Sample, Taken
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.traits import Traits
+from viewsphere.rendering.ground.material import ground_stamps
 from viewsphere.run.walls import Step, check_rooms, check_way
 from viewsphere.sampling.camera import inside_box
 from viewsphere.sampling.redraws import is_redrawn
 from viewsphere.store import ModelInfo, Store
-from viewsphere.surroundings.ground import ground_stamps
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.shot_views import ShotViews
 from viewsphere.truth.visibility import with_ground

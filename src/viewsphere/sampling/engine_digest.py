@@ -12,7 +12,7 @@ from viewsphere import plugins
 from viewsphere.files import read_bytes
 from viewsphere.recipe.recipe import Recipe
 
-SHARED = tuple(Path(__file__).parents[1] / name for name in ("imaging", "materials", "surroundings", "model/scene.py"))
+SHARED = tuple(Path(__file__).parents[1] / name for name in ("materials", "rendering", "model/scene.py"))
 """What every engine paints with: what finishes pictures, what is around the targets, materials, and what a scene is if nobody
 says.
 """

@@ -9,7 +9,6 @@ import numpy as np
 
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.assets.wetting import darkened
-from viewsphere.imaging.precipitation import extinction
 from viewsphere.model.scene import HemisphereLight, Scene
 from viewsphere.model.weather import CONTRAST, Fog, Lamps, Rain, Snow, Wet
 from viewsphere.recipe.draws import RngOf, drawn
@@ -17,7 +16,8 @@ from viewsphere.recipe.entries import concrete
 from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.scene import SceneEntry
 from viewsphere.recipe.weather import FogEntry, LampsEntry, RainEntry, SnowEntry, WetEntry
-from viewsphere.surroundings.weather import clouded, floor_light, in_fog
+from viewsphere.rendering.weather.conditions import clouded, floor_light, in_fog
+from viewsphere.rendering.weather.precipitation import extinction
 
 SOAKING = 25.0
 """Millimetres of rain an hour from which on nothing becomes wetter."""

@@ -30,7 +30,7 @@ from .meshes import COLORS
 from .textures import Textures
 
 UNEXPOSED = 1 / 0.7
-"""Radiance of an unlit white surface, which the view shows as white: one over `viewsphere.imaging.view.EXPOSURE`."""
+"""Radiance of an unlit white surface, which the view shows as white: one over `viewsphere.rendering.view.EXPOSURE`."""
 
 TOTAL = 0.99
 """Largest reflectance of dielectrics at normal incidence, as in Cycles."""

@@ -11,8 +11,8 @@ from viewsphere.engines._blender.requests import extent
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
-from viewsphere.surroundings.horizon import BEGIN, FLAT, OVER
-from viewsphere.surroundings.sky import SkyPictures, sky_pictures
+from viewsphere.rendering.ground.horizon import BEGIN, FLAT, OVER
+from viewsphere.rendering.sky.sky import SkyPictures, sky_pictures
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 

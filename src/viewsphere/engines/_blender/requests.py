@@ -20,11 +20,11 @@ from viewsphere.engines._lamps import lamplight
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint, Thing
-from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
-from viewsphere.surroundings.horizon import BEGIN, FLAT, OVER
-from viewsphere.surroundings.sky import SURROUNDINGS, SkyPictures, sky_pictures
-from viewsphere.surroundings.slab_picture import laid_with_slabs
-from viewsphere.surroundings.sun import sun_light
+from viewsphere.rendering.ground.horizon import BEGIN, FLAT, OVER
+from viewsphere.rendering.ground.material import ground_frame, ground_material, only_scatters
+from viewsphere.rendering.ground.slab_picture import laid_with_slabs
+from viewsphere.rendering.sky.sky import SURROUNDINGS, SkyPictures, sky_pictures
+from viewsphere.rendering.sky.sun import sun_light
 from viewsphere.truth.geometry import Geometry
 
 Put = Callable[[NDArray[Any]], str]

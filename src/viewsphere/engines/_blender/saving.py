@@ -18,15 +18,15 @@ from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.requests import members_of
 from viewsphere.engines._blender.staging import STAGE_SECONDS, Arrangement, build_stage, camera_request
 from viewsphere.geometry.camera import orbit_angles
-from viewsphere.imaging.background import display_background
-from viewsphere.imaging.effects import has_effects
-from viewsphere.imaging.view import EXPOSURE
-from viewsphere.imaging.white import NEUTRAL_K
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Finish
 from viewsphere.model.shot import Shot
+from viewsphere.rendering.background import display_background
+from viewsphere.rendering.effects import has_effects
+from viewsphere.rendering.view import EXPOSURE
+from viewsphere.rendering.white import NEUTRAL_K
 
 NEAREST, FARTHEST = 1e-3, 1e5
 """The camera's clipping range, in distances to its target: with a larger one surfaces would flicker in Blender's windows."""

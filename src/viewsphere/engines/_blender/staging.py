@@ -29,14 +29,14 @@ from viewsphere.engines._blender.texels import Kind, Levels
 from viewsphere.engines._blender.veiling import lay_sky, veil
 from viewsphere.engines._passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
-from viewsphere.imaging.background import display_background, shows_sky
-from viewsphere.imaging.falling import fall_in
-from viewsphere.imaging.finish import finished
-from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
+from viewsphere.rendering.background import display_background, shows_sky
+from viewsphere.rendering.finish import finished
+from viewsphere.rendering.seen import seen_by
+from viewsphere.rendering.weather.falling import fall_in
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from viewsphere.engines._blender.backdrop import Backdrop
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.imaging.air import Air
 from viewsphere.model.camera import Camera
 from viewsphere.model.weather import Fog
+from viewsphere.rendering.weather.fog import Air
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import rasterize
 

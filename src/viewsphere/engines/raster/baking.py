@@ -29,8 +29,8 @@ from viewsphere.engines.raster.still_maps import StillMaps
 from viewsphere.engines.raster.surface import Lengths, Materials, Rows, made_of, pack_materials
 from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.model.scene import Ground, Scene
-from viewsphere.surroundings.ground import SLABS, ground_albedo, ground_frame, ground_material, only_scatters
-from viewsphere.surroundings.sky import even_light
+from viewsphere.rendering.ground.material import SLABS, ground_albedo, ground_frame, ground_material, only_scatters
+from viewsphere.rendering.sky.sky import even_light
 from viewsphere.truth.geometry import Geometry, with_blended_colors
 
 

@@ -18,10 +18,10 @@ from viewsphere.engines.raster.kernels_probes import sky_from
 from viewsphere.engines.raster.lights import Extent, Lights
 from viewsphere.engines.raster.records import Float32, Int32, PictureRays
 from viewsphere.model.scene import AnySky, Daylight, Environment, Sky, Sun
-from viewsphere.surroundings.daylight import daylight_picture, opening
-from viewsphere.surroundings.environment_file import read_environment
-from viewsphere.surroundings.sky import HALO, SURROUNDINGS, gradient_share
-from viewsphere.surroundings.sun import Distant, sun_light
+from viewsphere.rendering.sky.daylight import daylight_picture, opening
+from viewsphere.rendering.sky.environment_file import read_environment
+from viewsphere.rendering.sky.sky import HALO, SURROUNDINGS, gradient_share
+from viewsphere.rendering.sky.sun import Distant, sun_light
 
 Float = NDArray[np.float64]
 

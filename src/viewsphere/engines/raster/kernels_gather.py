@@ -63,8 +63,8 @@ from viewsphere.kernels.lanes import (
     spread,
     where,
 )
-from viewsphere.surroundings.horizon import BEGIN, FLAT, OVER
-from viewsphere.surroundings.kernels_slabs import shade
+from viewsphere.rendering.ground.horizon import BEGIN, FLAT, OVER
+from viewsphere.rendering.ground.kernels_slabs import shade
 
 f4 = nb.float32
 U = nb.uintp

@@ -27,7 +27,7 @@ from viewsphere.engines.raster.kernels_views import add_near_light, near_light
 from viewsphere.kernels.lanes import clamp, cross, dot, lanewise, least, most, root, size, where
 from viewsphere.kernels.lanes import FAST
 from viewsphere.kernels.jit import inner
-from viewsphere.imaging.view import EXPOSURE
+from viewsphere.rendering.view import EXPOSURE
 
 f4 = nb.float32
 i4 = nb.int32

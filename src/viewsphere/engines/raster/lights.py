@@ -18,7 +18,7 @@ from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures
 from viewsphere.engines.raster.still_maps import Part, StillMaps, rounded, snapped
 from viewsphere.engines.raster.surface import part_of
 from viewsphere.model.scene import AnyLight, AreaLight, HemisphereLight, PointLight, SpotLight
-from viewsphere.surroundings.sun import Distant
+from viewsphere.rendering.sky.sun import Distant
 
 Float = NDArray[np.float64]
 

@@ -21,9 +21,9 @@ from viewsphere.engines.raster.samples import Layer, Marks, Samples, differs_beh
 from viewsphere.engines.raster.surface import Rows
 from viewsphere.engines.raster.tracing import Tree
 from viewsphere.geometry.camera import inverse_camera_matrix
-from viewsphere.imaging.air import Air
 from viewsphere.model.camera import Camera
 from viewsphere.model.weather import Fog
+from viewsphere.rendering.weather.fog import Air
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility, lens_rays
 

@@ -26,15 +26,15 @@ from viewsphere.engines.raster.surface import Lengths
 from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.engines.raster.wet_ground import mirror_in_water
 from viewsphere.errors import RecipeError
-from viewsphere.imaging.background import display_background, shows_sky
-from viewsphere.imaging.falling import fall_in
-from viewsphere.imaging.finish import finished
-from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
 from viewsphere.model.listed import LARGEST_PICTURE
 from viewsphere.model.shot import Shot
 from viewsphere.model.weather import Wet
+from viewsphere.rendering.background import display_background, shows_sky
+from viewsphere.rendering.finish import finished
+from viewsphere.rendering.seen import seen_by
+from viewsphere.rendering.weather.falling import fall_in
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 

@@ -18,7 +18,7 @@ from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures
 from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint, Thing
-from viewsphere.surroundings.ground import ground_frame, ground_material
+from viewsphere.rendering.ground.material import ground_frame, ground_material
 from viewsphere.truth.geometry import UP, Geometry, read_only
 from viewsphere.truth.sparse import sparse
 from viewsphere.truth.visibility import Visibility, homogeneous, left_out

@@ -17,7 +17,7 @@ from viewsphere.engines.raster.records import Float32
 from viewsphere.model.camera import Camera
 from viewsphere.model.classes import STUFF_IDS
 from viewsphere.model.weather import Wet
-from viewsphere.surroundings.puddles import puddles
+from viewsphere.rendering.weather.puddles import puddles
 from viewsphere.truth.visibility import Visibility
 
 LOW = 0.3

@@ -1,0 +1,66 @@
+"""Brightness, contrast, saturation and hue."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.srgb import linear
+
+Float32 = NDArray[np.float32]
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Shares of linear sRGB's red, green and blue in the luminance."""
+
+
+def jitter(picture: Float32, brightness: float, contrast: float, saturation: float, hue: float) -> Float32:
+    """The picture with its colours changed, clipped to [0, 1]; alpha stays, and grey stays grey.
+
+    Light is multiplied by 2^brightness; then coded values move from 1/2 by 2^contrast; then the linear colour turns by `hue`
+    half turns about the grey axis and moves from grey by 1 + saturation, both at the same luminance.
+    """
+    if brightness == contrast == saturation == hue == 0:
+        return picture
+    from viewsphere.rendering.effects import kernels_color as kernels
+
+    out = np.empty_like(picture)
+    channels = picture.shape[2]
+    table = tone_table(brightness, contrast) if brightness or contrast else np.zeros(0, np.float32)
+    matrix = chroma_matrix(saturation, hue).astype(np.float32)
+    kernels.recolor(picture.reshape(-1, channels), table, matrix, out.reshape(-1, channels))
+    return out
+
+
+def tone_table(brightness: float, contrast: float) -> Float32:
+    """Display-linear values for 65,536 display-linear values from 0 to 1, float32."""
+    codes, light = _curve()
+    bright = np.minimum(np.arange(65536) / 65535 * 2.0**brightness, 1)
+    code = np.interp(bright, light, codes)
+    return np.interp(np.clip(0.5 + (code - 0.5) * 2.0**contrast, 0, 1), codes, light).astype(np.float32)
+
+
+def chroma_matrix(saturation: float, hue: float) -> NDArray[np.float64]:
+    """Linear sRGB to linear sRGB, (3, 3): rows sum to 1, luminance stays.
+
+    Around grey a colour has two components in the plane of equal luminance; they are turned in an orthonormal basis of that
+    plane.
+    """
+    grey = np.outer(np.ones(3), LUMINANCE)
+    first = np.cross(LUMINANCE, np.ones(3))
+    first /= np.linalg.norm(first)
+    second = np.cross(LUMINANCE, first)
+    second /= np.linalg.norm(second)
+    c, s = math.cos(math.pi * hue), math.sin(math.pi * hue)
+    basis = np.stack([first, second])
+    turn = basis.T @ np.array([[c, -s], [s, c]]) @ basis
+    return grey + (1 + saturation) * (turn @ (np.eye(3) - grey))
+
+
+@cache
+def _curve() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Coded values and their light at the same nodes, which are denser where it is dark."""
+    codes = np.arange(4097) / 4096
+    return codes, linear(codes)

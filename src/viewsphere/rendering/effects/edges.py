@@ -1,0 +1,62 @@
+"""Lines along the targets' borders and creases, as early computer graphics drew them over pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.rendering.seen import Seen
+from viewsphere.rendering.spread import gaussian, spread_both_ways
+
+Float32 = NDArray[np.float32]
+
+CREASE = (0.25, 0.75)
+"""Change of slope from one pixel to the next at which a line begins to show, and at which it shows in full."""
+
+WIDTH = 1 / 300
+"""Width of the lines, in widths of the picture."""
+
+
+def edge_highlight(picture: Float32, strength: float, seen: Seen) -> Float32:
+    """The picture with lines that go towards white by `strength`; alpha stays."""
+    if strength == 0:
+        return picture
+    share = lines(seen)[..., None] * np.float32(strength)
+    white = picture[..., 3:] if picture.shape[2] == 4 else np.float32(1)
+    out = picture.copy()
+    out[..., :3] += (white - picture[..., :3]) * share
+    return out
+
+
+def lines(seen: Seen) -> Float32:
+    """How much of a line each pixel shows, (H, W) float32 in [0, 1].
+
+    The inverse depth of a plane is linear in the picture, so its second difference is not 0 only at creases and steps.
+    """
+    bent = crease(seen.inverse_depth, seen.intrinsics.fx)
+    low, high = CREASE
+    edge = np.where(seen.targets, np.clip((bent - low) / (high - low), 0, 1), np.float32(0))
+    edge[seen.targets & _beside(~seen.targets)] = 1
+    sigma = max(WIDTH * edge.shape[1] / 4, 0.4)
+    soft = spread_both_ways(edge[..., None].astype(np.float32), gaussian(sigma))[..., 0]
+    return np.minimum(soft * np.float32(sigma * 2.5 + 0.6), 1)
+
+
+def crease(inverse_depth: Float32, focal: float) -> Float32:
+    """Change of the surface's slope from a pixel to the next, about the tangent of the angle; (H, W), 0 where empty."""
+    q = np.pad(inverse_depth, 1, mode="edge")
+    middle = q[1:-1, 1:-1]
+    across = np.abs(q[1:-1, :-2] - 2 * middle + q[1:-1, 2:])
+    down = np.abs(q[:-2, 1:-1] - 2 * middle + q[2:, 1:-1])
+    slope = np.maximum(across, down) * np.float32(focal) / np.maximum(middle, np.float32(1e-12))
+    return np.where(middle > 0, slope, np.float32(0))
+
+
+def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Pixels that have a pixel of the mask to their left, right, top or bottom."""
+    out = np.zeros_like(mask)
+    out[1:] |= mask[:-1]
+    out[:-1] |= mask[1:]
+    out[:, 1:] |= mask[:, :-1]
+    out[:, :-1] |= mask[:, 1:]
+    return out

@@ -1,0 +1,1 @@
+"""The ground: its material, its slabs, where it fades into the sky."""

@@ -1,0 +1,1 @@
+"""Light from far away: daylight, the sun, pictures of the whole sphere."""
