@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from viewsphere.rendering.curve import display_linear
 
+from viewsphere.assets.srgb import linear
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Background, Effects, Finish, Smoother, ViewTransform
 from viewsphere.rendering.effects import apply_effects, has_effects
@@ -226,7 +226,7 @@ def test_noise_of_pixels_and_channels_is_independent():
 
 def test_colours_change_as_the_table_says():
     assert np.allclose(tone_table(1, 0)[[6554, 20000, 50000]], [6554 / 65535 * 2, 40000 / 65535, 1], atol=1e-4)
-    codes = display_linear(np.arange(256, dtype=np.uint8))
+    codes = linear(np.arange(256) / 255).astype(np.float32)
     bytes_out = to_bytes(tone_table(0, 1)[np.round(codes * 65535).astype(int)].reshape(1, -1, 1).repeat(3, axis=2))[0, :, 0]
     expected = np.clip(np.round(127.5 + (np.arange(256) - 127.5) * 2), 0, 255)
     assert np.abs(bytes_out - expected).max() <= 1
