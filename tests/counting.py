@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from viewsphere.plugins.spec import Spec
+
 
 def counted(monkeypatch, owner, name):
     """What a function was called with since."""
@@ -11,5 +13,8 @@ def counted(monkeypatch, owner, name):
         calls.append(args)
         return own(*args, **options)
 
-    monkeypatch.setattr(owner, name, told)
+    if isinstance(owner, Spec):  # frozen
+        monkeypatch.setitem(vars(owner), name, told)
+    else:
+        monkeypatch.setattr(owner, name, told)
     return calls

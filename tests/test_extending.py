@@ -8,10 +8,9 @@ import pickle
 import re
 import subprocess
 import sys
-import types
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from importlib import metadata
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ import pytest
 from PIL import Image
 
 from deadline import DEADLINE
+from installed import example, installed, write_package
 from sealing import seal_again
 from sequence_recipe import eventful_recipe
 from small import small_recipe, tree_hash
@@ -36,22 +36,20 @@ EXAMPLES = {
 }
 
 
-def install(monkeypatch: pytest.MonkeyPatch, name: str, group: str, code: str) -> None:
-    """Make code a module that an entry point names."""
-    module = types.ModuleType(f"my_{name}")
-    exec(code, module.__dict__)
-    monkeypatch.setitem(sys.modules, f"my_{name}", module)
-    entry = EntryPoint(name, f"my_{name}", group)
-    monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
+@pytest.fixture
+def install(tmp_path: Path) -> Iterator[Callable[[str, str, str], Path]]:
+    """Installs a plug-in as a package of its own, until the test is over."""
+    with ExitStack() as stack:
+        yield lambda group, name, code: stack.enter_context(installed(tmp_path / "site", group, name, code))
 
 
 @pytest.fixture
-def csv_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, "csv_boxes", "viewsphere.formats", EXAMPLES["One row an object"])
+def csv_boxes(install: Callable[[str, str, str], Path]) -> None:
+    install("formats", "csv_boxes", EXAMPLES["One row an object"])
 
 
 @pytest.fixture
-def labelled(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], None]]:
+def labelled(install: Callable[[str, str, str], Path]) -> Iterator[Callable[[str, str], None]]:
     """Installs a label; what is kept of the table of labels is forgotten before and after."""
     tables = [table for table in vars(labels).values() if hasattr(table, "cache_clear")]
 
@@ -60,11 +58,10 @@ def labelled(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], N
             table.cache_clear()
 
     def add(name: str, code: str) -> None:
-        install(monkeypatch, name, "viewsphere.labels", code)
+        install("labels", name, code)
         forget()
 
     yield add
-    monkeypatch.undo()
     forget()
 
 
@@ -145,8 +142,8 @@ def test_a_channel_that_needs_its_neighbours_is_refused_for_still_pictures(label
         plan(small_recipe(channels=["rgb", "borders"]))
 
 
-def test_an_engine_is_one_file(monkeypatch):
-    install(monkeypatch, "flat", "viewsphere.engines", EXAMPLES["flat"])
+def test_an_engine_is_one_file(install):
+    install("engines", "flat", EXAMPLES["flat"])
     recipe = small_recipe(engine="flat", channels=["rgb", "rgba", "depth", "instances"], formats=[])
     plain = {sample.index: sample for sample in render(small_recipe(channels=["rgb", "depth", "instances"], formats=[]))}
     for sample in render(recipe):
@@ -195,19 +192,8 @@ RECIPES = {
 @pytest.mark.slow
 def test_the_page_s_plug_ins_work_in_a_package_that_is_installed(tmp_path):
     """Written as pip writes it: modules, and metadata with entry points; then used by the command line."""
-    site, package = tmp_path / "site", tmp_path / "site" / "my_package"
-    package.mkdir(parents=True)
-    (package / "__init__.py").touch()
-    points = dict[str, list[str]]()
-    for name, (group, begins) in GROUPS.items():
-        (package / f"{name}.py").write_text(next(code for code in EXAMPLES.values() if code.startswith(f'"""{begins}')))
-        points.setdefault(group, []).append(f"{name} = my_package.{name}")
-    about = site / "my_package-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text(
-        "\n".join(f"[viewsphere.{group}]\n" + "\n".join(lines) + "\n" for group, lines in points.items())
-    )
+    site = tmp_path / "site"
+    write_package(site, "my_package", {(group, name): example(begins) for name, (group, begins) in GROUPS.items()})
     for name, more in RECIPES.items():
         moves = ", motion: {kind: bounce, height: 1}}]" if name == "moving" else "}]"
         (tmp_path / f"{name}.yaml").write_text(INSTALLED.replace("}]", moves, 1) + more)
@@ -270,8 +256,8 @@ def test_every_example_of_the_page_is_used():
     assert all(any(code.startswith(f'"""{one}') for one in begins) for code in EXAMPLES.values())
 
 
-def test_a_material_is_one_file(monkeypatch):
-    install(monkeypatch, "dots", "viewsphere.materials", EXAMPLES["dots"])
+def test_a_material_is_one_file(install):
+    install("materials", "dots", EXAMPLES["dots"])
     assert "dots" in plugins.names("materials")
     scene = {"ground": {"material": "dots"}, "materials": [{"texture": "dots"}]}
     dotted, plain = (next(iter(render(small_recipe(scene=own)))) for own in (scene, {"ground": "on"}))
@@ -295,17 +281,17 @@ def test_a_format_is_one_file(small_dataset, tmp_path):
         assert np.array_equal(np.asarray(Image.open(folder / row["image"])), sample.rgb)
 
 
-def test_a_format_may_prepare_its_samples(small_dataset, tmp_path, monkeypatch):
-    for example in ("One row an object", "The same table"):
-        install(monkeypatch, "csv_boxes", "viewsphere.formats", EXAMPLES[example])
-        export(small_dataset.root, ["csv_boxes"], output=tmp_path / example)
+def test_a_format_may_prepare_its_samples(small_dataset, tmp_path):
+    for begins in ("One row an object", "The same table"):
+        with installed(tmp_path / "site", "formats", "csv_boxes", EXAMPLES[begins]):
+            export(small_dataset.root, ["csv_boxes"], output=tmp_path / begins)
     assert len(list((tmp_path / "The same table").rglob("*.png"))) == len(small_dataset)
     assert tree_hash(tmp_path / "The same table") == tree_hash(tmp_path / "One row an object")
 
 
 @pytest.mark.slow
-def test_a_format_may_be_a_tree(small_dataset, monkeypatch):
-    install(monkeypatch, "lines", "viewsphere.formats", EXAMPLES["One JSON line a picture"])
+def test_a_format_may_be_a_tree(small_dataset, install):
+    install("formats", "lines", EXAMPLES["One JSON line a picture"])
     export(small_dataset.root, ["lines"])
     folder = small_dataset.root / "lines"
     lines = [

@@ -6,6 +6,7 @@
     │   ├── ModelError            a model file that cannot be used
     │   ├── StoreError            an output folder that cannot be used
     │   ├── RemoteError           a URL that does not answer, or refuses
+    │   ├── PluginError           a plug-in that cannot be loaded, or whose spec is not valid
     │   └── MissingExtraError     a feature whose optional package is not installed
     ├── CheckFailedError          a data set that is not what it claims to be: exit status 1
     ├── WorkerDied                who did a job died, as often as it is tried; other jobs go on
@@ -50,6 +51,10 @@ class StoreError(UserError):
 
 class RemoteError(UserError):
     """A URL that does not answer, or refuses; what is finished there is kept."""
+
+
+class PluginError(UserError):
+    """A plug-in that cannot be loaded, or whose spec is not valid; the message names its file and field."""
 
 
 class MissingExtraError(UserError):

@@ -128,14 +128,14 @@ class _InTurn:
 
 def findings(target: str, seeds: range) -> Iterator[Finding | int]:
     """Findings among these inputs, and each input's seed before it runs."""
-    from viewsphere import plugins
     from viewsphere.check import digests
+    from viewsphere.plugins import registry
     from viewsphere.store import checksums
 
     warnings.simplefilter("ignore")
     os.environ |= SETTINGS
     # Nobody installs plug-ins meanwhile, and looking for them takes long; so do threads of a processor that others keep busy.
-    plugins.entry_points, plugins.names = cache(plugins.entry_points), cache(plugins.names)
+    registry.entry_points = cache(registry.entry_points)
     checksums.ThreadPoolExecutor = digests.ThreadPoolExecutor = _InTurn
     for seed in seeds:
         yield seed

@@ -31,15 +31,14 @@ def told(target, seeds):
 @pytest.fixture(autouse=True)
 def alone(monkeypatch):
     """What a campaign sets in its own process is as before."""
-    from viewsphere import plugins
     from viewsphere.check import digests
+    from viewsphere.plugins import registry
     from viewsphere.store import checksums
 
     for name, value in SETTINGS.items():
         monkeypatch.setenv(name, value)
     for module, name in (
-        (plugins, "entry_points"),
-        (plugins, "names"),
+        (registry, "entry_points"),
         *((m, "ThreadPoolExecutor") for m in (checksums, digests)),
     ):
         monkeypatch.setattr(module, name, getattr(module, name))

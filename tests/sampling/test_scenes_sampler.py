@@ -1,11 +1,8 @@
 """Random scenes: stable under more of them, of one split each, equals among equals, kept by the whole chain."""
 
 import re
-import sys
 import tracemalloc
-import types
 from collections import Counter
-from importlib.metadata import EntryPoint
 from itertools import combinations
 
 import numpy as np
@@ -13,11 +10,11 @@ import pytest
 
 import viewsphere as vs
 from counting import counted
+from installed import example, installed
 from quick import quick
-from small import ROOT, small_recipe, tree_hash
-from viewsphere import plugins
+from small import small_recipe, tree_hash
 from viewsphere.check import check
-from viewsphere.errors import RecipeError
+from viewsphere.errors import PluginError, RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.shot import Shot
@@ -27,6 +24,7 @@ from viewsphere.run.generate import Missing
 from viewsphere.sampling.extension import extend, whole
 from viewsphere.sampling.placing import footprint
 from viewsphere.sampling.plan import Plan
+from viewsphere.sampling.samplers import scenes
 from viewsphere.sampling.viewpoints import SpherePoses
 from viewsphere.store import Store
 
@@ -302,14 +300,57 @@ def test_preview_and_estimate_know_scenes():
     assert cost.seconds > 0 and cost.bytes > 10_000
 
 
-def test_the_sampler_in_the_docs_is_one_file(monkeypatch):
-    text = (ROOT / "docs" / "extending.md").read_text("utf-8")
-    (code,) = (block for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if "def blocks(" in block)
-    module = types.ModuleType("my_pairs")
-    exec(code, module.__dict__)
-    monkeypatch.setitem(sys.modules, "my_pairs", module)
-    entry = EntryPoint("pairs", "my_pairs", "viewsphere.samplers")
-    monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
+@pytest.fixture
+def pairs(tmp_path):
+    with installed(tmp_path, "samplers", "pairs", example("Every model beside")) as file:
+        yield file
+
+
+def pairs_recipe(**scenes):
+    return small_recipe(models=[{"source": "zoo:post_box", "count": 3}], scenes={"sampler": "pairs", **scenes})
+
+
+@pytest.mark.usefixtures("pairs")
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"gapp": 1}, r"scenes\.gapp: expected no field but gap; found 'gapp'; did you mean 'gap'"),
+        ({"gap": "wide"}, r"scenes\.gap: .*'wide'"),
+    ],
+)
+def test_a_plan_refuses_options_that_a_sampler_does_not_have(options, message):
+    with pytest.raises(RecipeError, match=message):
+        vs.plan(pairs_recipe(**options))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("    split=split,\n", "", r"SamplerSpec\.split: expected a value; found nothing"),
+        ("    split=split,", "    splitt=split,", r"SamplerSpec\.splitt: 'splitt' is unknown; did you mean 'split'"),
+        ("    split=split,", "    split='train',", r"SamplerSpec\.split: expected a function; found 'train'"),
+        (
+            "    split=split,",
+            "    split=factors,",
+            r"SamplerSpec\.split: expected a function of 3 values; found factors",
+        ),
+        ("SAMPLER =", "SAMPLERS =", r"expected SAMPLER = SamplerSpec\(\.\.\.\); found no SAMPLER; did you mean 'SAMPLERS'"),
+        ("SAMPLER = SamplerSpec(", "SAMPLER = dict(", r"SAMPLER: expected a SamplerSpec; found a mapping"),
+        ("def subjects", "import no_such_package\n\ndef subjects", r"pairs cannot be imported: ModuleNotFoundError"),
+    ],
+)
+def test_a_faulty_spec_is_refused_with_its_file_and_field(old, new, message, tmp_path):
+    code = example("Every model beside")
+    assert old in code
+    with (
+        installed(tmp_path, "samplers", "pairs", code.replace(old, new)) as file,
+        pytest.raises(PluginError, match=f"^{re.escape(str(file))}: .*{message}"),
+    ):
+        vs.plan(pairs_recipe())
+
+
+@pytest.mark.usefixtures("pairs")
+def test_the_sampler_in_the_docs_is_one_file():
     grid = {"azimuth": [0, 90], "distance": 4}
     pairs = small_recipe(
         models=[{"source": "zoo:post_box", "count": 3}],
@@ -344,8 +385,7 @@ def test_a_hundred_million_frames_are_planned_in_little_memory(models, poses, by
 
 @pytest.mark.parametrize("views", [None, 2])
 def test_planning_counts_scenes_out_once_and_asks_for_no_pose_again(views, monkeypatch):
-    sampler = plugins.load("samplers", "scenes")
-    blocks, ranges = counted(monkeypatch, sampler, "blocks"), counted(monkeypatch, sampler, "as_ranges")
+    blocks, ranges = counted(monkeypatch, scenes.SAMPLER, "blocks"), counted(monkeypatch, scenes, "as_ranges")
     named = counted(monkeypatch, SpherePoses, "name")
     planned = vs.plan(recipe(count=300, scenes={"views": views}))
     assert (planned.frames, planned.shot_count) == (300 * (views or 3), len(planned.rows))

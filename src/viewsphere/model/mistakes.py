@@ -247,8 +247,15 @@ def _words(error: ErrorDetails, fields: Sequence[str]) -> str:
         case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
             return f"expected a number {error['msg'].removeprefix('Input should be ')}; found {shown(found)}"
         case _:
-            message = error["msg"].removeprefix("Input should be ").removeprefix("expected ").replace("a valid ", "a ")
-            return f"expected {message.replace('String should', 'text that should')}; found {shown(found)}"
+            return f"expected {_plain(error['msg'])}; found {shown(found)}"
+
+
+def _plain(message: str) -> str:
+    """Pydantic's message of what it expected, in this project's words."""
+    message = message.removeprefix("Input should be ").removeprefix("expected ")
+    for theirs, ours in (("a valid ", "a "), ("String should", "text that should"), ("callable", "a function")):
+        message = message.replace(theirs, ours)
+    return message
 
 
 def _no_field(name: str | int, fields: Sequence[str]) -> str:

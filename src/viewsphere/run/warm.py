@@ -55,7 +55,7 @@ ROOF: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 1.
 MARKS = "marks"
 """The folder of lists of kernels."""
 
-PACKAGE = Path(plugins.__file__).parent
+PACKAGE = Path(plugins.__file__).parent.parent
 
 
 def precompile(shot: Shot, tell: Told) -> None:

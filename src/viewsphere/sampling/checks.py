@@ -16,11 +16,12 @@ from viewsphere.model.channel import MATERIAL_PASSES, PASSES, PICTURES
 from viewsphere.model.mistakes import nearest, one_of, read_options, shown
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.suggestions import suggestion
+from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.rig import SensorList
-from viewsphere.recipe.scenes import ScenesEntry
+from viewsphere.recipe.scenes import SamplerEntry, ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
 from viewsphere.recipe.weather import FogEntry
 from viewsphere.sampling.layouts import check_layout, check_orientation
@@ -66,22 +67,18 @@ def check_distractors(recipe: Recipe) -> None:
 
 def check_names(recipe: Recipe) -> None:
     """The engine, the formats, the sampler, the placer and the channels are known, and still pictures are enough for these."""
-    engines = plugins.names("engines")
-    if recipe.engine.name not in engines:
-        raise RecipeError(f"engine: {one_of(recipe.engine.name, engines)}")
-    formats = plugins.names("formats")
+    _check_plugin("engine", "engines", recipe.engine.name)
     for i, entry in enumerate(recipe.formats):
-        if entry.name not in formats:
-            raise RecipeError(f"formats[{i}]: {one_of(entry.name, formats)}")
+        _check_plugin(f"formats[{i}]", "formats", entry.name)
         if entry.options:
             entry.arguments(f"formats[{i}].{entry.name}")
     company = recipe.scene.company
     if company is not None:
         check_layout(company.layout, "scene.company")
         check_orientation(company.orientation, "scene.company")
-    samplers = plugins.names("samplers")
-    if recipe.sampler not in samplers:
-        raise RecipeError(f"scenes.sampler: {one_of(recipe.sampler, samplers)}")
+    _check_plugin("scenes.sampler", "samplers", recipe.sampler)
+    if isinstance(recipe.scenes, SamplerEntry):
+        plugins.load(SamplerSpec, recipe.sampler).read(recipe.sampler, recipe.scenes.options, "scenes")
     if isinstance(recipe.scenes, ScenesEntry):
         check_layout(recipe.scenes.layout, "scenes")
         check_orientation(recipe.scenes.orientation, "scenes")
@@ -96,6 +93,13 @@ def check_names(recipe: Recipe) -> None:
         _check_annotation(recipe, f"annotations[{i}]", name)
     for name, given in recipe.labels.items():
         _check_options(recipe, name, given)
+
+
+def _check_plugin(field: str, kind: plugins.Kind, name: str) -> None:
+    """A plug-in that is known."""
+    known = plugins.names(kind)
+    if name not in known:
+        raise RecipeError(f"{field}: {one_of(name, known)}")
 
 
 def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
@@ -200,9 +204,9 @@ def check_frames(recipe: Recipe, views: Poses) -> None:
         )
 
 
-def check_sizes(recipe: Recipe, views: Poses, sampler: object) -> None:
+def check_sizes(recipe: Recipe, views: Poses, sampler: SamplerSpec) -> None:
     """Pictures that take their lenses from a file are of one size, unless the sampler makes them of any."""
-    if not recipe.camera.of_viewpoints or getattr(sampler, "OF_ANY_SIZE", False):
+    if not recipe.camera.of_viewpoints or sampler.of_any_size:
         return
     sizes = {f"{lens.width} x {lens.height}" for i in range(len(views)) if (lens := views.lens(i))}
     if len(sizes) > 1:

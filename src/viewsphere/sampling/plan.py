@@ -22,6 +22,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.notebook import Shown
 from viewsphere.model.rig import Rig
 from viewsphere.model.shot import Shot
+from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.recipe import Recipe
@@ -54,7 +55,7 @@ from viewsphere.sampling.pictures import check_pictures, proportions, scene_pict
 from viewsphere.sampling.recipe_warnings import hidden_background, hidden_by_exposure, no_light, out_of_view, too_small
 from viewsphere.sampling.redraws import scene_draws
 from viewsphere.sampling.rigs import rig_of
-from viewsphere.sampling.samplers import Sampler, Standing, Stock, lens
+from viewsphere.sampling.samplers import Standing, Stock, lens
 from viewsphere.sampling.scenes import check_night, is_night
 from viewsphere.sampling.seeds import Names, share
 from viewsphere.sampling.sequence_checks import check_sequences
@@ -83,9 +84,9 @@ class Plan(Shown, Stock):
     credits: Mapping[str, Credit] = field(default_factory=dict[str, Credit])  # known ones, by keys of models that are kept
 
     @cached_property
-    def sampler(self) -> Sampler:
-        """What says which shots there are, and makes them."""
-        return plugins.load("samplers", self.recipe.sampler)
+    def sampler(self) -> SamplerSpec:
+        """The sampler that makes the shots."""
+        return plugins.load(SamplerSpec, self.recipe.sampler)
 
     @property
     def images(self) -> tuple[str, ...]:
@@ -423,7 +424,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         most = recipe.shot_frames or shot_frames or SHOT_FRAMES
         frames = 1 if recipe.is_new_each_frame and recipe.time is None else most
         timings = timings if any(timings) else ()
-        sampler: Sampler = plugins.load("samplers", recipe.sampler)
+        sampler = plugins.load(SamplerSpec, recipe.sampler)
         check_sizes(recipe, views, sampler)
         planned = Plan(
             recipe,

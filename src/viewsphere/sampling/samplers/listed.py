@@ -15,8 +15,8 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scenes import SamplerEntry
 from viewsphere.recipe.viewpoints import PoseList
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.pose_files import Arranged, Extrinsics
@@ -24,8 +24,6 @@ from viewsphere.sampling.samplers import Standing, Stock
 from viewsphere.sampling.time_steps import is_animated
 from viewsphere.sampling.viewpoints import ListedPoses, placed, pose_file, world_turn
 from viewsphere.store import Block
-
-OF_ANY_SIZE = True
 
 
 def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
@@ -149,9 +147,19 @@ def _check(recipe: Recipe) -> None:
         raise RecipeError("models: expected models that stand still beside sampler: listed; found frames: leave frames out")
     if recipe.scene.company is not None:
         raise RecipeError("scene.company: expected none beside sampler: listed, which says what is there; found one")
-    options = recipe.scenes.options if isinstance(recipe.scenes, SamplerEntry) else {}
-    for name in options:
-        raise RecipeError(f"scenes.{name}: expected no options of sampler: listed; found one: leave it out")
     lenses = [repr(shot.said.camera) for shot in _file(recipe)[1]] if recipe.rig and recipe.camera.of_viewpoints else []
     if len(set(lenses)) > 1:
         raise RecipeError("rig: expected shots of one lens beside a rig and camera: {of_viewpoints: true}; found several")
+
+
+SAMPLER = SamplerSpec(
+    subjects=subjects,
+    factors=factors,
+    blocks=blocks,
+    most_objects=most_objects,
+    cast=cast,
+    split=split,
+    standing=standing,
+    shot=shot,
+    of_any_size=True,
+)

@@ -12,6 +12,7 @@ from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor, Scene, Vector
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
+from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import BoxOf, center
 from viewsphere.sampling.layouts import is_slow
@@ -168,3 +169,15 @@ def _scene(stock: Stock, subject: str, pose: str, run: Run) -> Scene:
     if scene.blend is None or run.step is None or run.step.scene is None:
         return scene
     return scene.model_copy(update={"blend": scene.blend.model_copy(update={"frame": run.step.scene})})
+
+
+SAMPLER = SamplerSpec(
+    subjects=subjects,
+    factors=factors,
+    blocks=blocks,
+    most_objects=most_objects,
+    cast=cast,
+    split=split,
+    standing=standing,
+    shot=shot,
+)

@@ -14,6 +14,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
+from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import BoxOf, center_of_all
 from viewsphere.sampling.layouts import is_slow
@@ -117,3 +118,15 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
 def _poses(stock: Stock, subject: str) -> Ranges:
     """Numbers of the poses that a scene is taken from."""
     return as_ranges(np.array(scene_views(stock, subject), np.int64))
+
+
+SAMPLER = SamplerSpec(
+    subjects=subjects,
+    factors=factors,
+    blocks=blocks,
+    most_objects=most_objects,
+    cast=cast,
+    split=split,
+    standing=standing,
+    shot=shot,
+)

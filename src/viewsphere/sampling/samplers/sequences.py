@@ -18,6 +18,7 @@ from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
+from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.sampling.composition import BoxOf
@@ -175,3 +176,15 @@ def _taken(stock: Stock) -> dict[int, list[str]]:
         for view in scene_views(stock, subject):
             found[view].append(subject)
     return dict(sorted(found.items()))
+
+
+SAMPLER = SamplerSpec(
+    subjects=subjects,
+    factors=factors,
+    blocks=blocks,
+    most_objects=most_objects,
+    cast=cast,
+    split=split,
+    standing=standing,
+    shot=shot,
+)

@@ -1,0 +1,29 @@
+"""Plug-ins: a registry that finds and loads them, and one frozen, typed spec a kind, each in a file of its own."""
+
+from viewsphere.plugins.registry import (
+    Kind,
+    attribute,
+    entry_points,
+    families,
+    family,
+    is_third_party,
+    load,
+    loadable,
+    names,
+    place,
+    places,
+)
+
+__all__ = [
+    "Kind",
+    "attribute",
+    "entry_points",
+    "families",
+    "family",
+    "is_third_party",
+    "load",
+    "loadable",
+    "names",
+    "place",
+    "places",
+]

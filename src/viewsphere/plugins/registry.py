@@ -1,0 +1,228 @@
+"""Finds plug-ins by name, and loads them.
+
+A plug-in is one module that holds a spec, such as `FORMAT = FormatSpec(...)`. A module's name is the plug-in's name, so listing
+names imports no plug-in. Third parties name their modules in entry points of the groups `viewsphere.formats` and so on. A
+plug-in of theirs that cannot be loaded is an error for those that name it, and for nothing else.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import pkgutil
+import sys
+from collections.abc import Iterable
+from functools import lru_cache
+from importlib import metadata
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar, overload
+
+from viewsphere.errors import PluginError, UserError
+
+Kind = Literal["engines", "formats", "labels", "materials", "motions", "placers", "samplers"]
+
+
+class Specified(Protocol):
+    """A class of specs: the plug-ins of a kind. The classes need pydantic, which listing names does without."""
+
+    KIND: ClassVar[Kind]
+
+
+S = TypeVar("S", bound=Specified)
+
+
+class Seam(NamedTuple):
+    """Where the plug-ins of a kind are that ship with viewsphere, and the constant of a module that holds its spec."""
+
+    package: str
+    constant: str
+
+
+SEAMS: dict[Kind, Seam] = {
+    "engines": Seam("viewsphere.engines", "ENGINE"),
+    "formats": Seam("viewsphere.formats", "FORMAT"),
+    "labels": Seam("viewsphere.labels", "LABEL"),
+    "materials": Seam("viewsphere.materials", "MATERIAL"),
+    "motions": Seam("viewsphere.sampling.motion", "MOTION"),
+    "placers": Seam("viewsphere.sampling.placing", "PLACER"),
+    "samplers": Seam("viewsphere.sampling.samplers", "SAMPLER"),
+}
+
+
+def names(kind: Kind) -> tuple[str, ...]:
+    """Names of all plug-ins of this kind, sorted; no plug-in is imported."""
+    return tuple(sorted({*_shipped(kind), *(entry.name for entry in entry_points(group=f"viewsphere.{kind}"))}))
+
+
+@overload
+def load(kind: type[S], name: str) -> S: ...
+@overload
+def load(kind: Kind, name: str) -> Any: ...
+def load(kind: type[S] | Kind, name: str) -> Any:
+    """The spec of a plug-in.
+
+    Raises UserError for an unknown name, with the nearest known one. Raises PluginError for a plug-in that cannot be loaded, or
+    whose spec is not valid.
+    """
+    if isinstance(kind, str):
+        return _module_of(kind, name)
+    return _spec(kind, _module_of(kind.KIND, name), name)
+
+
+def loadable(spec: type[S]) -> dict[str, S]:
+    """The specs of all plug-ins of a kind, by name, without the third-party ones that cannot be loaded."""
+    found: dict[str, S] = {}
+    for name in names(spec.KIND):
+        try:
+            found[name] = load(spec, name)
+        except PluginError:
+            if not is_third_party(spec.KIND, name):
+                raise
+    return found
+
+
+def is_third_party(kind: Kind, name: str) -> bool:
+    """Whether an entry point names the plug-in."""
+    return any(entry.name == name for entry in entry_points(group=f"viewsphere.{kind}"))
+
+
+def _shipped(kind: Kind) -> tuple[str, ...]:
+    return tuple(name for name, _ in _listed(SEAMS[kind].package) if not name.startswith("_"))
+
+
+def _module_of(kind: Kind, name: str) -> Any:
+    """The module of a plug-in, or the object that its entry point names."""
+    for entry in entry_points(group=f"viewsphere.{kind}"):
+        if entry.name == name:
+            return _entered(entry)
+    if name not in _shipped(kind):
+        raise _unknown(kind[:-1], name, names(kind))
+    return importlib.import_module(f"{SEAMS[kind].package}.{name}")
+
+
+def _entered(entry: metadata.EntryPoint) -> Any:
+    """What a third party's entry point names; whatever goes wrong there is an error of the plug-in."""
+    try:
+        return entry.load()
+    except PluginError as error:
+        raise PluginError("\n".join(f"{_file(entry.module)}: {line}" for line in str(error).splitlines())) from error
+    except UserError:
+        raise
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}".strip().replace("\n", " ")
+        raise PluginError(f"{_file(entry.module)}: plug-in {entry.name} cannot be imported: {said}") from error
+
+
+def _spec(spec: type[S], found: Any, name: str) -> S:
+    """The spec in a plug-in's module; raises PluginError where there is none."""
+    from viewsphere.model.mistakes import nearest, shown
+
+    if isinstance(found, spec):
+        return found
+    constant = SEAMS[spec.KIND].constant
+    where, others = getattr(found, "__file__", None) or name, vars(found) if hasattr(found, "__dict__") else {}
+    if constant not in others:
+        meant = nearest(constant, [other for other in others if other.isupper()])
+        raise PluginError(f"{where}: expected {constant} = {spec.__name__}(...); found no {constant}{meant}")
+    held = others[constant]
+    if not isinstance(held, spec):
+        raise PluginError(f"{where}: {constant}: expected a {spec.__name__}; found {shown(held)}")
+    return held
+
+
+def _file(module: str) -> str:
+    """The file of a module that could not be imported, else its name."""
+    try:
+        found = importlib.util.find_spec(module)
+    except Exception:  # its package may be what cannot be imported
+        return module
+    return module if found is None or found.origin is None else found.origin
+
+
+def entry_points(group: str) -> metadata.EntryPoints:
+    """The installed entry points of this group.
+
+    Those of all packages are read once, and again after one was installed or removed: reading them takes 10 ms.
+    """
+    return _of_group(_changes(sys.path), group)
+
+
+Changes = tuple[tuple[str, int], ...]
+"""Folders, and when each was last changed."""
+
+
+@lru_cache(maxsize=2 * len(SEAMS))
+def _of_group(paths: Changes, group: str) -> metadata.EntryPoints:
+    return _installed(paths).select(group=group)
+
+
+@lru_cache(maxsize=1)
+def _installed(_paths: Changes) -> Any:
+    """Entry points of the packages in these folders, as they were last changed at these times."""
+    return metadata.entry_points()
+
+
+def _changes(paths: Iterable[str]) -> Changes:
+    return tuple((path, _changed(path)) for path in paths)
+
+
+def _changed(path: str) -> int:
+    """When a folder was last changed, ns; 0 where there is none."""
+    try:
+        # Asked a thousand times a run: making a Path takes longer than the system's answer.
+        return os.stat(path or ".").st_mtime_ns  # noqa: PTH116
+    except OSError:
+        return 0
+
+
+def attribute(path: str) -> Any:
+    """A public object by its dotted path inside viewsphere: `model.recipe.Recipe`."""
+    module, _, name = path.rpartition(".")
+    return getattr(importlib.import_module(f"viewsphere.{module}"), name)
+
+
+def families() -> tuple[str, ...]:
+    """Names of the zoo's families (its modules, not its packages), sorted; none is imported."""
+    return _modules("viewsphere.zoo")
+
+
+def family(name: str) -> Any:
+    """The module of a zoo family; raises UserError for an unknown name, with the nearest known one."""
+    return _module("viewsphere.zoo", "zoo family", name)
+
+
+def places() -> tuple[str, ...]:
+    """Names of the zoo's places, sorted; none is imported."""
+    return _modules("viewsphere.zoo.places")
+
+
+def place(name: str) -> Any:
+    """The module of a place; raises UserError for an unknown name, with the nearest known one."""
+    return _module("viewsphere.zoo.places", "zoo place", name)
+
+
+def _modules(package: str) -> tuple[str, ...]:
+    return tuple(sorted(name for name, is_package in _listed(package) if not is_package))
+
+
+def _listed(package: str) -> tuple[tuple[str, bool], ...]:
+    """Names of a package's modules, and whether each is a package itself; listed again after its folder was changed."""
+    return _modules_in(_changes(importlib.import_module(package).__path__))
+
+
+@lru_cache(maxsize=2 * len(SEAMS))
+def _modules_in(paths: Changes) -> tuple[tuple[str, bool], ...]:
+    return tuple((m.name, m.ispkg) for m in pkgutil.iter_modules([path for path, _ in paths]))
+
+
+def _module(package: str, what: str, name: str) -> Any:
+    known = _modules(package)
+    if name not in known:
+        raise _unknown(what, name, known)
+    return importlib.import_module(f"{package}.{name}")
+
+
+def _unknown(what: str, name: str, known: tuple[str, ...]) -> UserError:
+    from viewsphere.model.mistakes import one_of
+
+    return UserError(f"{what}: {one_of(name, known)}")
