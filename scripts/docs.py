@@ -21,7 +21,7 @@ from typing import Any, get_args
 
 import numpy as np
 import site_links
-from figures import FIGURES
+from figures import FIGURES, HISTORY
 from typer.models import ArgumentInfo
 
 from viewsphere import plugins
@@ -350,7 +350,27 @@ def materials_page() -> str:
     return MATERIALS.sub(lambda found: found[1] + text, (DOCS / "materials.md").read_text("utf-8"))
 
 
+RELEASES = re.compile(r"(<!-- releases, written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
+FIGURES_OF_RELEASES = {
+    "frame": ("frame, of Embree", ".2f"),
+    "smooth_frame": ("frame with 4x edges, of Embree", ".2f"),
+    "plan_s": ("`plan`, CPU-s", ".2f"),
+    "picture_s": ("`render` of one picture, CPU-s", ".2f"),
+}
+
+
+def performance_page() -> str:
+    """The hand-written page with a table of all releases."""
+    heads = ("version", "date", *(head for head, _ in FIGURES_OF_RELEASES.values()))
+    text = f"\n| {' | '.join(heads)} |\n|---|---|{'---:|' * len(FIGURES_OF_RELEASES)}\n"
+    for release in json.loads(HISTORY.read_text("utf-8")):
+        cells = (format(release[n], form) if n in release else "not measured" for n, (_, form) in FIGURES_OF_RELEASES.items())
+        text += f"| {release['version']} | {release['date']} | {' | '.join(cells)} |\n"
+    return RELEASES.sub(lambda found: found[1] + text, (DOCS / "performance.md").read_text("utf-8"))
+
+
 PAGES = {
+    "performance.md": performance_page,
     "materials.md": materials_page,
     "limits.md": limits_page,
     "format-list.md": formats_page,

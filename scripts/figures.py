@@ -1,8 +1,10 @@
-"""The pictures of docs/conventions.md, drawn from the conventions themselves as SVG."""
+"""The drawings of docs/conventions.md, from the conventions, and of docs/performance.md, from benchmarks/history.json."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,4 +144,31 @@ def pixels() -> str:
     return svg(640, 365, parts)
 
 
-FIGURES = {"images/axes.svg": axes, "images/box.svg": box, "images/pixels.svg": pixels}
+HISTORY = Path(__file__).parent.parent / "benchmarks" / "history.json"
+
+
+def history() -> str:
+    """A column for each release: a whole frame without and with smooth edges, in units of Embree's time."""
+    releases = json.loads(HISTORY.read_text("utf-8"))
+    left, base, step, unit = 110, 250, 150, 130
+    width = left + step * len(releases) + 20
+    parts = [words((left - 10, base - level * unit + 5), f"{level:g}", anchor="end") for level in (0, 0.5, 1, 1.5)]
+    parts += [line((left, base - level * unit), (width - 20, base - level * unit), PALE) for level in (0, 0.5, 1, 1.5)]
+    parts += [words((20, base - unit + 5), "Embree", anchor="start"), words((left, 30), "CPU time of a frame", anchor="start")]
+    parts += [
+        words((left + 210, 30), "plain", BLUE, "start"),
+        words((left + 260, 30), "4x edges", GREEN, "start"),
+    ]
+    for column, release in enumerate(releases):
+        x = left + step * (column + 0.5)
+        parts.append(words((x, base + 25), release["version"]))
+        measured = [(color, release[name]) for color, name in ((BLUE, "frame"), (GREEN, "smooth_frame")) if name in release]
+        for color, ratio in measured:
+            at = (x, base - ratio * unit)
+            parts += [dot(at, color), words(at, f"{ratio:.2f}", color, "start", (10, 5))]
+        if not measured:
+            parts.append(words((x, base - 10), "not measured"))
+    return svg(width, 290, parts)
+
+
+FIGURES = {"images/axes.svg": axes, "images/box.svg": box, "images/pixels.svg": pixels, "images/history.svg": history}

@@ -1,5 +1,6 @@
 """What the pages say is true: generated pages are fresh, README's commands and code run."""
 
+import json
 import os
 import re
 import subprocess
@@ -72,3 +73,10 @@ def test_readme_s_world_in_motion_is_valid(tmp_path):
     (tmp_path / "recipe.yaml").write_text(text)
     planned = vs.plan(vs.Recipe.load(tmp_path / "recipe.yaml"))
     assert planned.frames == 3 * 50 * 2 and len(planned.subjects) == 3
+
+
+def test_every_release_has_a_line_in_the_history():
+    measured = [release["version"] for release in json.loads((ROOT / "benchmarks" / "history.json").read_text("utf-8"))]
+    released = re.findall(r"^## (\d+\.\d+\.\d+)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    assert released
+    assert set(released) <= set(measured)
