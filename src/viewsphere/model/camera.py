@@ -21,6 +21,7 @@ class Distortion(Frozen):
     `fisheye`: k1 k2 k3 k4 of theta_d = theta (1 + k1 theta^2 + ...) (Kannala and Brandt 2006; OpenCV's fisheye module).
     """
 
+    IS_CHOICE = True
     model: Literal["brown_conrady", "fisheye"] = Field(description="OpenCV's standard or its fisheye model")
     coefficients: tuple[Annotated[float, Field(ge=-1e6, le=1e6)], ...] = Field(
         description="brown_conrady: 4, 5 or 8 in OpenCV's order; fisheye: 4"
@@ -46,6 +47,7 @@ class Scan(Frozen):
     to them, elevations go on evenly; a lone ring's rows are a degree apart.
     """
 
+    IS_CHOICE = True
     model: Literal["scan"] = "scan"
     elevations_deg: tuple[Degrees, ...] = Field(
         min_length=1, description="of each ring above the sensor's level, highest first"

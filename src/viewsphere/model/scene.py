@@ -46,6 +46,7 @@ class Sun(Frozen):
 class Sky(Frozen):
     """Ambient light from above: a vertical gradient."""
 
+    IS_CHOICE = True
     kind: Literal["gradient"] = Field(default="gradient", description="a vertical gradient")
     zenith: Color = Field(default=(0.55, 0.7, 1.0), description="colour overhead: linear [r, g, b]")
     horizon: Color = Field(default=(0.9, 0.92, 0.95), description="colour at the horizon: linear [r, g, b]")
@@ -55,6 +56,7 @@ class Sky(Frozen):
 class Daylight(Frozen):
     """The sky that the sun's place makes, clear to overcast; the sun itself is dimmed and coloured by its air."""
 
+    IS_CHOICE = True
     kind: Literal["daylight"] = Field(default="daylight", description="a sky made by the sun's place")
     turbidity: float = Field(default=3.0, ge=1.8, le=10, description="haze: 2 is very clear, 10 hazy")
     clouds: Portion = Field(default=0.0, description="0 clear, 1 overcast: then there is no sun")
@@ -64,6 +66,7 @@ class Daylight(Frozen):
 class Environment(Frozen):
     """Light from everywhere, from a picture of the whole sphere (equirectangular EXR or HDR, linear)."""
 
+    IS_CHOICE = True
     kind: Literal["hdri"] = Field(default="hdri", description="a picture of the whole sphere")
     file: str = Field(description="absolute path of an EXR or HDR file")
     strength: Strength = Field(default=1.0, description="factor of its light")
@@ -95,6 +98,7 @@ class AimedLight(PlacedLight):
 class PointLight(PlacedLight):
     """A small ball that shines everywhere."""
 
+    IS_CHOICE = True
     kind: Literal["point"] = Field(default="point", description="a small ball that shines everywhere")
     radius: Amount = Field(default=0.05, description="metres: larger means softer shadows")
 
@@ -102,6 +106,7 @@ class PointLight(PlacedLight):
 class SpotLight(AimedLight):
     """A small disc that shines into a cone around the direction to `toward`; full inside of (1 - blend) of its angle."""
 
+    IS_CHOICE = True
     kind: Literal["spot"] = Field(default="spot", description="a cone of light")
     radius: Amount = Field(default=0.05, description="metres: larger means softer shadows")
     angle_deg: float = Field(default=45.0, gt=0, le=160, description="of the whole cone")
@@ -111,6 +116,7 @@ class SpotLight(AimedLight):
 class AreaLight(AimedLight):
     """A rectangle that shines to one side, towards `toward`, as Lambert says; its width lies level."""
 
+    IS_CHOICE = True
     kind: Literal["area"] = Field(default="area", description="a rectangle that shines to one side")
     size: tuple[Length, Length] = Field(default=(1.0, 1.0), description="[width, height] in metres")
 
@@ -118,6 +124,7 @@ class AreaLight(AimedLight):
 class HemisphereLight(Light):
     """Even light from above and another from below: radiance `strength` times each colour. It casts no shadow."""
 
+    IS_CHOICE = True
     kind: Literal["hemisphere"] = Field(default="hemisphere", description="even light from above, and other from below")
     below: Color = Field(default=(0.0, 0.0, 0.0), description="colour of what comes from below: linear [r, g, b]")
 
