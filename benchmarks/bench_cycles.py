@@ -158,7 +158,7 @@ def write_exr(path: Path, pixels: Any) -> None:
 
 
 def theirs(shot: Shot, stages: Stages, python: Path, folder: Path, threads: int) -> Costs:
-    from viewsphere.assets.export import export_glb
+    from viewsphere.assets.exporting.export import export_glb
 
     folder.mkdir(parents=True, exist_ok=True)
     export_glb(stages.model(shot.things[0].model), folder / "model.glb")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from viewsphere import Recipe
-from viewsphere.assets.export import export_glb
+from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Image, Mesh, Texture
 from viewsphere.zoo import build
 

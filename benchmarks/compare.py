@@ -25,7 +25,7 @@ from bench_scene import textured, write_sky
 from PIL import Image
 
 from viewsphere import plugins
-from viewsphere.assets.export import export_glb
+from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.engines import Engine

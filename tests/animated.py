@@ -7,9 +7,9 @@ import json
 
 import numpy as np
 
-from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import FileFacts
+from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.assets.timeline import Blenders, Timeline
 
 LAST = 49

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from small import still_channels
-from viewsphere.assets.export import export_glb, export_obj
-from viewsphere.assets.looks import looks_of
+from viewsphere.assets.appearance.looks import looks_of
+from viewsphere.assets.exporting.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.diameter import diameter

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewsphere.assets.glb import glb_bytes
+from viewsphere.assets.exporting.glb import glb_bytes
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.geometry.box import FACES, box_vertices
 

@@ -6,7 +6,7 @@ import zlib
 
 import pytest
 
-from viewsphere.assets.folder import UnreadableError, decode_image
+from viewsphere.assets.paths.folder import UnreadableError, decode_image
 from viewsphere.codecs.exr import decode_exr
 from viewsphere.codecs.pictures import decode_picture
 from viewsphere.errors import ViewsphereError

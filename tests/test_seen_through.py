@@ -6,7 +6,7 @@ import pytest
 
 from truth_scenes import cube
 from viewsphere import Recipe, generate
-from viewsphere.assets.export import export_glb
+from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Material
 from viewsphere.check import check
 from viewsphere.store import Dataset

@@ -48,7 +48,7 @@ def test_an_exr_environment_names_its_extra(tmp_path):
     (tmp_path / "sky.exr").write_bytes(b"\x76\x2f\x31\x01" + b"\0" * 100)
     (said,) = said_without(
         """
-        from viewsphere.assets.sphere import read_head
+        from viewsphere.rendering.sky.environment_head import read_head
         from viewsphere.rendering.sky.environment_file import read_environment
         messages = {refused(read_head, Path("sky.exr")), refused(read_environment, Path("sky.exr"))}
         print(*messages, sep="|")

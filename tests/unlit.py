@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from place_files import blocks
-from viewsphere.assets.glb import glb_bytes
+from viewsphere.assets.exporting.glb import glb_bytes
 from viewsphere.assets.mesh import Image, Material, Texture
 
 SQUARE = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])

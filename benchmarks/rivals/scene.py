@@ -11,7 +11,7 @@ from bench_scene import reference_recipe, write_reference
 from PIL import Image
 
 from viewsphere import plan
-from viewsphere.assets.export import export_glb
+from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.model.camera import Camera

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from viewsphere.assets.instances import ENOUGH, count_instances
 from viewsphere.assets.load import load_model
+from viewsphere.assets.readers.shared.instances import ENOUGH, count_instances
 from viewsphere.errors import ModelError
 
 DEPTH = 40

@@ -8,8 +8,8 @@ import pytest
 
 from animated import TORN, walker
 from viewsphere.assets.deforming import DeformingMesh, sharing
-from viewsphere.assets.export import export_deforming
-from viewsphere.assets.exported import read_exported
+from viewsphere.assets.exporting.export import export_deforming
+from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.load import load_model
 from viewsphere.assets.mesh_file import ARRAYS
 from viewsphere.errors import ModelError

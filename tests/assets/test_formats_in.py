@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 from deadline import DEADLINE
-from viewsphere.assets import reader_process
 from viewsphere.assets.cache import load
-from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.load import BLENDER_SUFFIXES, KNOWN, PICTURE_SUFFIXES, SUFFIXES, load_model
+from viewsphere.assets.sandbox import server as reader_process
+from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.errors import MissingExtraError, ModelError
 from viewsphere.limits import limits

@@ -85,7 +85,7 @@ def test_an_animated_gltf_file_needs_no_blender_and_a_damaged_animation_is_told(
     def none():
         raise MissingExtraError("no Blender")
 
-    monkeypatch.setattr("viewsphere.assets.via_blender.find_blender", none)
+    monkeypatch.setattr("viewsphere.assets.readers.blender.reading.find_blender", none)
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
     leaf(tmp_path / "leaf.gltf", {"Walk": 1, "Wave": 0.5})
     report = describe(tmp_path / "leaf.gltf")

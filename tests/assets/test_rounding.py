@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewsphere.assets import polygon
-from viewsphere.assets.export import export_obj
+from viewsphere.assets.exporting.export import export_obj
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import Primitive
-from viewsphere.assets.smoothing import angle_of, creased
+from viewsphere.assets.readers.shared import polygon
+from viewsphere.assets.readers.shared.smoothing import angle_of, creased
 from viewsphere.assets.srgb import encoded, linear
 
 PROGRAM = """

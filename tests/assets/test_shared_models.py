@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from quick import quick
-from viewsphere.assets.export import export_glb, export_obj
+from viewsphere.assets.exporting.export import export_glb, export_obj
 from viewsphere.assets.load import SUFFIXES, load_model
 from viewsphere.assets.normalise import normalise
 from viewsphere.errors import ModelError

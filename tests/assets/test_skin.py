@@ -10,12 +10,12 @@ from rigged import BODY, arm, person, write_gltf
 from small import ROOT
 from viewsphere.assets.cache import load
 from viewsphere.assets.deforming import DeformingMesh
-from viewsphere.assets.export import export_deforming, export_glb
-from viewsphere.assets.exported import read_exported
-from viewsphere.assets.glb import material_names
+from viewsphere.assets.exporting.export import export_deforming, export_glb
+from viewsphere.assets.exporting.exported import read_exported
+from viewsphere.assets.exporting.glb import material_names
 from viewsphere.assets.load import load_model
+from viewsphere.assets.metadata.traits import with_body_parts
 from viewsphere.assets.skin import NONE, strongest
-from viewsphere.assets.traits import with_body_parts
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec, Parts
 from viewsphere.run.models import mesh_digest

@@ -13,7 +13,7 @@ from place_files import blocks, write_place
 from sealing import seal_again
 from small import small_recipe
 from viewsphere import Dataset, generate
-from viewsphere.assets.glb import glb_bytes
+from viewsphere.assets.exporting.glb import glb_bytes
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.check import check

@@ -18,8 +18,8 @@ from deadline import until
 from viewsphere import Recipe
 from viewsphere.assets.cache import load
 from viewsphere.assets.inspect import describe
-from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.load import load_model
+from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.errors import ModelError

@@ -10,7 +10,7 @@ from fake_blender import with_modules
 
 from quick import quick
 from viewsphere.assets.cache import cache_folder, load
-from viewsphere.assets.isolated import READ_HERE
+from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.assets.scene_file import scene_file
 from viewsphere.assets.timeline import Blenders
 from viewsphere.blender.interpreter import VARIABLE

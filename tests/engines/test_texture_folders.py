@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 import viewsphere as vs
+from viewsphere.assets.appearance.repaint import textured
 from viewsphere.assets.mesh import Material, Mesh, Texture
-from viewsphere.assets.repaint import textured
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.model.thing import Repaint

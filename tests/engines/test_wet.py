@@ -11,8 +11,8 @@ from test_physics import camera, stage_of
 from test_raster import box, mesh_of, rectangle
 
 from shots import with_camera
+from viewsphere.assets.appearance.wetting import DARKEST, FILM, SMOOTH, UPRIGHT, darkened, wet, wetted
 from viewsphere.assets.mesh import Material
-from viewsphere.assets.wetting import DARKEST, FILM, SMOOTH, UPRIGHT, darkened, wet, wetted
 from viewsphere.engines.raster.painting import paint
 from viewsphere.engines.raster.wet_ground import WATER, mirror_in_water
 from viewsphere.geometry.camera import pixel_rays, project

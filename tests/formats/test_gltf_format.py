@@ -14,7 +14,7 @@ from quick import quick
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
-from viewsphere.assets.exported import read_exported
+from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.check import check
 from viewsphere.formats.gltf import verify
 from viewsphere.geometry.camera import project

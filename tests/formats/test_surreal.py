@@ -16,8 +16,8 @@ from proven import close, equal
 from rigged import person, write_gltf
 from small import tree_hash
 from viewsphere import Dataset, Recipe, generate
-from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.load import load_model
+from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.check import check
 from viewsphere.errors import MissingExtraError, UserError

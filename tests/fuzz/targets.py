@@ -346,7 +346,7 @@ def _exported(suffix: str) -> bytes:
 
     import trimesh
 
-    from viewsphere.assets.export import export_glb
+    from viewsphere.assets.exporting.export import export_glb
 
     if suffix == "glb":
         with tempfile.TemporaryDirectory() as folder:

@@ -12,7 +12,7 @@ from sealing import seal_again
 from small import small_recipe
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 from viewsphere import generate
-from viewsphere.assets.exported import read_exported
+from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Material
 from viewsphere.check import check
 from viewsphere.labels import observe

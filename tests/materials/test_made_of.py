@@ -8,13 +8,13 @@ import pytest
 import viewsphere as vs
 from animated import let_walk
 from small import ROOT
-from viewsphere.assets.box_mapping import box_mapped
-from viewsphere.assets.looks import looks_of, words
+from viewsphere.assets.appearance.box_mapping import box_mapped
+from viewsphere.assets.appearance.looks import looks_of, words
+from viewsphere.assets.appearance.pbr import pictures_of
+from viewsphere.assets.appearance.repaint import textured
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.primitive import face_normals
-from viewsphere.assets.repaint import textured
 from viewsphere.assets.srgb import linear
-from viewsphere.assets.substance import pictures_of
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pictures import bricks, write
-from viewsphere.assets.folder import SHARPEST
+from viewsphere.assets.paths.folder import SHARPEST
 from viewsphere.assets.srgb import linear
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Ground

@@ -10,7 +10,7 @@ from built_once import built_once
 from place_files import HOUSE, blocks, write_picture, write_place
 from sealing import seal_again
 from small import small_recipe, tree_hash
-from viewsphere.assets.glb import glb_bytes
+from viewsphere.assets.exporting.glb import glb_bytes
 from viewsphere.check import check
 from viewsphere.errors import ModelError, UserError
 from viewsphere.preview import preview_samples

@@ -1,7 +1,7 @@
 """A change to materials that changes nothing is said, once a model."""
 
 from small import small_recipe
-from viewsphere.assets.glb import glb_bytes, material_names
+from viewsphere.assets.exporting.glb import glb_bytes, material_names
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.generate import generate
 from viewsphere.zoo import build_zoo_model

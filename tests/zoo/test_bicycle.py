@@ -14,7 +14,7 @@ import pytest
 import viewsphere as vs
 from quick import quick
 from viewsphere import zoo
-from viewsphere.assets.glb import glb_bytes
+from viewsphere.assets.exporting.glb import glb_bytes
 from viewsphere.zoo.bicycle import STYLES, Bicycle, bicycle, draw
 from viewsphere.zoo.cycle.chain import PITCH, Pulley, pitch_radius, rollers, sprocket
 from viewsphere.zoo.cycle.layout import Layout

@@ -7,8 +7,8 @@ from quick import quick
 from viewsphere import plugins
 from viewsphere.assets.cache import load
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.part_points import At, part_points, sided
-from viewsphere.assets.traits import traits_of
+from viewsphere.assets.metadata.part_points import At, part_points, sided
+from viewsphere.assets.metadata.traits import traits_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.zoo import build_zoo_model
 

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from viewsphere import zoo
-from viewsphere.assets.rigged import joints_at
+from viewsphere.assets.exporting.rigged import joints_at
 from viewsphere.cli.commands import app
 from viewsphere.errors import UserError
 from viewsphere.zoo.people import makehuman

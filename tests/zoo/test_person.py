@@ -13,9 +13,9 @@ from quick import quick
 from small import ROOT
 from viewsphere import Recipe, generate, plan, zoo
 from viewsphere.assets.cache import load, load_normalised
-from viewsphere.assets.glb import rigged_glb_bytes
+from viewsphere.assets.exporting.glb import rigged_glb_bytes
+from viewsphere.assets.exporting.rigged import joints_at
 from viewsphere.assets.inspect import describe
-from viewsphere.assets.rigged import joints_at
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.formats.surreal.body import SMPL
@@ -181,7 +181,7 @@ def test_who_sits_has_level_thighs_above_the_chair(build):
 
 @pytest.mark.slow
 def test_its_file_plays_without_blender_and_rests_in_a_pose_that_nobody_is_rigged_in(monkeypatch):
-    monkeypatch.setattr("viewsphere.assets.via_blender.find_blender", None)
+    monkeypatch.setattr("viewsphere.assets.readers.blender.reading.find_blender", None)
     one, spec = made(1), spec_of()
     mesh, facts = load(spec, zoo.build_zoo_model)
     assert mesh.body_parts == SMPL and [*facts.keypoints.points] == list(SMPL)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from viewsphere import plugins, zoo
-from viewsphere.assets.rigged import RiggedModel
+from viewsphere.assets.exporting.rigged import RiggedModel
 from viewsphere.zoo.places import Lane, Place, PlacePiece, Traffic
 from viewsphere.zoo.townscape import street_life
 from zoo_mesh import seeds

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from viewsphere import plugins
-from viewsphere.assets.surface import Surface
-from viewsphere.assets.symmetries import find
+from viewsphere.assets.metadata.surface import Surface
+from viewsphere.assets.metadata.symmetries import find
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.zoo.bottle import FORMS, Bottle, bottle
 from viewsphere.zoo.bottle import draw as draw_bottle

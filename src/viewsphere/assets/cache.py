@@ -21,15 +21,15 @@ from typing import Any
 
 from viewsphere import plugins
 from viewsphere.aside import aside, temporary
-from viewsphere.assets.inside import split_source
-from viewsphere.assets.isolated import read_apart
 from viewsphere.assets.load import check_source
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh, unpacked
+from viewsphere.assets.metadata.part_points import part_points
 from viewsphere.assets.normalise import normalise, placed
-from viewsphere.assets.part_points import part_points
 from viewsphere.assets.parts import taken
+from viewsphere.assets.paths.inside import split_source
 from viewsphere.assets.primitive import FileFacts, extents
+from viewsphere.assets.sandbox.client import read_apart
 from viewsphere.caches import cache_of
 from viewsphere.caches.entries import SUFFIX, publish, read_entry, sweep_once, write_entry
 from viewsphere.errors import ModelError

@@ -11,10 +11,10 @@ import numpy as np
 from viewsphere.assets.cache import ZOO, Build, in_file, load
 from viewsphere.assets.load import PICTURE_SUFFIXES
 from viewsphere.assets.mesh import Material
+from viewsphere.assets.metadata.traits import found_symmetries, traits_of
 from viewsphere.assets.normalise import axes
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.timeline import Timeline, animation_of
-from viewsphere.assets.traits import found_symmetries, traits_of
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
 from viewsphere.recipe.sidecar import ENDING

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewsphere.assets.folder import ModelFolder
-from viewsphere.assets.inside import split_source
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.paths.folder import ModelFolder
+from viewsphere.assets.paths.inside import split_source
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.readers import usd
 from viewsphere.errors import ModelError
@@ -99,11 +99,11 @@ def load_frames(
     folder = ModelFolder(file, confined, inside, shown, clip, fps)
     with np.errstate(all="ignore"):
         if suffix in GLTF:
-            from viewsphere.assets.gltf import read_gltf_frames
+            from viewsphere.assets.readers.gltf import read_gltf_frames
 
             yield from read_gltf_frames(folder, frames)
         else:
-            from viewsphere.assets.via_blender import read_frames
+            from viewsphere.assets.readers.blender.reading import read_frames
 
             yield from read_frames(folder, frames)
 
@@ -137,11 +137,11 @@ def needs_blender(suffix: str) -> bool:
 
 def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, FileFacts]:
     if suffix in GLTF:
-        from viewsphere.assets.gltf import read_gltf
+        from viewsphere.assets.readers.gltf import read_gltf
 
         return read_gltf(folder, node)
     if needs_blender(suffix):
-        from viewsphere.assets.via_blender import read_via_blender
+        from viewsphere.assets.readers.blender.reading import read_via_blender
 
         if suffix in USD:
             folder.warn("Blender may lose the transform above a mesh that is below a mesh; pip install 'viewsphere[usd]'")
@@ -151,15 +151,15 @@ def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, Fil
 
         return read_usd(folder)
     if suffix == "obj":
-        from viewsphere.assets.obj import read_obj
+        from viewsphere.assets.readers.obj.reading import read_obj
 
         return read_obj(folder)
     if suffix in PICTURE_SUFFIXES:
-        from viewsphere.assets.picture import read_picture
+        from viewsphere.assets.readers.picture import read_picture
 
         return read_picture(folder)
     if suffix == "dae":
-        from viewsphere.assets.readers.dae import read_dae
+        from viewsphere.assets.readers.dae.reading import read_dae
 
         return read_dae(folder)
     if suffix == "stl":
@@ -167,11 +167,11 @@ def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, Fil
 
         return read_stl(folder)
     if suffix == "3mf":
-        from viewsphere.assets.readers.threemf import read_3mf
+        from viewsphere.assets.readers.threemf.reading import read_3mf
 
         return read_3mf(folder)
     if suffix == "ply":
-        from viewsphere.assets.readers.ply import read_ply
+        from viewsphere.assets.readers.ply.reading import read_ply
 
         return read_ply(folder)
     from viewsphere.assets.readers.off import read_off

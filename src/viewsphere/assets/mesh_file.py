@@ -6,9 +6,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
-from viewsphere.assets.marks import Mark
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import TEXTURE_FIELDS, FileFacts
+from viewsphere.assets.scene_annotations import Mark
 from viewsphere.caches.arrays import Content, read_arrays, write_arrays
 from viewsphere.model.keypoints import Keypoints
 

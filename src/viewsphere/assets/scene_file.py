@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.via_blender import why_no_answer
+from viewsphere.assets.readers.blender.reading import why_no_answer
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, ModelError

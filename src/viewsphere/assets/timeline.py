@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.assets.cache import kept
-from viewsphere.assets.folder import ModelFolder
-from viewsphere.assets.gltf.animation import timeline
-from viewsphere.assets.gltf.document import Document
-from viewsphere.assets.inside import split_source
-from viewsphere.assets.isolated import timeline_apart
 from viewsphere.assets.load import ANIMATED_SUFFIXES, GLTF, USD, check_animated, needs_blender
-from viewsphere.assets.via_blender import asked, read_named, remember_layers, started
+from viewsphere.assets.paths.folder import ModelFolder
+from viewsphere.assets.paths.inside import split_source
+from viewsphere.assets.readers.blender.reading import asked, read_named, remember_layers, started
+from viewsphere.assets.readers.gltf.animation import timeline
+from viewsphere.assets.readers.gltf.document import Document
+from viewsphere.assets.sandbox.client import timeline_apart
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import ModelError
 

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from viewsphere.aside import temporary
-from viewsphere.assets.export import export_obj
-from viewsphere.assets.exported import read_exported
-from viewsphere.assets.looks import is_alike, looks_of
+from viewsphere.assets.appearance.looks import is_alike, looks_of
+from viewsphere.assets.exporting.export import export_obj
+from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.surface import Surface
-from viewsphere.assets.symmetries import lacking
-from viewsphere.assets.traits import far_points
+from viewsphere.assets.metadata.surface import Surface
+from viewsphere.assets.metadata.symmetries import lacking
+from viewsphere.assets.metadata.traits import far_points
 from viewsphere.check.failure import failure
 from viewsphere.codecs.png_tiff import decode_png
 from viewsphere.errors import UserError

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from viewsphere.assets.inside import split_source
+from viewsphere.assets.paths.inside import split_source
 from viewsphere.check.differences import Difference, differences, in_words
 from viewsphere.check.failure import failure
 from viewsphere.check.report import in_short

@@ -193,7 +193,7 @@ def inspect(
 
 def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, json_: bool) -> None:
     """Show the sensors of a recipe: in words, as a model (GLB), and in a picture of this model from four sides."""
-    from viewsphere.assets.glb import glb_bytes
+    from viewsphere.assets.exporting.glb import glb_bytes
     from viewsphere.preview import four_sides
     from viewsphere.run.inspection import model_spec
     from viewsphere.run.rig_view import recipe_rig, rig_lines, rig_mesh, sensor_facts

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
+from viewsphere.assets.appearance.repaint import textured
+from viewsphere.assets.appearance.wetting import wetted
 from viewsphere.assets.deforming import Load, sharing
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.repaint import textured
-from viewsphere.assets.wetting import wetted
 from viewsphere.engines._lamps import lit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.export import export_glb, export_obj
+from viewsphere.assets.exporting.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.store import Category, ModelInfo

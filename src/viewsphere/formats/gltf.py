@@ -29,7 +29,7 @@ import numpy as np
 import xxhash
 
 from viewsphere.aside import temporary
-from viewsphere.assets.glb import Looking, Placed, scene_glb_bytes
+from viewsphere.assets.exporting.glb import Looking, Placed, scene_glb_bytes
 from viewsphere.files import read_bytes, read_text
 from viewsphere.formats import Remark, Scope
 from viewsphere.formats._cameras import opengl_pose

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.appearance.repaint import repainted
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture, Wrap
-from viewsphere.assets.repaint import repainted
 from viewsphere.assets.srgb import linear
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint

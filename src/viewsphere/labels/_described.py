@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.looks import words
+from viewsphere.assets.appearance.looks import words
 from viewsphere.geometry.box import Bounds
 from viewsphere.labels._placement import ModelFacts
 from viewsphere.labels._sight import Sight

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.exported import read_exported
+from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError, UserError
 from viewsphere.model.sample import Sample, Taken

@@ -13,7 +13,7 @@ from textwrap import shorten
 
 from viewsphere.assets.cache import frame_of, read_ahead
 from viewsphere.assets.deforming import DeformingMesh
-from viewsphere.assets.export import export_deforming, export_glb, export_obj
+from viewsphere.assets.exporting.export import export_deforming, export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes

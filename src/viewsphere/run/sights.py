@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.exported import read_exported
+from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.labels import Needs, Placement, Sight, labels

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewsphere import plugins
+from viewsphere.assets.appearance.looks import looks_of
+from viewsphere.assets.appearance.opaque import Stamp
+from viewsphere.assets.appearance.repaint import repaint_stamps
 from viewsphere.assets.cache import frame_of, load, read_ahead
-from viewsphere.assets.looks import looks_of
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.opaque import Stamp
+from viewsphere.assets.metadata.traits import traits_of, with_body_parts
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts
-from viewsphere.assets.repaint import repaint_stamps
-from viewsphere.assets.traits import traits_of, with_body_parts
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
-from viewsphere.assets.glb import material_names
+from viewsphere.assets.exporting.glb import material_names
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.stages import model_files

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from viewsphere.assets.inside import split_source
+from viewsphere.assets.paths.inside import split_source
 from viewsphere.errors import RecipeError
 from viewsphere.model.credit import Credit
 from viewsphere.model.mistakes import report, shown

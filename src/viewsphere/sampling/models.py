@@ -15,8 +15,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Literal
 
-from viewsphere.assets.inside import split_source
 from viewsphere.assets.load import BLENDER_SUFFIXES, UP, check_source, needs_blender
+from viewsphere.assets.paths.inside import split_source
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.limits import limits

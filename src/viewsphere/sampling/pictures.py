@@ -11,8 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from viewsphere.assets.folder import UnreadableError
-from viewsphere.assets.sphere import read_head
+from viewsphere.assets.paths.folder import UnreadableError
 from viewsphere.errors import RecipeError
 from viewsphere.files import open_file
 from viewsphere.limits import limits
@@ -22,6 +21,7 @@ from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.light import SKY_SUFFIXES
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.rendering.sky.environment_head import read_head
 from viewsphere.sampling.entries_walked import named
 
 if TYPE_CHECKING:

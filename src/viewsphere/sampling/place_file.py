@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.cache import kept, load
-from viewsphere.assets.inside import split_source
-from viewsphere.assets.marks import FLOOR, INDOORS, LANE, SURFACE, Mark, kind_of, naturally, own_name
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.paths.inside import split_source
 from viewsphere.assets.primitive import FileFacts
+from viewsphere.assets.scene_annotations import FLOOR, INDOORS, LANE, SURFACE, Mark, kind_of, naturally, own_name
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.hull import convex_hull, smallest_rectangle

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from viewsphere import plugins
+from viewsphere.assets.metadata.traits import said_of
 from viewsphere.assets.timeline import Timeline
-from viewsphere.assets.traits import said_of
 from viewsphere.errors import RecipeError, each
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec

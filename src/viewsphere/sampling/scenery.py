@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewsphere import plugins
-from viewsphere.assets.inside import split_source
+from viewsphere.assets.paths.inside import split_source
 from viewsphere.errors import ModelError, RecipeError, UserError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import compose, transform

@@ -441,7 +441,7 @@ class Dataset(Shown, Sequence[Sample]):
         """A finished model, or a time step of one, with its materials, in object axes: as its GLB has it. Raises StoreError for
         one that is not there.
         """
-        from viewsphere.assets.exported import read_exported
+        from viewsphere.assets.exporting.exported import read_exported
 
         info = self._info(key)
         if info is None:

@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.appearance.repaint import textured
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.repaint import textured
 from viewsphere.geometry.rotation import compose, inverse, product, rigid, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.exposure import Sweep, beyond

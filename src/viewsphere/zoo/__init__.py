@@ -59,7 +59,7 @@ def build(family: str, rng: np.random.Generator) -> Mesh:
     made = _built(family, rng)
     if not clips_of(family):
         return made
-    from viewsphere.assets.glb import rigged_glb_bytes
+    from viewsphere.assets.exporting.glb import rigged_glb_bytes
     from viewsphere.assets.load import load_model
     from viewsphere.assets.normalise import normalise
     from viewsphere.model.model_spec import ModelSpec
@@ -123,7 +123,7 @@ def file_of(spec: ModelSpec) -> Path | None:
     if os.access(file, os.R_OK):  # `is_file` fails in a folder that cannot be read
         note_use(file)
     elif file not in spare:
-        from viewsphere.assets.glb import rigged_glb_bytes
+        from viewsphere.assets.exporting.glb import rigged_glb_bytes
 
         data = rigged_glb_bytes(_built(family, np.random.default_rng(spec.seed)))
         try:

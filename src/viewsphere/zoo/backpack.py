@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.part_points import At, sided
+from viewsphere.assets.metadata.part_points import At, sided
 from viewsphere.zoo.sewing.carrying import back, handle, pockets, sides, straps
 from viewsphere.zoo.sewing.closings import CLOSINGS
 from viewsphere.zoo.sewing.cloth import coats, main_bag

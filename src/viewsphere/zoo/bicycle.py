@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.part_points import At, sided
+from viewsphere.assets.metadata.part_points import At, sided
 from viewsphere.zoo.cycle import brakes, fittings, luggage
 from viewsphere.zoo.cycle.coats import Coats, coats
 from viewsphere.zoo.cycle.cockpit import clamp, cockpit_pieces

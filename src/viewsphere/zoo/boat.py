@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.part_points import At, sided
+from viewsphere.assets.metadata.part_points import At, sided
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.shapes.solids import moved

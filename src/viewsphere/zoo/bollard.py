@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.part_points import At
+from viewsphere.assets.metadata.part_points import At
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, linear, metal
 from viewsphere.zoo.shapes.rods import ring_of

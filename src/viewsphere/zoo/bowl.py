@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Image, Material, Mesh
-from viewsphere.assets.part_points import At
+from viewsphere.assets.metadata.part_points import At
 from viewsphere.zoo.household import charts, dishes, food
 from viewsphere.zoo.household.canvas import blank
 from viewsphere.zoo.household.draws import chance, pick, seed, uniform

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.part_points import sided
+from viewsphere.assets.metadata.part_points import sided
 from viewsphere.zoo.furnishing.carcass import BOARD, Carcass, Column, carcass, fronts
 from viewsphere.zoo.furnishing.casework import Leg, Pull, block, four
 from viewsphere.zoo.furnishing.coats import BLACK_STEEL, WHITE_STEEL, Timber, Wood, drawn_wood, furnished, grain

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.part_points import At, sided
+from viewsphere.assets.metadata.part_points import At, sided
 from viewsphere.zoo.coachwork import fittings, lights, structure
 from viewsphere.zoo.coachwork.coats import Coats, coats
 from viewsphere.zoo.coachwork.lights import Grille, Lamps

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.part_points import sided
+from viewsphere.assets.metadata.part_points import sided
 from viewsphere.zoo.joinery import armchair, dining, folding, office, stool, windsor
 from viewsphere.zoo.joinery.armchair import Armchair
 from viewsphere.zoo.joinery.dining import Dining

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.part_points import At, sided
+from viewsphere.assets.metadata.part_points import At, sided
 from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.townscape import building
 from viewsphere.zoo.townscape.masonry import Bars

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.part_points import At
+from viewsphere.assets.metadata.part_points import At
 from viewsphere.zoo.furnishing.casework import block, footed
 from viewsphere.zoo.furnishing.coats import BLACK_STEEL, WHITE_STEEL, Timber, Wood, drawn_wood, furnished, grain
 from viewsphere.zoo.joinery.coats import BRASS, CHROME, drawn_color

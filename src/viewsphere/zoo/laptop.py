@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.part_points import At, sided
+from viewsphere.assets.metadata.part_points import At, sided
 from viewsphere.zoo.household import charts, screens
 from viewsphere.zoo.household.draws import chance, pick, seed, uniform
 from viewsphere.zoo.household.slabs import keys, slab, upright

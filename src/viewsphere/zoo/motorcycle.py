@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.part_points import At, sided
+from viewsphere.assets.metadata.part_points import At, sided
 from viewsphere.zoo.motorbike.bodywork import body_pieces
 from viewsphere.zoo.motorbike.design import Engine, Motorcycle, Style, coats
 from viewsphere.zoo.motorbike.engine import engine_pieces, frame_pieces, middle

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Image, Material, Mesh
-from viewsphere.assets.part_points import At
+from viewsphere.assets.metadata.part_points import At
 from viewsphere.zoo.household import charts, vessels
 from viewsphere.zoo.household.canvas import blank, ellipse, heart
 from viewsphere.zoo.household.patterns import PATTERNS

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewsphere.assets.rigged import RiggedModel
+from viewsphere.assets.exporting.rigged import RiggedModel
 from viewsphere.zoo.people import makehuman
 from viewsphere.zoo.people.actions import Manner, clips, still
 from viewsphere.zoo.people.build import Build

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.part_points import sided
+from viewsphere.assets.metadata.part_points import sided
 from viewsphere.zoo.furnishing.casework import block
 from viewsphere.zoo.furnishing.coats import DYES
 from viewsphere.zoo.joinery.coats import CHROME, STEEL, drawn_color

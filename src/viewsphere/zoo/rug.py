@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh, Texture
-from viewsphere.assets.part_points import sided
+from viewsphere.assets.metadata.part_points import sided
 from viewsphere.zoo.furnishing.carpets import Colors, Design, carpet
 from viewsphere.zoo.joinery.members import hoop
 from viewsphere.zoo.shapes.assembly import Piece, assemble

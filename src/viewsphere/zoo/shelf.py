@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.part_points import sided
+from viewsphere.assets.metadata.part_points import sided
 from viewsphere.zoo.furnishing.casework import block, footed
 from viewsphere.zoo.furnishing.coats import BLACK_STEEL, WHITE_STEEL, Timber, Wood, drawn_wood, furnished, grain
 from viewsphere.zoo.furnishing.stock import books, box, vase

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.part_points import sided
+from viewsphere.assets.metadata.part_points import sided
 from viewsphere.zoo.furnishing.casework import Leg, block, leg
 from viewsphere.zoo.furnishing.coats import Cloth, Wood, drawn_cloth, drawn_wood, furnished, grain, weave
 from viewsphere.zoo.furnishing.softs import cushion, draped, padded, pillow, tufted, upright

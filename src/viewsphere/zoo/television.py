@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh, Texture
-from viewsphere.assets.part_points import sided
+from viewsphere.assets.metadata.part_points import sided
 from viewsphere.zoo.furnishing.broadcasts import Show, broadcast
 from viewsphere.zoo.furnishing.carcass import Carcass, Column, carcass, fronts
 from viewsphere.zoo.furnishing.casework import block, footed, four

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.part_points import At, sided
+from viewsphere.assets.metadata.part_points import At, sided
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, lamp, linear
 from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, loft, moved, rounded_box, superellipse, turned

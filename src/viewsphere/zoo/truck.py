@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.part_points import At, sided
+from viewsphere.assets.metadata.part_points import At, sided
 from viewsphere.zoo.coachwork.cargo import Skin, cargo_pieces
 from viewsphere.zoo.coachwork.coats import coats
 from viewsphere.zoo.coachwork.lorry import Frame, cab_pieces, chassis_pieces

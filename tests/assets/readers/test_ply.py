@@ -11,9 +11,9 @@ from PIL import Image
 
 from ply_files import FORMATS, ply
 from polygons import triangle_areas
-from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.load import load_model
-from viewsphere.assets.readers.ply_data import Lists, read_elements
+from viewsphere.assets.paths.folder import ModelFolder
+from viewsphere.assets.readers.ply.data import Lists, read_elements
 from viewsphere.assets.srgb import linear
 from viewsphere.errors import ModelError
 

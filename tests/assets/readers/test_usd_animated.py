@@ -2,7 +2,7 @@
 
 import pytest
 
-from viewsphere.assets.isolated import READ_HERE
+from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.assets.timeline import Blenders, animation_of
 from viewsphere.errors import ModelError
 

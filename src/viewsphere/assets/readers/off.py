@@ -8,11 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import FileFacts, Float, Int, assemble
-from viewsphere.assets.readers.numbers import numbers_in
-from viewsphere.assets.readers.polygon_pieces import Polygons, brightest_of, linear_colors, pieces_of, upright, with_alpha
+from viewsphere.assets.readers.shared.numbers import numbers_in
+from viewsphere.assets.readers.shared.polygon_pieces import (
+    Polygons,
+    brightest_of,
+    linear_colors,
+    pieces_of,
+    upright,
+    with_alpha,
+)
 
 PREFIXES = ("ST", "C", "N", "4", "n")
 HEADER = re.compile(rb"\s*(ST)?(C)?(N)?(4)?(n)?(?:OFF|off)(?![A-Za-z])")

@@ -7,11 +7,11 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.coordinates import check_coordinates
-from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
-from viewsphere.assets.smoothing import creased
+from viewsphere.assets.readers.shared.coordinates import check_coordinates
+from viewsphere.assets.readers.shared.smoothing import creased
 from viewsphere.assets.srgb import linear
 
 HEADER = 84

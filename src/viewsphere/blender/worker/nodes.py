@@ -1,4 +1,4 @@
-"""Node trees of materials as plain expressions, which `viewsphere.assets.nodes` works out.
+"""Node trees of materials as plain expressions, which `viewsphere.assets.readers.blender.nodes` works out.
 
 An expression is a number, a list of three or four (linear colours), or a dict `{"do": name, ...}` of other expressions. Parts
 of a tree that no expression can say are listed by name in `lost`.

@@ -1,4 +1,4 @@
-"""Reads model files through Blender into plain arrays and expressions, for `viewsphere.assets.via_blender`.
+"""Reads model files through Blender into plain arrays and expressions, for `viewsphere.assets.readers.blender.reading`.
 
 A frame is evaluated by rendering it with a render engine that paints nothing and only collects the evaluated objects: so
 modifiers, particles and visibility have their settings for renders, not those for the viewport.

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.appearance.repaint import repainted
 from viewsphere.assets.mesh import Image, Material, Mesh
-from viewsphere.assets.repaint import repainted
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.options import AnyOptions
 from viewsphere.engines._blender.texels import Kind, Levels

@@ -19,8 +19,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.appearance.repaint import repainted
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.repaint import repainted
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.appearance.repaint import repainted
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.repaint import repainted
 from viewsphere.engines.raster.bundles import BundlePacker
 from viewsphere.engines.raster.kernels_rows import place_rows
 from viewsphere.engines.raster.material_rows import material_row

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.wetting import FILM
+from viewsphere.assets.appearance.wetting import FILM
 from viewsphere.engines.raster import kernels_paint, kernels_split
 from viewsphere.engines.raster.mirroring import blurred, looked_at, lying, mirrored
 from viewsphere.engines.raster.painting import Baked, view_of

@@ -12,10 +12,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from viewsphere.assets.appearance.opaque import Stamp, opaque_picture, stamp_of
+from viewsphere.assets.appearance.pbr import made_of, pictures_of
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.assets.opaque import Stamp, opaque_picture, stamp_of
 from viewsphere.assets.srgb import linear
-from viewsphere.assets.substance import made_of, pictures_of
 from viewsphere.model.scene import Ground
 
 SLABS = 2

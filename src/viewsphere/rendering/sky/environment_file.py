@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.folder import UnreadableError
-from viewsphere.assets.sphere import EXPECTED, ExrHead, HdrHead, check_shape, openexr, read_head, silenced
+from viewsphere.assets.paths.folder import UnreadableError
 from viewsphere.errors import RecipeError
 from viewsphere.files import check_file, open_file, read_bytes
+from viewsphere.rendering.sky.environment_head import EXPECTED, ExrHead, HdrHead, check_shape, openexr, read_head, silenced
 from viewsphere.rendering.sky.kernels_rgbe import decode_rows
 
 Float32 = NDArray[np.float32]

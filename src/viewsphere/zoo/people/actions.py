@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from viewsphere.assets.rigged import Clip, Pose
+from viewsphere.assets.exporting.rigged import Clip, Pose
 from viewsphere.geometry.rotation import product
 from viewsphere.zoo.people.skeleton import JOINTS, Skeleton
 from viewsphere.zoo.shapes.solids import Float

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.readers.usd.layers import opened
 from viewsphere.assets.readers.usd.library import Usd, UsdGeom, UsdSkel
 

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.readers.usd.library import Ar, Sdf, Tf, Usd
 from viewsphere.errors import ModelError
 from viewsphere.limits import limits

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from viewsphere.assets.folder import ModelFolder
-from viewsphere.assets.gltf.specular_glossiness import SpecularGlossiness, as_metallic_roughness
 from viewsphere.assets.mesh import HIGHEST_IOR, Material, Texture
+from viewsphere.assets.paths.folder import ModelFolder
+from viewsphere.assets.readers.gltf.specular_glossiness import SpecularGlossiness, as_metallic_roughness
 from viewsphere.assets.readers.usd.library import UsdShade
 from viewsphere.assets.readers.usd.texture import Baker, Sampled, network_texture, producer
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.coordinates import check_coordinates
-from viewsphere.assets.folder import ModelFolder
-from viewsphere.assets.polygon_proof import cut_polygons
+from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
+from viewsphere.assets.readers.shared.coordinates import check_coordinates
+from viewsphere.assets.readers.shared.polygon_proof import cut_polygons
 from viewsphere.assets.readers.usd.library import UsdGeom
 from viewsphere.assets.readers.usd.shapes import polygons_of
 from viewsphere.assets.skin import strongest

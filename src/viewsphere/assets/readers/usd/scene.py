@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.named_points import NamedPoint, named_points
+from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
+from viewsphere.assets.readers.shared.named_points import NamedPoint, named_points
+from viewsphere.assets.readers.shared.smoothing import creased
+from viewsphere.assets.readers.shared.transform import moved
 from viewsphere.assets.readers.usd.layers import opened
 from viewsphere.assets.readers.usd.library import Usd, UsdGeom
 from viewsphere.assets.readers.usd.material import UsdMaterials
 from viewsphere.assets.readers.usd.mesh import Influences, by_material, pieces_of, read_shape
 from viewsphere.assets.readers.usd.skel import skins_of
-from viewsphere.assets.smoothing import creased
-from viewsphere.assets.transform import moved
 
 KEYPOINT = "keypoint:"
 """Begins a prim's display name that is a named point; in prim names, which hold no colons, `keypoint_`."""

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.named_points import NamedPoint
 from viewsphere.assets.primitive import Float
+from viewsphere.assets.readers.shared.named_points import NamedPoint
 from viewsphere.assets.readers.usd.library import Gf, Usd, UsdGeom, UsdSkel
 from viewsphere.assets.readers.usd.mesh import Influences
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Image, Texture, Wrap
+from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import Float
 from viewsphere.assets.readers.usd.layers import asset_bytes
 from viewsphere.assets.readers.usd.library import UsdShade

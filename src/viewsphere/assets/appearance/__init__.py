@@ -1,0 +1,1 @@
+"""What surfaces look like: colour words, physically based materials, coverage, repainting."""

@@ -1,0 +1,1 @@
+"""Facts of a mesh: its surface, symmetries and keypoints."""

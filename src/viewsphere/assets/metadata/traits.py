@@ -1,0 +1,156 @@
+"""What a model says of itself, in the file beside it or in its own; else what is found on its surface, where that is asked."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from viewsphere.assets.cache import ZOO, frame_of, readers_digest
+from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.metadata.spread_points import spread_points
+from viewsphere.assets.metadata.surface import Surface
+from viewsphere.assets.metadata.symmetries import find, lacking
+from viewsphere.assets.paths.inside import split_source
+from viewsphere.assets.primitive import FileFacts
+from viewsphere.assets.skin import grouped
+from viewsphere.caches.arrays import Content
+from viewsphere.caches.entries import kept
+from viewsphere.errors import ModelError, RecipeError
+from viewsphere.geometry.diameter import diameter
+from viewsphere.model.keypoints import Keypoints, Place
+from viewsphere.model.mistakes import nearest, shown
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.symmetries import Symmetries
+from viewsphere.model.thing import TimeStep
+from viewsphere.model.traits import Traits
+from viewsphere.recipe.sidecar import ENDING, Sidecar, read_sidecar
+
+BEYOND = 0.1
+"""Share of its diameter by which a point that a model names may lie outside of its box."""
+
+
+def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | None = None) -> Traits:
+    """What a normalised model says of itself at a time step (None: as it rests), `facts` being its file's.
+
+    Raises ModelError, which names the sidecar and the field, for one that cannot be read, for a symmetry that the surface does
+    not have, and for points far outside of its box.
+    """
+    across = diameter(mesh.corners)
+    path, sidecar = said_of(spec)
+    said = _in_object_axes(sidecar, facts)
+    color, material = spec.color or said.color, spec.material or said.material
+    if spec.parts is not None:
+        return Traits(across, color=color, material=material)
+    if step is not None and step.frame != frame_of(spec, None):
+        return Traits(across, keypoints=_own(mesh, across, facts), color=color, material=material)
+    if said.symmetries is not None and (problem := next(lacking(Surface.of(mesh), said.symmetries), None)):
+        raise ModelError(f"{path}: {problem}")
+    if said.keypoints is not None and (problem := next(far_points(mesh, across, said.keypoints), None)):
+        raise ModelError(f"{path}: keypoints.{problem}")
+    symmetries = said.symmetries
+    if symmetries is None and spec.symmetries == "found":
+        symmetries = found_symmetries(mesh)
+    return Traits(
+        across, symmetries, said.keypoints or _own(mesh, across, facts) or _spread(spec, mesh), color=color, material=material
+    )
+
+
+def with_body_parts(mesh: Mesh, spec: ModelSpec) -> Mesh:
+    """The mesh with those parts of its body that its sidecar names. Raises ModelError for bones that its skin does not have."""
+    path, sidecar = said_of(spec)
+    parts = sidecar.body_parts
+    if parts is None:
+        return mesh
+    bones = mesh.body_parts
+    for name, own in parts.items():
+        for bone in own:
+            if bone not in bones:
+                found = f"{shown(bone)}{nearest(bone, bones)}" if bones else "a model that has none"
+                raise ModelError(f"{path}: body_parts.{name}: expected bones of the model's skin; found {found}")
+    return grouped(mesh, parts)
+
+
+def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:
+    """A model's sidecar and what it says; an empty one where there is none, and of a part of a file.
+
+    Raises ModelError for one that cannot be read.
+    """
+    path = None if spec.parts is not None else sidecar_of(spec)
+    try:
+        return path, Sidecar() if path is None else read_sidecar(path)
+    except RecipeError as error:
+        raise ModelError(str(error)) from None
+
+
+def sidecar_of(spec: ModelSpec) -> Path | None:
+    """The file that says symmetries, points and parts of a model: that which the recipe names, else the one beside it; None
+    without.
+
+    Raises ModelError for one beside it that is a link out of the folder of a confined model.
+    """
+    if spec.sidecar is not None:
+        return Path(spec.sidecar)
+    file, inside = split_source(Path(spec.source))
+    path = file.with_name(file.name + ENDING)
+    if spec.source.startswith(ZOO) or inside or not path.exists():
+        return None
+    if spec.confined and path.resolve().parent != path.parent.resolve():
+        raise ModelError(
+            f"{path}: expected a file in this folder; found a link to {path.resolve()}: copy it, or say confined: false"
+        )
+    return path
+
+
+def found_symmetries(mesh: Mesh) -> Symmetries:
+    """The symmetries of a mesh's surface; from the cache, where they have been looked for before."""
+    digest = hashlib.sha256(readers_digest().encode())
+    for array in (mesh.vertices, mesh.triangles):
+        digest.update(repr(array.shape).encode() + array.tobytes())
+    return kept(
+        "models",
+        digest.hexdigest(),
+        lambda: find(Surface.of(mesh)),
+        lambda found: Content(found.model_dump(mode="json"), {}),
+        lambda content: Symmetries.model_validate(content.about),
+    )
+
+
+def far_points(mesh: Mesh, across: float, keypoints: Keypoints) -> Iterator[str]:
+    """Points outside of a mesh's box by more than `BEYOND` of its diameter: what is wrong with each."""
+    low, high = mesh.bounds
+    for name, place in keypoints.points.items():
+        off = float(np.maximum(low - place, np.array(place) - high).max())
+        if off > BEYOND * across:
+            where = ", ".join(f"{value:.4g}" for value in place)
+            yield (
+                f"points.{name}: expected a point of the model, at most {BEYOND:.0%} of its diameter ({BEYOND * across:.3g} m) "
+                f"outside of its box; found ({where}) in the object's axes, {off:.3g} m outside: see axes, and the file's unit"
+            )
+
+
+def _in_object_axes(said: Sidecar, facts: FileFacts) -> Sidecar:
+    if said.axes == "object":
+        return said
+    symmetries = said.symmetries and said.symmetries.moved(facts.object_from_file)
+    keypoints = said.keypoints and said.keypoints.moved(facts.object_from_file)
+    return said.model_copy(update={"symmetries": symmetries, "keypoints": keypoints})
+
+
+def _own(mesh: Mesh, across: float, facts: FileFacts) -> Keypoints | None:
+    """The points that the model's file names, but for those far outside of it."""
+    if facts.keypoints is None:
+        return None
+    found = facts.keypoints.moved(facts.object_from_file)
+    far = {line.split(": ", 1)[0].removeprefix("points.") for line in far_points(mesh, across, found)}
+    return found.only(found.points.keys() - far)
+
+
+def _spread(spec: ModelSpec, mesh: Mesh) -> Keypoints | None:
+    if spec.keypoints is None:
+        return None
+    places = spread_points(mesh.corners, spec.keypoints)
+    return Keypoints(points={f"point_{i}": cast("Place", tuple(place)) for i, place in enumerate(places.tolist())})

@@ -1,0 +1,1 @@
+"""Where a model's files lie: its folder, its textures, what a file name hides."""

@@ -1,0 +1,73 @@
+"""Files that are no model at all, or one of another kind, known by their first bytes: pointers, web pages, archives."""
+
+from __future__ import annotations
+
+import re
+
+from viewsphere.assets.paths.finder import PICTURES as PICTURE_ENDINGS
+
+HEAD = 4096
+"""Bytes that are looked at: a server's message or the head of a page fits."""
+
+PAGE = re.compile(rb"(?is)\s*(?:<!--.*?-->\s*)*<(?:!doctype html|html|head|body|script)\b")
+MESSAGE = re.compile(
+    rb"(?is)\s*(?:(?:error:? )?[45]\d\d\b|not found\b|access denied\b|forbidden\b|(?:<\?xml[^>]*>\s*)?<error>"
+    rb"|\{(?!.*\"asset\")[^{]*\"(?:message|error|detail)\"\s*:)"
+)
+"""Replies of servers in place of a file: an HTTP status, a store's XML, or JSON with a message."""
+
+ARCHIVES = {
+    b"PK\x03\x04": "ZIP",
+    b"\x1f\x8b\x08": "gzip",
+    b"7z\xbc\xaf\x27\x1c": "7z",
+    b"Rar!": "RAR",
+    b"\xfd7zXZ": "xz",
+    b"BZh": "bzip2",
+}
+PACKED = {"3mf": "ZIP", "usdz": "ZIP", "usd": "ZIP", "blend": "gzip"}
+"""Kinds of models that are archives themselves."""
+
+MODELS = {
+    b"glTF": ("glb", "gltf"), b"ply\n": ("ply",), b"ply\r": ("ply",), b"Kaydara FBX": ("fbx",), b"BLENDER": ("blend",),
+    b"PXR-USDC": ("usdc", "usd"), b"#usda": ("usda", "usd"), b"Ogawa": ("abc",),
+}  # fmt: skip
+"""Kinds of models by their first bytes, the most usual ending first."""
+
+PICTURES = {b"\x89PNG": "PNG", b"\xff\xd8\xff": "JPEG", b"RIFF": "WebP", b"GIF8": "GIF"}
+
+
+def impostor(data: bytes) -> str | None:
+    """The content of a stand-in for a file, and the remedy: a pointer, or a server's page or message; None for neither."""
+    head = data[:HEAD].removeprefix(b"\xef\xbb\xbf")
+    return _pointer(head) or _from_server(head, len(data))
+
+
+def wrong_kind(data: bytes, suffix: str) -> str | None:
+    """The content of a file that is no model with this suffix, by its first bytes, and the remedy; None if unknown."""
+    kind = next((name for magic, name in ARCHIVES.items() if data.startswith(magic)), None)
+    if kind is not None and PACKED.get(suffix) != kind:
+        return f"a {kind} archive; unpack it and name the file in it"
+    for magic, endings in MODELS.items():
+        if data.startswith(magic) and suffix not in endings:
+            return f"one of another kind; rename the file so that it ends in .{endings[0]}"
+    picture = next((name for magic, name in PICTURES.items() if data.startswith(magic)), None)
+    return None if picture is None or f".{suffix}" in PICTURE_ENDINGS else f"a {picture} picture; name the model's file"
+
+
+def _pointer(head: bytes) -> str | None:
+    if head.startswith(b"version https://git-lfs.github.com/spec/"):
+        size = re.search(rb"(?m)^size (\d+)", head)
+        left = f", whose {int(size[1]):,} bytes are not downloaded" if size else ""
+        return f"a git-lfs pointer to the file{left}; run `git lfs pull` in its repository"
+    if head.lstrip(b"./").startswith((b"annex/objects/", b"git/annex/objects/")):
+        return "a git-annex pointer to the file; run `git annex get` in its repository"
+    return None
+
+
+def _from_server(head: bytes, size: int) -> str | None:
+    if PAGE.match(head):
+        return "a web page (HTML); download the file itself (on GitHub: the button Download raw file)"
+    if size <= HEAD and MESSAGE.match(head):
+        text = " ".join(head.decode(errors="replace").split())[:80]
+        return f"the message of a server ({text!r}); download the file again"
+    return None

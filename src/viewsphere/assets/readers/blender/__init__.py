@@ -1,0 +1,1 @@
+"""Files that Blender reads: FBX, Alembic, .blend and more."""

@@ -1,0 +1,1 @@
+"""PLY, ASCII and binary."""

@@ -1,0 +1,1 @@
+"""What several readers need: polygons, smoothing, numbers, XML."""

@@ -1,0 +1,49 @@
+"""Named points of a model's file, from nodes of a tree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import cast
+
+from viewsphere.assets.paths.folder import ModelFolder
+from viewsphere.assets.primitive import Float
+from viewsphere.model.keypoints import MOST_POINTS, Keypoints, Place, is_name, left_and_right
+from viewsphere.model.numbers import LARGEST
+
+
+@dataclass(frozen=True, eq=False)
+class NamedPoint:
+    """A node that is a point: what it is called, where it is (3,), and the number of the next such node above it."""
+
+    name: str
+    place: Float
+    above: int | None
+
+
+def named_points(folder: ModelFolder, nodes: Mapping[int, NamedPoint]) -> Keypoints | None:
+    """The points of nodes, by numbers, in their order, with a line to each from the one above, and left and right as the names
+    say; None without any. Names that no point may have, or that are there twice, become others; a file of more points than a
+    model may have gets a warning.
+    """
+    if len(nodes) > MOST_POINTS:
+        folder.warn(f"{len(nodes):,} named points: expected at most {MOST_POINTS:,}, none is kept")
+        return None
+    names, points = dict[int, str](), dict[str, Place]()
+    for i, node in nodes.items():
+        if abs(node.place).max() < LARGEST:
+            names[i] = _free(node.name.strip()[:90], i, points)
+            points[names[i]] = cast("Place", tuple(node.place.tolist()))
+    lines = ((nodes[i].above, name) for i, name in names.items())
+    skeleton = tuple((names[above], name) for above, name in lines if above in names)
+    return Keypoints(points=points, skeleton=skeleton, flips=left_and_right(points)) if points else None
+
+
+def _free(said: str, number: int, taken: Mapping[str, Place]) -> str:
+    """The name, or the first of name_2, name_3, ... that is free."""
+    name = said if is_name(said) else f"node{number}"
+    found, k = name, 1
+    while found in taken:
+        k += 1
+        found = f"{name}_{k}"
+    return found

@@ -1,0 +1,1 @@
+"""Model files are read in a process of their own, with limits."""
