@@ -13,7 +13,7 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from enum import Enum
 from functools import partial
 from pathlib import Path
@@ -40,7 +40,7 @@ from viewsphere.labels import (
 from viewsphere.limits import table
 from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.recipe.file import schema
-from viewsphere.run.listing import listed
+from viewsphere.run.listing import Listed, listed
 
 DOCS = Path(__file__).parent.parent / "docs"
 NOTE = "<!-- written by scripts/docs; do not edit -->\n\n"
@@ -270,48 +270,116 @@ def limits_page() -> str:
 
 FORMAT_LIST = """# All formats
 
-`viewsphere formats` lists them, too. Each is one file in `src/viewsphere/formats/`. Labels that a format needs and a data set
-does not keep are computed by `viewsphere export` from its shots and models; passes, such as `rgb`, have to be kept. `viewsphere
-check` proves every export: each file is what would be written now. The column *read by* names programs that a format is made
-for. The one beside it says what read written trees back in tests, what was compared with the data set's own labels, and the
-largest difference; *own reader* and *second reader* are small ones written from the format's documentation, the second by
-somebody who had not seen the writer.
+This page helps you choose a format and shows how exactly programs read it back. `viewsphere formats` prints the same list.
 
-| format | holds | needs | read by | compared in tests: largest difference | test |
-|---|---|---|---|---|---|
+- `viewsphere export` computes labels that a format needs and your data set lacks. Passes, such as `rgb`, have to be in the data
+  set.
+- *Reader* is a program that reads the written files in the tests, with its version. *Own reader* is a small one that follows
+  the format's documentation; the author of a *second reader* had not seen the writer.
+- *Worst error* is the largest difference from the data set's own labels, for each unit. A number without a unit is a share or a
+  count. *Rounding* is below 1e-9 in every unit. A larger error comes from the digits or the contents that a format has.
+- *Evidence* below each format has all comparisons. Empty cells: the tests of this format record no figures.
+
+| format | description | holds | reader | worst error |
+|---|---|---|---|---|
 """
+NAMED = {"PIL": "Pillow", "cv2.FileStorage": "OpenCV", "NumPy": "numpy"}
+"""Programs that tests call by several names."""
+UNITS = ("m", "cm", "mm", "px", "deg", "rad", "m/s", "s", "cells", "diagonals", "")
+"""In the order of a cell; others have no unit."""
+ROUNDING = 1e-9
+"""Differences of float64 arithmetic are below it, those of text with few digits above: see docs/formats.json."""
 
 
 def formats_page() -> str:
-    """Each format with what reads it and how far it agrees, then the page of each that formats.md does not describe."""
+    """A table of all formats, then a section for each: its description, its options, and what tests compared."""
     proofs = json.loads((DOCS / "formats.json").read_text("utf-8"))
     described = set(re.findall(r"^## (\w+)$", (DOCS / "formats.md").read_text("utf-8"), re.MULTILINE))
+    versioned = {reader_of(proof)[0] for found in proofs.values() for proof in found if "version" in proof} - {"tests"}
+    packages = {program(reader) for reader in versioned if ", " not in reader}
     text = NOTE + FORMAT_LIST
     for one in listed():
         found = proofs.get(one.name, [])
-        compared = "<br>".join(by_reader(found))
-        tests = "<br>".join(dict.fromkeys(f"`{proof['test'].removeprefix('tests/')}`" for proof in found))
-        link = f"[`{one.name}`](formats.md#{one.name})" if one.name in described else f"[`{one.name}`](#{one.name})"
-        needs = ", ".join(f"`{name}`" for name in one.needs)
-        text += f"| {link} | {', '.join(one.holds)} | {needs} | {', '.join(one.read_by)} | {compared} | {tests} |\n"
-    for one in listed():
-        if one.name not in described:
-            text += f"\n## {one.name}\n\n{as_page(inspect.getdoc(plugins.load('formats', one.name)) or '')}\n"
-            if one.options:
-                text += options_table("formats", one.name)
-    return text
+        read = ", ".join(readers(found, packages, one.read_by)) or "own reader" * bool(found)
+        text += (
+            f"| [`{one.name}`](#{one.name}) | {sentence(one.summary)} | {', '.join(one.holds)} | {read} | {worst(found)} |\n"
+        )
+    return text + "".join(format_section(one, proofs.get(one.name, []), one.name in described) for one in listed())
 
 
-def by_reader(proofs: list[dict[str, Any]]) -> Iterator[str]:
-    """A line for each reader: what was compared by it, with the largest difference; what differs by nothing is equal."""
-    read: dict[str, dict[str, str]] = {}
-    for proof in proofs:
-        reader, is_named, what = proof["against"].partition(": ")
-        by = f"{reader} {proof['version']}" if "version" in proof else reader
-        read.setdefault(by if is_named else "tests", {})[what or reader] = error_of(proof) if proof["error"] else "equal"
-    for reader, errors in read.items():
-        same = {error: ", ".join(what for what in errors if errors[what] == error) for error in errors.values()}
-        yield f"*{reader}*: {'; '.join(f'{what} {error}' for error, what in same.items())}"
+def format_section(one: Listed, found: list[dict[str, Any]], is_described: bool) -> str:
+    """The description of a format, or a link to it, and its folded evidence."""
+    text = f"\n## {one.name}\n\n"
+    if one.needs:
+        text += f"Needs {', '.join(f'`{name}`' for name in one.needs)}. "
+    if one.read_by:
+        text += f"Written for {', '.join(one.read_by)}."
+    text = f"{text.rstrip()}\n\n"
+    if is_described:
+        text += f"{sentence(one.summary)} [Files and options](formats.md#{one.name}).\n"
+    else:
+        text += f"{as_page(inspect.getdoc(plugins.load('formats', one.name)) or '')}\n"
+        text += options_table("formats", one.name) if one.options else ""
+    return text + (evidence(found) if found else "")
+
+
+def evidence(found: list[dict[str, Any]]) -> str:
+    """A folded list of all comparisons, those of one reader in one item."""
+    read: dict[str, dict[str, list[str]]] = {}
+    for proof in found:
+        reader, what = reader_of(proof)
+        by = f"{reader} {proof.get('version', '')}".rstrip()
+        error = error_of(proof) if proof["error"] else "equal"
+        read.setdefault(by, {}).setdefault(error, []).append(what)
+    text = '\n<details markdown="1"><summary>Evidence</summary>\n\n'
+    for by, errors in read.items():
+        parts = (f"{', '.join(dict.fromkeys(what))} {error}" for error, what in errors.items())
+        text += f"- *{by}*: {'; '.join(parts)}\n"
+    tests = dict.fromkeys(proof["test"].removeprefix("tests/") for proof in found)
+    return f"{text}\nTests: {', '.join(f'`{test}`' for test in tests)}.\n\n</details>\n"
+
+
+def reader_of(proof: dict[str, Any]) -> tuple[str, str]:
+    """What read an export in a test, and what of it was compared."""
+    reader, is_named, what = proof["against"].partition(": ")
+    return (reader, what) if is_named else ("tests", reader)
+
+
+def readers(found: list[dict[str, Any]], packages: Collection[str], read_by: Collection[str]) -> list[str]:
+    """The programs among the readers, each once, with the version where it is installed as a package."""
+    read: dict[str, str] = {}
+    for proof in found:
+        parts = reader_of(proof)[0].split(", ")
+        for name in map(program, parts):
+            if name in packages and "version" in proof:
+                read[name] = proof["version"]
+            elif len(parts) == 1 and name in read_by:  # elsewhere a layout's name, beside the program that reads it
+                read.setdefault(name, "")
+    return [f"{name} {version}".rstrip() for name, version in sorted(read.items(), key=lambda one: one[0].lower())]
+
+
+def program(reader: str) -> str:
+    """The name of a program without the part of it that reads."""
+    name = reader.partition(" ")[0]
+    return NAMED.get(name, name)
+
+
+def worst(found: list[dict[str, Any]]) -> str:
+    """The largest difference in each unit; empty where nothing was compared."""
+    largest: dict[str, float] = {}
+    for proof in found:
+        unit = {"degrees": "deg"}.get(proof["unit"], proof["unit"])
+        unit = unit if unit in UNITS else ""
+        largest[unit] = max(largest.get(unit, 0.0), proof["error"])
+    visible = [f"{largest[unit]:.2g} {unit}".rstrip() for unit in UNITS if largest.get(unit, 0.0) >= ROUNDING]
+    return ", ".join(visible) or ("rounding" if any(largest.values()) else "equal") * bool(found)
+
+
+def sentence(summary: str) -> str:
+    """A summary without addresses in brackets, and without what follows a semicolon, or a colon behind more than a name."""
+    first = re.sub(r" \(https?:[^)]*\)", "", summary).partition("; ")[0]
+    short, _, _ = first.partition(": ")
+    return (short if len(short.split()) > 2 else first).rstrip(".") + "."
 
 
 def as_page(told: str) -> str:

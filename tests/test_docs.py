@@ -13,6 +13,7 @@ from built_once import built_once
 from command_line import viewsphere
 from deadline import DEADLINE
 from small import ROOT
+from viewsphere import plugins
 
 README = (ROOT / "README.md").read_text("utf-8")
 
@@ -80,3 +81,16 @@ def test_every_release_has_a_line_in_the_history():
     released = re.findall(r"^## (\d+\.\d+\.\d+)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
     assert released
     assert set(released) <= set(measured)
+
+
+def test_the_table_of_formats_is_short_and_their_evidence_is_folded_below():
+    page = (ROOT / "docs" / "format-list.md").read_text("utf-8")
+    proofs = json.loads((ROOT / "docs" / "formats.json").read_text("utf-8"))
+    rows = re.findall(r"^\| \[`(\w+)`\]\(#\1\) (\|.*)\|$", page, re.MULTILINE)
+    assert tuple(name for name, _ in rows) == plugins.names("formats")
+    assert max(len(cell) for _, cells in rows for cell in cells.split("|")) < 200
+    sections = dict(zip(*[iter(re.split(r"^## (\w+)$", page, flags=re.MULTILINE)[1:])] * 2, strict=True))
+    for name, _ in rows:
+        assert ("<details" in sections[name]) == (name in proofs)
+        _, _, folded = sections[name].partition("<details")
+        assert [proof["test"] for proof in proofs.get(name, []) if proof["test"].removeprefix("tests/") not in folded] == []
