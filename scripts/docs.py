@@ -39,6 +39,8 @@ from viewsphere.labels import (
 )
 from viewsphere.limits import table
 from viewsphere.model.channel import PASSES, PICTURES
+from viewsphere.plugins.format import FormatSpec
+from viewsphere.plugins.overview import SPECS
 from viewsphere.recipe.file import schema
 from viewsphere.run.listing import Listed, listed
 
@@ -66,7 +68,7 @@ def cli_page() -> str:
 
 def format_options() -> str:
     """All options of all formats, as `--format-option` sets them."""
-    told = {name: getattr(plugins.load("formats", name), "Options", None) for name in plugins.names("formats")}
+    told = {name: spec.options for name, spec in plugins.loadable(FormatSpec).items()}
     fields = {f"{name}.{field}": spec for name, kind in told.items() if kind for field, spec in properties(kind).items()}
     return fields_table({"": {"properties": fields}}, ["="])
 
@@ -208,10 +210,31 @@ def options_page(plugin: plugins.Kind, page: str) -> str:
 
 def options_table(plugin: plugins.Kind, kind: str) -> str:
     """The options of a plug-in, and of what it has lists of."""
-    told = plugins.load(plugin, kind).Options.model_json_schema()
+    spec = {spec.KIND: spec for spec in SPECS}.get(plugin)
+    made: Any = plugins.load(spec, kind) if spec else plugins.load(plugin, kind)
+    told = (made.options if spec else made.Options).model_json_schema()
     parts = {name: part for name, part in told.get("$defs", {}).items() if name not in ("Distribution", "Gaussian")}
     text = fields_table({kind: told}, [kind])
     return text + "".join(f"\nEach {name.lower()}:\n{fields_table(parts, [name])}" for name in parts)
+
+
+PLUGINS = """# Specs of plug-ins
+
+[Extending viewsphere](extending.md) shows a plug-in of each kind. This page lists the fields of the specs.
+A plug-in is one module, named by an entry point of its group, that holds its spec under the name below.
+"""
+
+
+def plugins_page() -> str:
+    """The fields of all specs."""
+    text = NOTE + PLUGINS
+    for spec in SPECS:
+        text += f"\n## {spec.__name__}\n\n{inspect.getdoc(spec)}\n\n"
+        text += f"Entry points `viewsphere.{spec.KIND}`; the module holds `{plugins.SEAMS[spec.KIND].constant}`.\n"
+        text += "\n| field | default | meaning |\n|---|---|---|\n"
+        for name, field in spec.model_fields.items():
+            text += f"| `{name}` | {'needed' if field.is_required() else value(field.default)} | {field.description} |\n"
+    return text
 
 
 FIELDS = re.compile(r"(<!-- fields of (.+?), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
@@ -241,7 +264,7 @@ def fields_table(entries: dict[str, Any], named: list[str]) -> str:
 
 def value(default: Any) -> str:
     """A default as a recipe would write it; empty without a default."""
-    if isinstance(default, list):
+    if isinstance(default, (list, tuple)):
         return f"[{', '.join(map(value, default))}]"
     if isinstance(default, str):
         return f"`{default}`"
@@ -318,7 +341,7 @@ def format_section(one: Listed, found: list[dict[str, Any]], is_described: bool)
     if is_described:
         text += f"{sentence(one.summary)} [Files and options](formats.md#{one.name}).\n"
     else:
-        text += f"{as_page(inspect.getdoc(plugins.load('formats', one.name)) or '')}\n"
+        text += f"{as_page(inspect.cleandoc(plugins.load(FormatSpec, one.name).about or ''))}\n"
         text += options_table("formats", one.name) if one.options else ""
     return text + (evidence(found) if found else "")
 
@@ -444,6 +467,7 @@ PAGES = {
     "format-list.md": formats_page,
     "cli.md": cli_page,
     "channels.md": channels_page,
+    "plugins.md": plugins_page,
     "proofs.md": proofs_page,
     "formats.md": partial(options_page, "formats", "formats.md"),
     "motion.md": partial(options_page, "motions", "motion.md"),

@@ -24,8 +24,12 @@ from sequence_recipe import eventful_recipe
 from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate, labels, plan, plugins, render
 from viewsphere.check import check
-from viewsphere.errors import RecipeError, UserError
-from viewsphere.run.exporting import export
+from viewsphere.errors import PluginError, RecipeError, UserError
+from viewsphere.formats import coco
+from viewsphere.plugins.format import FormatSpec
+from viewsphere.plugins.overview import overview
+from viewsphere.run.exporting import export, writable_formats
+from viewsphere.run.listing import listed
 from viewsphere.store.sample_records import from_whole_sample, whole_sample
 
 PAGE = Path(__file__).parent.parent / "docs" / "extending.md"
@@ -339,13 +343,61 @@ def test_entry_points_are_read_once_and_again_where_a_package_was_installed(monk
     read = []
     monkeypatch.setattr(metadata, "entry_points", lambda own=metadata.entry_points: read.append(None) or own())
     assert "mine" not in plugins.names("formats")
-    assert plugins.load("formats", "coco").__name__ == "viewsphere.formats.coco"
+    assert plugins.load(FormatSpec, "coco") is coco.FORMAT
     assert len(read) == 1
     folder = tmp_path / "mine-1.0.dist-info"
     folder.mkdir()
     (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
-    (folder / "entry_points.txt").write_text("[viewsphere.formats]\nmine = json\n")
+    (folder / "entry_points.txt").write_text("[viewsphere.formats]\nmine = viewsphere.formats.csv\n")
     os.utime(tmp_path, ns=(2, 2))
     assert "mine" in plugins.names("formats")
-    assert plugins.load("formats", "mine") is json
+    assert plugins.load(FormatSpec, "mine") is plugins.load(FormatSpec, "csv")
     assert len(read) == 2
+
+
+def test_a_broken_package_is_listed_with_its_reason_and_breaks_nothing_else(small_dataset, tmp_path):
+    with installed(tmp_path / "site", "formats", "broken", "import no_such_package") as file:
+        (found,) = (one for one in overview() if one.error is not None)
+        assert (found.kind, found.name) == ("formats", "broken")
+        assert found.distribution.endswith(" 1.0") and found.distribution.startswith("my_package")
+        assert found.error.startswith(f"{file}: ") and "ModuleNotFoundError" in found.error
+        assert "broken" not in writable_formats() and "coco" in writable_formats()
+        assert all(one.name != "broken" for one in listed())
+        export(small_dataset.root, ["csv"])
+        assert check(small_dataset, rays=False, sample=0).ok
+        with pytest.raises(PluginError, match="broken cannot be imported: ModuleNotFoundError"):
+            export(small_dataset.root, ["broken"])
+
+
+def test_viewsphere_plugins_names_distributions_and_failures(tmp_path):
+    site = tmp_path / "site"
+    write_package(site, "my_package", {("formats", "lines"): EXAMPLES["One JSON line a picture"], ("motions", "odd"): "1 / 0"})
+    path = os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")])
+    command = [sys.executable, "-m", "viewsphere", "plugins"]
+    run = subprocess.run(command, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=DEADLINE)
+    assert run.returncode == 0, run.stderr
+    assert "    my_package 1.0: lines\n" in run.stdout
+    assert "    my_package 1.0: odd cannot be loaded: " in run.stdout and "ZeroDivisionError" in run.stdout
+
+
+TYPO = EXAMPLES["One row an object"]
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        (TYPO.replace("channels=", "chanels="), r"FormatSpec\.chanels: 'chanels' is unknown; did you mean 'channels'\?"),
+        (TYPO.replace("verify=", "verfy="), r"FormatSpec\.verfy: 'verfy' is unknown; did you mean 'verify'\?"),
+        (TYPO.replace('("rgb",)', '"rgb"'), r"FormatSpec\.channels: expected a list; found 'rgb'"),
+        (TYPO.replace("FORMAT =", "FORMATS ="), r"expected FORMAT = FormatSpec\(\.\.\.\); found no FORMAT"),
+        (
+            TYPO.replace("(dataset, folder, sampled)", "(dataset, folder)"),
+            r"FormatSpec\.verify: expected a function",
+        ),
+    ],
+)
+def test_a_misspelt_format_is_refused_before_anything_is_rendered(install, code, message, tmp_path):
+    file = install("formats", "csv_boxes", code)
+    with pytest.raises(PluginError, match=f"^{re.escape(str(file))}: {message}"):
+        generate(small_recipe(formats=["csv_boxes"]), tmp_path / "out")
+    assert not list((tmp_path / "out").rglob("*.png"))

@@ -21,6 +21,7 @@ from viewsphere import plugins
 from viewsphere.check import check
 from viewsphere.cli.arguments import load_recipe
 from viewsphere.model.sample import ObjectAnnotation
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.file import read
 
 sys.path.insert(0, str(ROOT / "scripts"))
@@ -221,5 +222,5 @@ def test_every_format_of_table_1_is_there_and_so_is_its_test():
     rows = re.findall(r"^\| .* \| ✓ \[`(\w+)`\]\(([\w.-]+)#\w+\) \| `(\S+)` \|", PAGE, re.MULTILINE)
     assert len(rows) >= 16
     for name, page, test in rows:
-        assert hasattr(plugins.load("formats", name), "writer") and (ROOT / test).is_file()
+        assert plugins.load(FormatSpec, name).writer and (ROOT / test).is_file()
         assert f"\n## {name}\n" in (ROOT / "docs" / page).read_text("utf-8")

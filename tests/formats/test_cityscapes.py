@@ -19,6 +19,7 @@ from viewsphere.formats.cityscapes.classes import COLORS, INSTANCES, LABELS, lab
 from viewsphere.formats.cityscapes.instances import regions
 from viewsphere.model.camera import Distortion
 from viewsphere.model.classes import SemanticClass
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import export, write
 from viewsphere.run.scope import refusals, scope_of
@@ -222,7 +223,7 @@ def apart(scope):
 def test_refusals(stills, options, change, message):
     entry = FormatEntry(name="cityscapes", options=options)
     with pytest.raises(UserError, match=message):
-        raise UserError(*refusals(plugins.load("formats", "cityscapes"), entry, change(scope_of(stills))))
+        raise UserError(*refusals(plugins.load(FormatSpec, "cityscapes"), entry, change(scope_of(stills))))
 
 
 def test_torchvision_reads_it(stills, written):

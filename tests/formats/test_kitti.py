@@ -14,6 +14,7 @@ from PIL import Image
 from proven import close, equal, told
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.store import Choice
@@ -274,7 +275,7 @@ def test_tracking_is_proved(drives, written):
     from viewsphere.formats.kitti import Options
 
     folder = written("drives", "tracking")
-    verify = plugins.load("formats", "kitti").verify
+    verify = plugins.load(FormatSpec, "kitti").verify
     assert list(verify(drives, folder, range(len(drives)), Options(task="tracking"))) == []
     file = folder / "training/label_02/0001.txt"
     kept = file.read_bytes()

@@ -15,6 +15,7 @@ from proven import close, equal
 from viewsphere import Dataset, generate, plugins
 from viewsphere.errors import UserError
 from viewsphere.formats.nuscenes import Options
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exporting import export
 from viewsphere.store import Choice
 
@@ -177,7 +178,7 @@ def test_some_instants_and_sensors(drives, tmp_path):
     export(drives.root, "nuscenes", output=whole)
     tokens = Tables(whole / "nuscenes").by_token["sample_annotation"]
     assert all(row["token"] in tokens for row in tables.rows["sample_annotation"])
-    verify = plugins.load("formats", "nuscenes").verify
+    verify = plugins.load(FormatSpec, "nuscenes").verify
     chosen = Dataset(drives.root, Choice(frames=((20, 30),)))
     assert list(verify(chosen, tmp_path / "nuscenes", range(len(chosen)), Options())) == []
 

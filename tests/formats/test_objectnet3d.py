@@ -11,6 +11,7 @@ from viewpoint_readers import project_3d, project_3d_msid, read, rotation_matrix
 from proven import close, equal
 from viewsphere import Dataset, generate, plugins
 from viewsphere.errors import UserError
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exporting import export
 from worlds import MODELS
 from worlds import poses as poses_recipe
@@ -121,8 +122,8 @@ def test_refusals(tmp_path, stills):
     recipe = poses_recipe(models=[{**MODELS[2], "count": 1, "category": "d'été"}], formats=["objectnet3d"])
     with pytest.raises(UserError, match=r"format objectnet3d: expected names of categories .*; found \"d'été\""):
         generate(recipe, tmp_path / "out", workers=0)
-    module = plugins.load("formats", "objectnet3d")
-    assert module.needs(module.Options()) == ("keypoints",) and module.needs(module.Options(anchors=False)) == ()
+    module = plugins.load(FormatSpec, "objectnet3d")
+    assert module.needs(module.options()) == ("keypoints",) and module.needs(module.options(anchors=False)) == ()
     recipe = poses_recipe(name="split", models=[{**MODELS[2], "count": 1}], splits={"by": "model", "classes": 1.0})
     generate(recipe, tmp_path / "other", workers=0)
     with pytest.raises(UserError, match=r"objectnet3d: expected splits .*; found classes"):

@@ -16,6 +16,7 @@ from viewpoint_readers import project_3d, read, true_pixels
 from proven import close, equal, told
 from viewsphere import Dataset, generate, plugins
 from viewsphere.errors import MissingExtraError, UserError
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exporting import export
 from worlds import MODELS
 from worlds import poses as poses_recipe
@@ -187,8 +188,8 @@ def test_no_date_stands_in_the_bytes(poses, written):
 def test_without_anchors(poses, written):
     for _, _, _, objects, _ in shown(poses, written(poses, anchors=False)):
         assert all(said.anchors.size == 0 and said.viewpoint.num_anchor == 0 for said in objects)
-    module = plugins.load("formats", "pascal3d")
-    assert module.needs(module.Options()) == ("keypoints",) and module.needs(module.Options(anchors=False)) == ()
+    module = plugins.load(FormatSpec, "pascal3d")
+    assert module.needs(module.options()) == ("keypoints",) and module.needs(module.options(anchors=False)) == ()
 
 
 def refused(tmp_path, **changes):
@@ -252,4 +253,4 @@ def test_without_scipy(monkeypatch):
 
     monkeypatch.setattr(builtins, "__import__", none)
     with pytest.raises(MissingExtraError, match=r"pip install 'viewsphere\[mat\]'"):
-        plugins.load("formats", "pascal3d").check()
+        plugins.load(FormatSpec, "pascal3d").check()

@@ -26,6 +26,7 @@ from cube_dataset import LENS, make
 from viewsphere import Dataset, plugins
 from viewsphere.model.camera import Distortion
 from viewsphere.model.instant import Moment
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
@@ -34,10 +35,10 @@ from viewsphere.store.checksums import CHECKSUMS
 
 def _proves_itself(module) -> bool:
     """Whether a format has a proof of its own; trees share one, which test_trees.py tries."""
-    return hasattr(module, "verify") and module.verify.__module__ != "viewsphere.formats._tree"
+    return module.verify is not None and module.verify.__module__ != "viewsphere.formats._tree"
 
 
-FORMATS = [name for name in plugins.names("formats") if _proves_itself(plugins.load("formats", name))]
+FORMATS = [name for name in plugins.names("formats") if _proves_itself(plugins.load(FormatSpec, name))]
 OF_CAMERAS = {"gltf", "native", "pointcloud"}
 """Those that would hold nothing of pictures of unknown cameras."""
 
@@ -89,7 +90,7 @@ def _held(request):
 
 
 def verified(dataset: Dataset, name: str, sampled: Collection[int]):
-    return plugins.load("formats", name).verify(dataset, dataset.root / name, sampled, *FormatEntry(name=name).arguments())
+    return plugins.load(FormatSpec, name).verify(dataset, dataset.root / name, sampled, *FormatEntry(name=name).arguments())
 
 
 def found(dataset: Dataset, name: str) -> bool:

@@ -11,6 +11,7 @@ import pytest
 from small import tree_hash
 from viewsphere import Dataset, plugins
 from viewsphere.errors import UserError
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import export, writable_formats
 from viewsphere.run.preparing import Views
@@ -47,13 +48,13 @@ def chosen(dataset, name):
 
 
 def accepts(dataset, name):
-    return not list(refusals(plugins.load("formats", name), FormatEntry(name=name), scope_of(dataset)))
+    return not list(refusals(plugins.load(FormatSpec, name), FormatEntry(name=name), scope_of(dataset)))
 
 
 def remarks(dataset, name, folder):
     entry = FormatEntry(name=name)
     view = Views(chosen(dataset, name)).of(entry, None)
-    return list(plugins.load("formats", name).verify(view, folder, range(len(view)), *entry.arguments()))
+    return list(plugins.load(FormatSpec, name).verify(view, folder, range(len(view)), *entry.arguments()))
 
 
 @pytest.mark.slow
@@ -62,7 +63,7 @@ def test_every_format_holds_some_data_set_and_refuses_others_in_words(name, requ
     refused = []
     for world in WORLDS:
         dataset = request.getfixturevalue(world)
-        problems = list(refusals(plugins.load("formats", name), FormatEntry(name=name), scope_of(dataset)))
+        problems = list(refusals(plugins.load(FormatSpec, name), FormatEntry(name=name), scope_of(dataset)))
         refused += [world] if problems else []
         assert all("; found " in problem and "\n" not in problem for problem in problems)
         if problems:

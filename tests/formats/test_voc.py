@@ -15,6 +15,7 @@ import cube_dataset
 from proven import close, equal
 from viewsphere import plugins
 from viewsphere.errors import UserError
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import export, write
 from viewsphere.run.scope import refusals, scope_of
@@ -170,7 +171,7 @@ def test_names_and_empty_pictures(hostile):
     ],
 )
 def test_refusals(stills, changes, message):
-    voc = plugins.load("formats", "voc")
+    voc = plugins.load(FormatSpec, "voc")
     with pytest.raises(UserError, match=message):
         raise UserError(*refusals(voc, FormatEntry(name="voc"), replace(scope_of(stills), **changes)))
 

@@ -1,19 +1,18 @@
 """Formats are given options by recipes, calls and the command line; a data set keeps those of its exports."""
 
 import json
-import sys
-import types
-from importlib.metadata import EntryPoint
 
 import pytest
 
 from command_line import viewsphere
+from installed import installed
 from small import small_recipe, tree_hash
 from viewsphere import Dataset, Recipe, generate, plugins
 from viewsphere.check import check
 from viewsphere.check.repair import repair
 from viewsphere.cli.arguments import asked_formats
 from viewsphere.errors import RecipeError, UserError
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exporting import export
 from viewsphere.sampling.plan import plan
 
@@ -24,6 +23,7 @@ POST_BOX = {"contiguous": 1, "coco": 91}
 PLUGIN = """
 from contextlib import contextmanager
 from viewsphere.model.frozen import Frozen
+from viewsphere.plugins.format import FormatSpec
 
 class Options(Frozen):
     greeting: str = "hello"
@@ -37,16 +37,15 @@ def writer(dataset, folder, note, options):
 def verify(dataset, folder, sampled, options):
     if (folder / "greeting.txt").read_text() != options.greeting * options.times:
         yield None, "another greeting"
+
+FORMAT = FormatSpec(about="A greeting.", options=Options, writer=writer, verify=verify)
 """
 
 
 @pytest.fixture
-def plugin(monkeypatch):
-    module = types.ModuleType("my_hello")
-    exec(PLUGIN, module.__dict__)
-    monkeypatch.setitem(sys.modules, "my_hello", module)
-    entry = EntryPoint("hello", "my_hello", "viewsphere.formats")
-    monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
+def plugin(tmp_path):
+    with installed(tmp_path / "site", "formats", "hello", PLUGIN):
+        yield
 
 
 def category_id(folder):
@@ -116,7 +115,7 @@ def test_changed_options_are_damage(small_dataset):
 
 def test_a_format_that_is_only_read_cannot_be_asked_for(plugin, monkeypatch, small_run):
     assert asked_formats("hello, coco") == ("hello", "coco")
-    monkeypatch.delattr("my_hello.writer")
+    monkeypatch.setitem(vars(plugins.load(FormatSpec, "hello")), "writer", None)
     others = [name for name in plugins.names("formats") if name != "hello"]
     known = f"'hello' is unknown. Valid: {', '.join(others)}"
     with pytest.raises(UserError, match=f"^--format: {known}"):
@@ -131,7 +130,7 @@ def test_a_format_that_does_not_work_here_is_told_before_any_work(plugin, monkey
     def check():
         raise UserError("hello: expected somebody, found none")
 
-    monkeypatch.setattr("my_hello.check", check, raising=False)
+    monkeypatch.setitem(vars(plugins.load(FormatSpec, "hello")), "check", check)
     with pytest.raises(UserError, match="expected somebody"):
         asked_formats("hello")
 
@@ -176,7 +175,7 @@ def test_a_wrong_option_in_a_recipe_is_one_line_with_its_place(tmp_path):
             "[0].coco.category_ids",
             "'oco' is unknown; did you mean 'coco'? Valid: contiguous, coco",
         ),
-        ("opencv: {category_ids: coco}", "[0].opencv", "expected no options, format opencv has none; found category_ids"),
+        ("opencv: {category_ids: coco}", "[0].opencv", "expected no options, opencv has none; found category_ids"),
         ("coco: 5", "[0]", r"expected a format's name, or {name: {option: value}}; found a mapping"),
     ):
         file.write_text(text.replace("formats: []\n", "") + f"formats: [{{{entry}}}]\n")

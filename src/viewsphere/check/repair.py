@@ -107,7 +107,7 @@ class _Mending:
         """Write those again of which something was found: also where their files are links of what was damaged. While frames
         cannot be made again, exports stay: they may hold the last copy.
         """
-        names = exports(self._dataset).keys() & {finding.check for finding in findings}
+        names = set(exports(self._dataset)) & {finding.check for finding in findings}
         lost = bool(self.refused) or any(finding.check == "counts" for finding in findings)
         for name in sorted(names):
             if lost:
@@ -123,7 +123,7 @@ class _Mending:
 
 def _found_shots(dataset: Dataset, findings: Iterable[Finding]) -> Iterator[str]:
     """Keys of the shots that findings are about; where a channel was added to a frame later, it lies in a shot of its own."""
-    names = exports(dataset).keys()
+    names = exports(dataset)
     for finding in findings:
         if finding.frame is not None and finding.check not in names:
             added = [

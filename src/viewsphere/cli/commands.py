@@ -31,6 +31,7 @@ for command in (
     making.render,
     datasets.export,
     datasets.formats,
+    datasets.plugins,
     datasets.status,
     datasets.check,
     datasets.report,

@@ -20,7 +20,16 @@ from viewsphere.cli.arguments import (
     split,
     with_options,
 )
-from viewsphere.cli.terminal import ProgressBar, print_formats, print_json, print_report, print_status, say, waiting
+from viewsphere.cli.terminal import (
+    ProgressBar,
+    print_formats,
+    print_json,
+    print_plugins,
+    print_report,
+    print_status,
+    say,
+    waiting,
+)
 from viewsphere.errors import UserError
 from viewsphere.run.crew_size import cores
 
@@ -87,6 +96,17 @@ def formats(json_: AsJson = False) -> None:
         print_json([one.__dict__ for one in found])
     else:
         print_formats(found)
+
+
+def plugins(json_: AsJson = False) -> None:
+    """List all plug-ins: the distribution that each comes from, and why it cannot be loaded, if so."""
+    from viewsphere.plugins.overview import overview
+
+    found = overview()
+    if json_:
+        print_json([one.__dict__ for one in found])
+    else:
+        print_plugins(found)
 
 
 def status(folder: DataFolder, json_: AsJson = False) -> None:

@@ -22,6 +22,7 @@ from viewsphere.printable import printable
 
 if TYPE_CHECKING:
     from viewsphere.check import Report
+    from viewsphere.plugins.overview import Installed
     from viewsphere.run.estimate import Estimate
     from viewsphere.run.generate import Summary, Warnings
     from viewsphere.run.listing import Listed
@@ -179,6 +180,19 @@ def print_formats(found: Sequence[Listed]) -> None:
         for what, names in parts:
             if names:
                 say(f"    {what}: {', '.join(names)}")
+
+
+def print_plugins(found: Sequence[Installed]) -> None:
+    """Print the plug-ins of each kind and distribution in a paragraph, and those that cannot be loaded, a line each."""
+    for kind in dict.fromkeys(one.kind for one in found):
+        say(f"{kind}:")
+        working = [one for one in found if one.kind == kind and one.error is None]
+        for distribution in dict.fromkeys(one.distribution for one in working):
+            listed = ", ".join(one.name for one in working if one.distribution == distribution)
+            say(f"    {distribution}: {listed}")
+        for one in found:
+            if one.kind == kind and one.error is not None:
+                say(f"    {one.distribution}: {one.name} cannot be loaded: {one.error}")
 
 
 def print_status(found: Status) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.codecs.png_tiff import decode_png, encode_png
 from viewsphere.errors import UserError
 from viewsphere.files import open_file, read_bytes
-from viewsphere.formats import Remark
+from viewsphere.plugins.format import Remark
 from viewsphere.store import Dataset
 from viewsphere.store.checksums import CHECKSUMS
 from viewsphere.store.foreign import Loaded

@@ -8,9 +8,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Final, cast
 
-from viewsphere.formats import Remark
 from viewsphere.formats._contents import same_bytes
 from viewsphere.formats._json_rows import Row, Where, rows
+from viewsphere.plugins.format import Remark
 
 ABSENT: Final = object()
 """In the place of a value that one of two files lacks."""

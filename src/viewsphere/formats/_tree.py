@@ -20,11 +20,11 @@ from typing import Any, NamedTuple
 from viewsphere.aside import temporary
 from viewsphere.errors import UserError
 from viewsphere.files import open_file
-from viewsphere.formats import Remark
 from viewsphere.formats._contents import Content, Expected, check_files, put, same_bytes
 from viewsphere.formats._paper import json_bytes
 from viewsphere.labels import channels
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import Remark
 from viewsphere.store import Dataset
 
 FOLDER_SIZE = 10_000

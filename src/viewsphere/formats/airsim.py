@@ -51,12 +51,8 @@ from viewsphere.geometry.rotation import product, quaternion_from_matrix, transf
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("cameras", "depth", "disparity", "instances")
-READ_BY = ("pandas", "AirSim's read_pfm")
 
 Kind = Literal["scene", "depth_planar", "depth_perspective", "disparity_normalized", "segmentation", "infrared"]
 KINDS: Mapping[Kind, tuple[int, str, str]] = {
@@ -181,3 +177,18 @@ def _floats(sample: Sample, channel: str) -> bytes:
 
 
 preparer, writer, verify = functions(AirSim)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("cameras", "depth", "disparity", "instances"),
+    read_by=("pandas", "AirSim's read_pfm"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

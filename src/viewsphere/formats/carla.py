@@ -46,12 +46,9 @@ from viewsphere.formats._sequences import scene
 from viewsphere.formats._tree import File, Piece, Tree, functions, item
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "depth", "semantic", "instances")
-CREDITS = False
-HOLDS = ("depth", "segmentation", "instances", "cameras", "3D boxes")
-READ_BY = ("OpenCV", "code for CARLA's sensors")
 FAR = 1000.0
 STEPS = 256**3 - 1
 MOST = 65535
@@ -174,3 +171,16 @@ def _tagged(sample: Sample, tags: NDArray[np.uint8], *, ids: bool) -> bytes:
 
 
 preparer, writer, verify = functions(Carla)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("depth", "segmentation", "instances", "cameras", "3D boxes"),
+    read_by=("OpenCV", "code for CARLA's sensors"),
+    channels=("rgb", "depth", "semantic", "instances"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

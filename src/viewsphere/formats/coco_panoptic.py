@@ -31,12 +31,8 @@ from viewsphere.geometry.mask import mask_box
 from viewsphere.labels.panoptic import class_of, object_of
 from viewsphere.model.classes import SemanticClass, thing_class
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb", "panoptic")
-CREDITS = False
-HOLDS = ("panoptic masks", "boxes")
-READ_BY = ("panopticapi", "datumaro")
 
 KINDS = (".png", ".jpg")
 
@@ -107,3 +103,15 @@ def _category(number: int, one: SemanticClass, supers: Mapping[int, str]) -> dic
 
 
 preparer, writer, verify = functions(CocoPanoptic)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("panoptic masks", "boxes"),
+    read_by=("panopticapi", "datumaro"),
+    channels=("rgb", "panoptic"),
+    names_credits=False,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

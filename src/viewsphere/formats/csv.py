@@ -23,16 +23,12 @@ from pydantic import Field
 
 from viewsphere.aside import temporary
 from viewsphere.files import open_file
-from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, put
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.store import Dataset
 
-HOLDS = ("boxes", "poses", "views", "sizes")
-READ_BY = ("pandas", "any spreadsheet")
-CHANNELS = ()  # pictures are taken where there are any
-CREDITS = False
 TABLE = "objects.csv"
 BOXES = ("box2d", "box2d_projected", "box2d_unclipped")  # x0, y0, x1, y1 in pixels
 OF_SAMPLE = ("image", "index", "split", "width", "height", "sequence", "sensor", "instant", "time")
@@ -162,3 +158,16 @@ def _rows_that_differ(wanted: Path, found: Path) -> Iterator[Remark]:
 def _frame_of(row: bytes) -> int | None:
     cells = next(csv.reader([row.decode("utf-8")]), [])
     return int(cells[1]) if len(cells) == len(HEAD) and cells[1].isdecimal() else None
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("boxes", "poses", "views", "sizes"),
+    read_by=("pandas", "any spreadsheet"),
+    options=Options,
+    channels=(),  # pictures are taken where there are any
+    names_credits=False,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -32,12 +32,9 @@ from viewsphere.formats._refusals import plain_names
 from viewsphere.formats._tree import File, Piece, Tree, functions, line
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("boxes", "truncation")
-READ_BY = ("supervision", "its own training code")
 ROOT = "VOC2012"
 TRUNCATED = 0.15
 NAMES = r"[^\x00-\x1f]+"
@@ -109,3 +106,17 @@ def _fill(parent: ElementTree.Element, fields: dict[str, Any]) -> None:
 
 
 preparer, writer, verify = functions(Matrix)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("boxes", "truncation"),
+    read_by=("supervision", "its own training code"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

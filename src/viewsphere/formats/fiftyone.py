@@ -36,12 +36,9 @@ from viewsphere.formats._pictures import depth_png, picture, png, suffix_of
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("boxes", "masks", "keypoints", "3D boxes", "depth", "semantic maps", "cameras")
-READ_BY = ("FiftyOne",)
 KINDS = (".png", ".jpg", ".webp")
 MILLIMETRE = 0.001
 NAN = {"$numberDouble": "NaN"}
@@ -167,3 +164,15 @@ def _within(o: ObjectAnnotation) -> NDArray[np.bool_] | None:
 
 
 preparer, writer, verify = functions(FiftyOne)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("boxes", "masks", "keypoints", "3D boxes", "depth", "semantic maps", "cameras"),
+    read_by=("FiftyOne",),
+    channels=("rgb",),
+    names_credits=False,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

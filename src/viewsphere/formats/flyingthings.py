@@ -53,12 +53,9 @@ from viewsphere.formats._tree import File, Piece, Tree, functions, line
 from viewsphere.geometry.rotation import rigid
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "instances", "flow", "flow_backward", "disparity")
-CREDITS = False
-HOLDS = ("flow", "disparity", "disparity change", "instances", "motion boundaries", "occlusions", "cameras")
-READ_BY = ("torchvision", "ptlflow")
 HELD_OUT = ("val", "test")
 SENSOR_MM = 32
 WAYS = (("future", "flow"), ("past", "flow_backward"))
@@ -140,3 +137,17 @@ def _pgm(sample: Sample) -> bytes:
 
 
 preparer, writer, verify = functions(FlyingThings)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("flow", "disparity", "disparity change", "instances", "motion boundaries", "occlusions", "cameras"),
+    read_by=("torchvision", "ptlflow"),
+    options=Options,
+    channels=("rgb", "instances", "flow", "flow_backward", "disparity"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

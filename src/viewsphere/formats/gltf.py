@@ -31,20 +31,16 @@ import xxhash
 from viewsphere.aside import temporary
 from viewsphere.assets.exporting.glb import Looking, Placed, scene_glb_bytes
 from viewsphere.files import read_bytes, read_text
-from viewsphere.formats import Remark, Scope
+from viewsphere.formats import Scope
 from viewsphere.formats._cameras import opengl_pose
 from viewsphere.formats._contents import check_files
 from viewsphere.formats._refusals import any_camera
 from viewsphere.model.camera import Distortion
 from viewsphere.model.classes import thing_class
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.store import Dataset
 
-HOLDS = ("scenes as meshes", "poses", "cameras")
-READ_BY = ("Blender", "trimesh", "any glTF viewer")
-ANNOTATES = False  # what is hidden is part of a scene, too
-CHANNELS = ()
-CREDITS = False
 TABLE = "frames.csv"
 FOLDER_SIZE = 10_000
 MESHES = 64
@@ -174,3 +170,16 @@ def _looking(sample: Sample) -> Looking | None:
 def _read(kept: dict[str, Any]) -> Looking:
     pose = np.array(kept.pop("world_from_camera"))
     return Looking(world_from_camera=pose, **kept)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("scenes as meshes", "poses", "cameras"),
+    read_by=("Blender", "trimesh", "any glTF viewer"),
+    channels=(),
+    keeps_all_objects=True,  # what is hidden is part of a scene, too
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    verify=verify,
+)

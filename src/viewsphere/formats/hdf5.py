@@ -42,11 +42,9 @@ from viewsphere.formats._refusals import sequences
 from viewsphere.formats._tree import File, Piece, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CREDITS = False
-HOLDS = ("pictures", "depth", "normals", "masks", "NOCS", "flow", "poses", "cameras")
-READ_BY = ("h5py", "BlenderProc")
 NOTHING = np.float32(1e10)
 """What Blender says of the depth of pixels that see nothing."""
 LIBRARIES = ("v108", "v110")
@@ -183,3 +181,18 @@ def _library() -> Any:
 
 
 preparer, writer, verify = functions(Hdf5)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("pictures", "depth", "normals", "masks", "NOCS", "flow", "poses", "cameras"),
+    read_by=("h5py", "BlenderProc"),
+    options=Options,
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    check=check,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -34,12 +34,9 @@ from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._tree import LINES, File, Layout, Piece, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("the class of a picture", "viewpoints")
-READ_BY = ("torchvision", "datasets")
 KINDS = (".png", ".jpg", ".webp")
 CARD = "README.md"
 UNFIT = re.compile(r'[<>:"/\\|?*\[\]%\x00-\x1f\x7f]|^[. _]|[. _]$')
@@ -123,3 +120,17 @@ def _told(o: ObjectAnnotation) -> dict[str, Any]:
 
 
 preparer, writer, verify = functions(ImageFolder)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("the class of a picture", "viewpoints"),
+    read_by=("torchvision", "datasets"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

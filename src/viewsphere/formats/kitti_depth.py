@@ -30,12 +30,9 @@ from viewsphere.formats._pictures import picture
 from viewsphere.formats._sequences import Eyes, check_whole, instants, number, scene, two_eyes
 from viewsphere.formats._tree import File, Tree, functions
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "depth")
-CREDITS = False
-HOLDS = ("depth", "calibration")
-READ_BY = ("OpenCV", "Pillow")
 CAMERAS = {"left": "image_02", "right": "image_03"}
 
 
@@ -72,3 +69,16 @@ def _metres(sample: Sample) -> bytes:
 
 
 preparer, writer, verify = functions(KittiDepth)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("depth", "calibration"),
+    read_by=("OpenCV", "Pillow"),
+    channels=("rgb", "depth"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -48,12 +48,9 @@ from viewsphere.formats._sequences import Eyes, check_whole, instants, number, t
 from viewsphere.formats._tree import File, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "flow", "flow_state", "disparity", "disparity_state")
-CREDITS = False
-HOLDS = ("flow", "disparity", "scene flow", "instances", "calibration")
-READ_BY = ("torchvision", "ptlflow")
 MATCHED = {"noc": (0, 1), "occ": (0, 1, 2)}  # states of points: with a match inside the other picture, or anywhere
 
 
@@ -149,3 +146,18 @@ def _in_both(sample: Sample, later: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 preparer, writer, verify = functions(KittiFlow)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("flow", "disparity", "scene flow", "instances", "calibration"),
+    read_by=("torchvision", "ptlflow"),
+    options=Options,
+    channels=("rgb", "flow", "flow_state", "disparity", "disparity_state"),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -43,13 +43,8 @@ from viewsphere.formats._tree import File, Piece, Tree, functions, line
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb",)
-CREDITS = False
-LIDAR = True
-HOLDS = ("camera poses", "calibrations", "stereo", "LiDAR points")
-READ_BY = ("pykitti",)
 
 
 def refuses(scope: Scope) -> Iterator[str]:
@@ -99,3 +94,17 @@ def _pose(shot: Shot, instant: int, car: Car) -> Float:
 
 
 preparer, writer, verify = functions(KittiOdometry)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("camera poses", "calibrations", "stereo", "LiDAR points"),
+    read_by=("pykitti",),
+    channels=("rgb",),
+    lidar=True,
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

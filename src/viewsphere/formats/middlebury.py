@@ -48,12 +48,8 @@ from viewsphere.formats._tree import File, Tree, functions
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb", "disparity", "disparity_state")
-CREDITS = False
-HOLDS = ("disparity", "occlusions", "calibration")
-READ_BY = ("torchvision",)
 
 
 class Options(Frozen):
@@ -127,3 +123,17 @@ def _colmap(sample: Sample, baseline: float, folder: str) -> Iterator[File]:
 
 
 preparer, writer, verify = functions(Middlebury)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("disparity", "occlusions", "calibration"),
+    read_by=("torchvision",),
+    options=Options,
+    channels=("rgb", "disparity", "disparity_state"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

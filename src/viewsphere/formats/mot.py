@@ -33,13 +33,10 @@ from viewsphere.formats._tree import LINES, File, Layout, Piece, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("boxes", "tracks of objects", "visibility")
-READ_BY = ("motmetrics", "TrackEval", "datumaro")
 KINDS = (".png", ".jpg")
 
 
@@ -107,3 +104,17 @@ def _columns(sample: Sample, o: ObjectAnnotation, x0: float, y0: float, x1: floa
 
 
 preparer, writer, verify = functions(Mot)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("boxes", "tracks of objects", "visibility"),
+    read_by=("motmetrics", "TrackEval", "datumaro"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -46,12 +46,9 @@ from viewsphere.formats._tree import File, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset, ModelInfo
 
-CHANNELS = ("rgb", "depth", "instances", "nocs")
-CREDITS = False
-HOLDS = ("NOCS maps", "masks", "depth", "poses", "sizes")
-READ_BY = ("NOCS_CVPR2019", "category-level pose estimators")
 BACKGROUND = 255
 SCENE_SIZE = 1000
 """Still pictures of a scene."""
@@ -164,3 +161,16 @@ def _mesh(dataset: Dataset, info: ModelInfo) -> bytes:
 
 
 preparer, writer, verify = functions(Nocs)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("NOCS maps", "masks", "depth", "poses", "sizes"),
+    read_by=("NOCS_CVPR2019", "category-level pose estimators"),
+    channels=("rgb", "depth", "instances", "nocs"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

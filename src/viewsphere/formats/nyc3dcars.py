@@ -43,12 +43,8 @@ from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("boxes", "places on the globe", "footprints", "occlusion", "cameras")
-READ_BY = ("pandas", "PostGIS")
 
 Float = NDArray[np.float64]
 
@@ -155,3 +151,17 @@ def _words(place: Float) -> str:
 
 
 preparer, writer, verify = functions(Nyc3dCars)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("boxes", "places on the globe", "footprints", "occlusion", "cameras"),
+    read_by=("pandas", "PostGIS"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

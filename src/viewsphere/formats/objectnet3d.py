@@ -41,12 +41,8 @@ from viewsphere.formats._pictures import picture
 from viewsphere.formats._tree import File, Piece, Tree, functions, line
 from viewsphere.formats._viewpoint_mat import Cads, Options, no_viewpoints, scipy_io
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("viewpoints", "CAD models", "boxes", "anchors")
-READ_BY = ("scipy", "MATLAB")
 
 
 def check() -> None:
@@ -97,3 +93,19 @@ class ObjectNet3d(Tree):
 
 
 preparer, writer, verify = functions(ObjectNet3d)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("viewpoints", "CAD models", "boxes", "anchors"),
+    read_by=("scipy", "MATLAB"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    check=check,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -39,11 +39,8 @@ from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, item
 from viewsphere.geometry.box import clip_to_image
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.format import FormatSpec
 
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("3D boxes", "boxes", "poses", "visibility")
-READ_BY = ("Cube R-CNN", "pycocotools")
 KINDS = (".png", ".jpg")
 NAME = "viewsphere"
 DATASET = 1000
@@ -146,3 +143,16 @@ def _bounds(seen: NDArray[np.float64]) -> tuple[float, float, float, float]:
 
 
 preparer, writer, verify = functions(Omni3d)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("3D boxes", "boxes", "poses", "visibility"),
+    read_by=("Cube R-CNN", "pycocotools"),
+    channels=("rgb",),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -34,13 +34,9 @@ from viewsphere.geometry.rotation import product, rotation_vector, transform
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ()
-LIDAR = True
-CREDITS = False
-HOLDS = ("cameras", "stereo calibration", "poses")
-READ_BY = ("cv2.FileStorage",)
 Value = int | str | NDArray[np.float64]
 
 
@@ -140,3 +136,17 @@ def _yaml(values: dict[str, Value]) -> bytes:
 
 
 preparer, writer, verify = functions(Opencv)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("cameras", "stereo calibration", "poses"),
+    read_by=("cv2.FileStorage",),
+    channels=(),
+    lidar=True,
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -20,19 +20,16 @@ from pydantic import Field
 from viewsphere.codecs.ply import encode_ply
 from viewsphere.errors import UserError
 from viewsphere.files import read_bytes
-from viewsphere.formats import Remark, Scope
+from viewsphere.formats import Scope
 from viewsphere.formats._contents import check_files
 from viewsphere.formats._refusals import any_camera
 from viewsphere.model.channel import missing
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.point_cloud import PointCloud
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.store import Dataset
 
-HOLDS = ("coloured points", "normals", "objects")
-READ_BY = ("Open3D", "trimesh", "MeshLab", "CloudCompare")
-CHANNELS = ("depth", "instances")
-CREDITS = False
 FOLDER_SIZE = 10_000
 AXES = {
     "camera": "camera axes: x right, y down, z ahead; metres",
@@ -116,3 +113,18 @@ def _content(sample: Sample, options: Options) -> bytes:
     for name, column in columns.items():
         rows[name] = column
     return encode_ply(rows, (f"viewsphere, frame {sample.index}", AXES[options.axes], "object: 0 is none"))
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("coloured points", "normals", "objects"),
+    read_by=("Open3D", "trimesh", "MeshLab", "CloudCompare"),
+    options=Options,
+    channels=("depth", "instances"),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

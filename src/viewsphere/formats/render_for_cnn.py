@@ -39,12 +39,8 @@ from viewsphere.formats._pictures import JPEG_QUALITY, opaque
 from viewsphere.formats._refusals import known_views
 from viewsphere.formats._tree import File, Piece, Tree, functions, line
 from viewsphere.model.sample import ObjectAnnotation, ObjectView, Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("viewpoints", "pictures of objects", "truncations")
-READ_BY = ("RenderForCNN",)
 
 PICTURES = "syn_images_cropped_bkg_overlaid"
 SYNSETS = {
@@ -137,3 +133,16 @@ def _truncation(seen: tuple[float, ...], whole: tuple[float, ...]) -> Iterator[f
 
 
 preparer, writer, verify = functions(RenderForCnn)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("viewpoints", "pictures of objects", "truncations"),
+    read_by=("RenderForCNN",),
+    channels=("rgb",),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -50,12 +50,9 @@ from viewsphere.formats._tree import File, Tree, functions
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "depth", "instances", "flow", "flow_state")
-CREDITS = False
-HOLDS = ("flow", "occlusions", "depth", "cameras", "instances", "disparity")
-READ_BY = ("torchvision", "ptlflow")
 MOST = 1024
 
 
@@ -142,3 +139,18 @@ def _albedo(sample: Sample) -> bytes:
 
 
 preparer, writer, verify = functions(Sintel)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("flow", "occlusions", "depth", "cameras", "instances", "disparity"),
+    read_by=("torchvision", "ptlflow"),
+    options=Options,
+    channels=("rgb", "depth", "instances", "flow", "flow_state"),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -47,12 +47,9 @@ from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import Sample
 from viewsphere.model.voxels import EMPTY, OUTSIDE, Grid, Voxels
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("depth", "voxels")
-CREDITS = False
-HOLDS = ("depth", "voxels", "cameras")
-READ_BY = ("code for SSCNet's data",)
 SIZE, CELL = (240, 144, 240), 0.02
 EXPECTED = Intrinsics(width=640, height=480, fx=518.8579, fy=518.8579, cx=320.5, cy=240.5)
 OTHER, NO_ROOM = 36, 255
@@ -157,3 +154,16 @@ def _places(grid: Grid, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np
 
 
 preparer, writer, verify = functions(Sscnet)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("depth", "voxels", "cameras"),
+    read_by=("code for SSCNet's data",),
+    channels=("depth", "voxels"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -55,12 +55,9 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.classes import Color, SemanticClass
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "semantic")
-CREDITS = False
-HOLDS = ("segmentation", "instances", "depth", "cameras", "stereo")
-READ_BY = ("datumaro (rand)", "OpenCV", "numpy")
 FAR = 65535
 MOST = 200
 
@@ -242,3 +239,18 @@ def _table(sample: Sample, classes: NDArray[np.uint8]) -> bytes:
 
 
 preparer, writer, verify = functions(Synthia)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("segmentation", "instances", "depth", "cameras", "stereo"),
+    read_by=("datumaro (rand)", "OpenCV", "numpy"),
+    options=Options,
+    channels=("rgb", "semantic"),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

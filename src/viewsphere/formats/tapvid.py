@@ -42,12 +42,8 @@ from viewsphere.formats._tree import File, Tree, functions
 from viewsphere.geometry.rotation import rigid
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb", "tracks")
-CREDITS = False
-HOLDS = ("point tracks", "occlusion", "cameras")
-READ_BY = ("tapnet",)
 
 
 class Options(Frozen):
@@ -126,3 +122,17 @@ def _jpeg(dataset: Dataset, sample: Sample) -> bytes:
 
 
 preparer, writer, verify = functions(Tapvid)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("point tracks", "occlusion", "cameras"),
+    read_by=("tapnet",),
+    options=Options,
+    channels=("rgb", "tracks"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

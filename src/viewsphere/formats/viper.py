@@ -45,12 +45,9 @@ from viewsphere.formats._tree import File, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "semantic", "instances", "flow")
-CREDITS = False
-HOLDS = ("segmentation", "instances", "flow", "cameras")
-READ_BY = ("ptlflow",)
 MOST, MOST_OBJECTS = 200, 65535
 NEAR, FAR = 0.1, 1000.0
 
@@ -190,3 +187,16 @@ def _view(first: Camera, now: Camera) -> NDArray[np.float64]:
 
 
 preparer, writer, verify = functions(Viper)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("segmentation", "instances", "flow", "cameras"),
+    read_by=("ptlflow",),
+    channels=("rgb", "semantic", "instances", "flow"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -22,18 +22,14 @@ from pydantic import Field
 
 from viewsphere.codecs import tar
 from viewsphere.files import open_file
-from viewsphere.formats import Remark
 from viewsphere.formats._contents import check_files
 from viewsphere.formats._paper import json_bytes
 from viewsphere.model.channel import PICTURES
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.store import Dataset
 from viewsphere.store.sample_records import whole_sample
-
-HOLDS = ("everything",)
-READ_BY = ("webdataset", "wids")
-CREDITS = False
 
 
 class Options(Frozen):
@@ -180,3 +176,14 @@ def _npy(array: NDArray[Any]) -> bytes:
     data = io.BytesIO()
     np.lib.format.write_array(data, np.ascontiguousarray(array), (1, 0), allow_pickle=False)
     return data.getvalue()
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("everything",),
+    read_by=("webdataset", "wids"),
+    options=Options,
+    names_credits=False,
+    writer=writer,
+    verify=verify,
+)

@@ -1,6 +1,7 @@
 """Plug-ins: a registry that finds and loads them, and one frozen, typed spec a kind, each in a file of its own."""
 
 from viewsphere.plugins.registry import (
+    SEAMS,
     Kind,
     attribute,
     entry_points,
@@ -10,11 +11,13 @@ from viewsphere.plugins.registry import (
     load,
     loadable,
     names,
+    origin,
     place,
     places,
 )
 
 __all__ = [
+    "SEAMS",
     "Kind",
     "attribute",
     "entry_points",
@@ -24,6 +27,7 @@ __all__ = [
     "load",
     "loadable",
     "names",
+    "origin",
     "place",
     "places",
 ]

@@ -83,7 +83,18 @@ def loadable(spec: type[S]) -> dict[str, S]:
 
 def is_third_party(kind: Kind, name: str) -> bool:
     """Whether an entry point names the plug-in."""
-    return any(entry.name == name for entry in entry_points(group=f"viewsphere.{kind}"))
+    return _entry(kind, name) is not None
+
+
+def origin(kind: Kind, name: str) -> str:
+    """The distribution that a plug-in comes from, with its version."""
+    entry = _entry(kind, name)
+    found = metadata.distribution("viewsphere") if entry is None else entry.dist
+    return "" if found is None else f"{found.name} {found.version}"
+
+
+def _entry(kind: Kind, name: str) -> metadata.EntryPoint | None:
+    return next((entry for entry in entry_points(group=f"viewsphere.{kind}") if entry.name == name), None)
 
 
 def _shipped(kind: Kind) -> tuple[str, ...]:
@@ -92,9 +103,9 @@ def _shipped(kind: Kind) -> tuple[str, ...]:
 
 def _module_of(kind: Kind, name: str) -> Any:
     """The module of a plug-in, or the object that its entry point names."""
-    for entry in entry_points(group=f"viewsphere.{kind}"):
-        if entry.name == name:
-            return _entered(entry)
+    entry = _entry(kind, name)
+    if entry is not None:
+        return _entered(entry)
     if name not in _shipped(kind):
         raise _unknown(kind[:-1], name, names(kind))
     return importlib.import_module(f"{SEAMS[kind].package}.{name}")

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Self, cast, get_args, get_origin
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self, get_args, get_origin
 
 from pydantic import ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, model_validator
+from pydantic.fields import FieldInfo
 
 from viewsphere.errors import PluginError, RecipeError
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import explained, read_options, report
+from viewsphere.model.mistakes import explained, report
+from viewsphere.model.mistakes import read_options as read_as
 from viewsphere.plugins.registry import Kind
+
+
+@dataclass(frozen=True)
+class Takes:
+    """How many values the function of a field takes, besides options."""
+
+    values: int
 
 
 class Spec(Frozen):
@@ -32,7 +42,9 @@ class Spec(Frozen):
             lines = report(explained(error, tuple(cls.model_fields)), data).splitlines()
             raise PluginError("\n".join(f"{cls.__name__}.{line}" for line in lines)) from None
         for name, field in cls.model_fields.items():
-            _check_call(f"{cls.__name__}.{name}", getattr(made, name), field.annotation, made.takes_options)
+            count = _values(field, made.takes_options)
+            if count is not None and getattr(made, name) is not None:
+                _check_call(f"{cls.__name__}.{name}", getattr(made, name), count)
         return made
 
     @property
@@ -51,35 +63,36 @@ class SpecWithOptions(Spec):
         """Whether the plug-in has options."""
         return self.options is not None
 
-    def read(self, name: str, given: Mapping[str, Any], field: str) -> tuple[Frozen, ...]:
+    def read_options(self, name: str, given: Mapping[str, Any], field: str) -> tuple[Frozen, ...]:
         """The options as the plug-in's class reads them, or nothing where it has none.
 
         Raises RecipeError for options that are not valid, as mistakes of the recipe's field.
         """
         if self.options is not None:
-            return (read_options(self.options, given, field),)
+            return (read_as(self.options, given, field),)
         if given:
             raise RecipeError(f"{field}: expected no options, {name} has none; found {', '.join(given)}")
         return ()
 
 
-def _check_call(field: str, value: Any, annotation: Any, takes_options: bool) -> None:
-    """Raise PluginError for a function that takes another number of values than its field's type declares."""
-    declared = next((one for one in (annotation, *get_args(annotation)) if get_origin(one) is Callable), None)
-    if declared is None or not callable(value) or get_args(declared)[0] is ...:
-        return
-    count = len(cast(list[Any], get_args(declared)[0]))
+def _values(field: FieldInfo, takes_options: bool) -> int | None:
+    """The number of values that a field's function takes; None for what is no function, or one of any values."""
+    for mark in field.metadata:
+        if isinstance(mark, Takes):
+            return mark.values + takes_options
+    declared = next((one for one in (field.annotation, *get_args(field.annotation)) if get_origin(one) is Callable), None)
+    values = get_args(declared)[0] if declared is not None else ...
+    return None if values is ... else len(values)
+
+
+def _check_call(field: str, function: Callable[..., Any], count: int) -> None:
+    """Raise PluginError for a function that cannot be called with so many values."""
     try:
-        signature = inspect.signature(value)
+        signature = inspect.signature(function)
     except ValueError:  # a builtin
         return
-    if not any(_binds(signature, number) for number in ((count, count + 1) if takes_options else (count,))):
-        raise PluginError(f"{field}: expected a function of {count} values; found {getattr(value, '__name__', '')}{signature}")
-
-
-def _binds(signature: inspect.Signature, count: int) -> bool:
     try:
         signature.bind(*range(count))
     except TypeError:
-        return False
-    return True
+        name = getattr(function, "__name__", "")
+        raise PluginError(f"{field}: expected a function of {count} values; found {name}{signature}") from None

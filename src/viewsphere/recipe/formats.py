@@ -10,7 +10,8 @@ from pydantic import BeforeValidator, Field, JsonValue, TypeAdapter, ValidationE
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import read_options, report, shown
+from viewsphere.model.mistakes import report, shown
+from viewsphere.plugins.format import FormatSpec
 
 FORM = {
     "anyOf": [
@@ -45,19 +46,13 @@ class FormatEntry(Frozen):
         Raises RecipeError for options that it does not have, as mistakes of `field` (default: the format's name), and UserError
         for a format that is not known.
         """
-        field = field or self.name
-        kind: type[Frozen] | None = getattr(plugins.load("formats", self.name), "Options", None)
-        if kind is not None:
-            return (read_options(kind, self.options, field),)
-        if self.options:
-            raise RecipeError(f"{field}: expected no options, format {self.name} has none; found {', '.join(self.options)}")
-        return ()
+        return plugins.load(FormatSpec, self.name).read_options(self.name, self.options, field or self.name)
 
     def notes(self, categories: Sequence[Any]) -> Iterator[str]:
         """What the format has to say of these options and a data set's categories; raises as `arguments` does."""
-        said = getattr(plugins.load("formats", self.name), "notes", None) if self.options else None
-        if said is not None:
-            yield from said(categories, *self.arguments())
+        spec = plugins.load(FormatSpec, self.name)
+        if self.options and spec.notes is not None:
+            yield from spec.notes(categories, *self.arguments())
 
 
 def _entry(value: Any) -> Any:

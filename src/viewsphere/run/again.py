@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError, UserError
 from viewsphere.model.mistakes import one_of
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.again_recipe import RECIPE, draft
 from viewsphere.sampling.plan import plan
 from viewsphere.store import new_folder
@@ -26,7 +28,7 @@ class Made:
 
 def formats_again() -> tuple[str, ...]:
     """Names of the formats whose data sets can be rendered again, sorted."""
-    return tuple(name for name in plugins.names("formats") if hasattr(plugins.load("formats", name), "again"))
+    return tuple(_again())
 
 
 def make_again(kind: str, source: Path, folder: Path) -> Made:
@@ -35,18 +37,22 @@ def make_again(kind: str, source: Path, folder: Path) -> Made:
     The folder appears when all of it is there and its recipe has been planned. Raises UserError for a format that cannot be
     rendered again and for a folder that holds something, StoreError for a data set that is broken.
     """
-    known = formats_again()
+    known = _again()
     if kind not in known:
-        raise UserError(f"--from: {one_of(kind, known)}")
+        raise UserError(f"--from: {one_of(kind, tuple(known))}")
     _check_folder(folder)
     if not source.exists():
         raise UserError(f"--from {kind}: expected a data set; found no {source}")
-    found: Again = plugins.load("formats", kind).again(source)
+    found = known[kind](source)
     try:
         _make(found, f"{kind} {source}", folder)
     except OSError as error:
         raise UserError(f"{folder}: expected a place to write, found: {error.strerror or error}") from None
     return Made(folder / RECIPE, len(found.shots), len(found.models), found.notes)
+
+
+def _again() -> dict[str, Callable[[Path], Again]]:
+    return {name: spec.again for name, spec in plugins.loadable(FormatSpec).items() if spec.again is not None}
 
 
 def _check_folder(folder: Path) -> None:

@@ -17,6 +17,7 @@ from viewsphere.geometry.rotation import rigid
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.model.scene import IDENTITY
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.file import dump
 from viewsphere.recipe.formats import Formats, read_formats
 from viewsphere.recipe.recipe import Recipe
@@ -159,7 +160,7 @@ def _recipe(
 
 def _channels(formats: Formats) -> list[str]:
     """Pictures, and what else the formats read."""
-    needed = {name for entry in read_formats(formats) for name in needs_of(plugins.load("formats", entry.name), entry)}
+    needed = {name for entry in read_formats(formats) for name in needs_of(plugins.load(FormatSpec, entry.name), entry)}
     return [name for name in CHANNELS if name == CHANNELS[0] or name in needed]
 
 

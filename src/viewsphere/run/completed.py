@@ -11,10 +11,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError, UserError
-from viewsphere.formats import Format
 from viewsphere.labels import Sight, annotated, channel_labels, labels, on_request, sample_values
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.scenery import Scenery
 from viewsphere.run.scope import is_computed, needs_of
@@ -22,14 +22,14 @@ from viewsphere.run.sights import Sights
 from viewsphere.store import Choice, Dataset, Exported
 
 
-def lacking(dataset: Dataset, module: Format, entry: FormatEntry) -> tuple[str, ...]:
+def lacking(dataset: Dataset, spec: FormatSpec, entry: FormatEntry) -> tuple[str, ...]:
     """The labels that a format needs and a part of a data set does not keep, all of which can be computed of its shots; none of
     a data set without shots, such as an imported one, of which formats take what there is.
 
     Raises UserError for those that cannot: passes, which an engine has to paint, points that a recipe has to name, and any of
     pictures that were imported among others.
     """
-    wanted, names, unknown = needs_of(module, entry), dict[str, None](), dict[str, None]()
+    wanted, names, unknown = needs_of(spec, entry), dict[str, None](), dict[str, None]()
     shots = dataset.shots_of_parts
     for part, shot in zip(dataset.plan.parts, shots, strict=True):
         asked = set(part.recipe.get("annotations", ()))

@@ -10,11 +10,11 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.formats import Format
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.quantity import quantity
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
-from viewsphere.run.preparing import Entries, leaves_out, prepared, targets
+from viewsphere.run.preparing import Entries, prepared, targets
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.scope import refuse, scope_of
 from viewsphere.store import Choice, Dataset, located, new_folder
@@ -52,10 +52,10 @@ def export(
         return ()
     from viewsphere.run.completed import lacking  # which loads what reads and draws models
 
-    modules = {entry.name: writable(entry.name) for entry in entries}
+    specs = {entry.name: writable(entry.name) for entry in entries}
     refuse(entries, scope_of(dataset), dataset.root)
     for entry in entries:
-        lacking(dataset, modules[entry.name], entry)
+        lacking(dataset, specs[entry.name], entry)
     with ExitStack() as whole:
         if is_own:
             dataset.store.make_ready()
@@ -109,8 +109,9 @@ def write(dataset: Dataset, formats: Entries, tell: Listener = unheard, workers:
             for name, add in adds.items():
                 add(parts[name])
     for entry, folder in formats:
-        own = least if leaves_out(_format(entry.name)) else None
-        credited = credits_digest(dataset.models) if _names_credits(_format(entry.name)) else None
+        spec = plugins.load(FormatSpec, entry.name)
+        own = None if spec.keeps_all_objects else least
+        credited = credits_digest(dataset.models) if spec.names_credits else None
         write_checksums(folder, entry.whole().options, own, credited, total)
     tell(Progress("exports", total, total))
     return tuple(notes)
@@ -127,35 +128,27 @@ def is_out_of_date(name: str, dataset: Dataset, least: float | None) -> bool:
     """Whether a format's export in a data set's folder lacks frames that are there, keeps other annotations than those of what
     is seen more than `least`, or names other credits than those that are known now.
     """
-    module, folder = _format(name), dataset.root / name
-    if written_frames(folder) not in (None, len(dataset)) or (leaves_out(module) and written_least(folder) != least):
+    spec, folder = plugins.load(FormatSpec, name), dataset.root / name
+    if written_frames(folder) not in (None, len(dataset)) or (not spec.keeps_all_objects and written_least(folder) != least):
         return True
-    return _names_credits(module) and written_credits(folder) != credits_digest(dataset.models)
-
-
-def _names_credits(module: object) -> bool:
-    """Whether a format may name the models' credits; one that does not says `CREDITS = False`."""
-    return getattr(module, "CREDITS", True)
+    return spec.names_credits and written_credits(folder) != credits_digest(dataset.models)
 
 
 def writable_formats() -> tuple[str, ...]:
     """Names of the formats that data sets can be written in; others are only read."""
-    return tuple(name for name in plugins.names("formats") if hasattr(_format(name), "writer"))
+    return tuple(name for name, spec in plugins.loadable(FormatSpec).items() if spec.writer)
 
 
-def writable(name: str, field: str = "format") -> Format:
+def writable(name: str, field: str = "format") -> FormatSpec:
     """The format of this name; raises UserError for one that does not work here, and, as a mistake of `field`, for one that is
     not known or only read.
     """
-    if name not in plugins.names("formats") or not hasattr(_format(name), "writer"):
+    spec = plugins.load(FormatSpec, name) if name in plugins.names("formats") else None
+    if spec is None or spec.writer is None:
         raise UserError(f"{field}: {one_of(name, writable_formats())}")
-    module = _format(name)
-    getattr(module, "check", lambda: None)()
-    return module
-
-
-def _format(name: str) -> Format:
-    return plugins.load("formats", name)
+    if spec.check is not None:
+        spec.check()
+    return spec
 
 
 def _check_choice(dataset: Dataset, is_own: bool) -> None:

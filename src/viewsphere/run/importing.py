@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64encode
+from collections.abc import Callable
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.model.mistakes import one_of
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.store import Block, Dataset, Part, PlanRecord, Store, located
 from viewsphere.store.credits import write_credits
@@ -23,7 +25,11 @@ SHOT_FRAMES = 1000
 
 def readable_formats() -> tuple[str, ...]:
     """Names of the formats that can be read, sorted."""
-    return tuple(name for name in plugins.names("formats") if hasattr(plugins.load("formats", name), "read"))
+    return tuple(_readers())
+
+
+def _readers() -> dict[str, Callable[..., ForeignDataset]]:
+    return {name: spec.read for name, spec in plugins.loadable(FormatSpec).items() if spec.read is not None}
 
 
 def import_dataset(
@@ -43,10 +49,10 @@ def read_dataset(kind: str, source: Path | str, *, keep_going: bool = False, fie
     """What a data set of another tool says, whole; raises as `import_dataset` does, for an unknown format as a mistake of
     `field`.
     """
-    known = readable_formats()
+    known = _readers()
     if kind not in known:
-        raise UserError(f"{field}: {one_of(kind, known)}")
-    return plugins.load("formats", kind).read(Path(source), keep_going=keep_going)
+        raise UserError(f"{field}: {one_of(kind, tuple(known))}")
+    return known[kind](Path(source), keep_going=keep_going)
 
 
 def put_in_store(foreign: ForeignDataset, out: Path, listener: Listener | None = None) -> None:

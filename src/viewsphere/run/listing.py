@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 from dataclasses import dataclass
-from typing import Any
 
 from viewsphere import plugins
+from viewsphere.plugins.format import FormatSpec
 
 
 @dataclass(frozen=True)
@@ -27,18 +26,17 @@ class Listed:
 
 def listed() -> tuple[Listed, ...]:
     """All formats that are installed, by their names."""
-    return tuple(_listed(name, plugins.load("formats", name)) for name in plugins.names("formats"))
+    return tuple(_listed(name, spec) for name, spec in plugins.loadable(FormatSpec).items())
 
 
-def _listed(name: str, module: Any) -> Listed:
-    options = getattr(module, "Options", None)
+def _listed(name: str, spec: FormatSpec) -> Listed:
     return Listed(
         name=name,
-        summary=(inspect.getdoc(module) or "").partition("\n\n")[0].replace("\n", " "),
-        needs=tuple(getattr(module, "CHANNELS", ())),
-        holds=tuple(getattr(module, "HOLDS", ())),
-        read_by=tuple(getattr(module, "READ_BY", ())),
-        options=tuple(options.model_fields) if options else (),
-        writes=hasattr(module, "writer"),
-        reads=hasattr(module, "read"),
+        summary=(spec.about or "").strip().partition("\n\n")[0].replace("\n", " "),
+        needs=spec.channels or (),
+        holds=spec.holds,
+        read_by=spec.read_by,
+        options=tuple(spec.options.model_fields) if spec.options else (),
+        writes=spec.writer is not None,
+        reads=spec.read is not None,
     )

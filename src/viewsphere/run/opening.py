@@ -7,11 +7,11 @@ from contextlib import suppress
 from importlib.metadata import version
 
 from viewsphere.errors import RecipeError, StoreError, UserError
-from viewsphere.formats import Format
 from viewsphere.labels import on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Sensor
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import writable
@@ -45,18 +45,18 @@ def check_formats(planned: Plan, wanted: Iterable[FormatEntry], channels: Sequen
     scope = scope_of_plan(planned, channels)
     with planned.recipe.located():
         for entry in wanted:
-            module = writable(entry.name)
-            for problem in not_held(module, entry, scope):
+            spec = writable(entry.name)
+            for problem in not_held(spec, entry, scope):
                 raise UserError(f"formats: format {entry.name}: {problem}")
             for sensor in planned.rig.sensors:
-                _check_labels(entry, module, planned.recipe, channels, sensor)
+                _check_labels(entry, spec, planned.recipe, channels, sensor)
 
 
-def _check_labels(entry: FormatEntry, module: Format, recipe: Recipe, channels: Sequence[str], sensor: Sensor) -> None:
-    if sensor.lidar is not None and getattr(module, "LIDAR", False):
+def _check_labels(entry: FormatEntry, spec: FormatSpec, recipe: Recipe, channels: Sequence[str], sensor: Sensor) -> None:
+    if sensor.lidar is not None and spec.lidar:
         return
     kept = sensor.kept(tuple(channels))
-    lacking = missing(needs_of(module, entry), {*kept, *recipe.annotations})
+    lacking = missing(needs_of(spec, entry), {*kept, *recipe.annotations})
     absent = [name for name in lacking if not is_computed(name) or (sensor.lidar is not None and name in PASSES)]
     if absent:
         raise RecipeError(_absent(entry, absent[0], kept, recipe, sensor))

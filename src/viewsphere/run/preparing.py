@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.formats import Format
 from viewsphere.model.camera import Scan
 from viewsphere.model.channel import missing
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.in_order import in_order
 from viewsphere.store import Dataset, Exported
@@ -41,11 +41,6 @@ Entries = Sequence[tuple[FormatEntry, Path]]
 """Formats and the folders that they are written into."""
 
 
-def leaves_out(module: object) -> bool:
-    """Whether a format leaves annotations out; one that writes scenes says `ANNOTATES = False`."""
-    return getattr(module, "ANNOTATES", True)
-
-
 class Views:
     """A data set as formats see it: one for all that leave the same annotations out, and lack the same labels."""
 
@@ -60,8 +55,8 @@ class Views:
         """
         from viewsphere.run.completed import lacking  # which loads what reads and draws models
 
-        module = plugins.load("formats", entry.name)
-        return self._seen(least if leaves_out(module) else None, lacking(self._dataset, module, entry))
+        spec = plugins.load(FormatSpec, entry.name)
+        return self._seen(None if spec.keeps_all_objects else least, lacking(self._dataset, spec, entry))
 
     def _made(self, least: float | None, names: tuple[str, ...]) -> Dataset:
         if least is None and not names:
@@ -85,23 +80,24 @@ class Target:
 
     entry: FormatEntry
     folder: Path
-    module: Format
+    spec: FormatSpec
     view: Dataset
 
     def writer(self, note: Callable[[str], None]) -> AbstractContextManager[Callable[[Any], None]]:
         """What the format writes with: gives a function that is called with what is prepared of each sample."""
-        return self.module.writer(self.view, self.folder, note, *self.entry.arguments())
+        assert self.spec.writer is not None
+        return self.spec.writer(self.view, self.folder, note, *self.entry.arguments())
 
     @property
     def prepares(self) -> bool:
         """Whether the format makes anything of samples before they are added."""
-        return hasattr(self.module, "preparer")
+        return self.spec.preparer is not None
 
     def preparer(self) -> Callable[[Sample], Any]:
         """Makes of a sample what the format adds: the sample itself, as the format sees it, where it prepares nothing."""
-        module: Any = self.module
+        preparer = self.spec.preparer
         with self._named():
-            make = module.preparer(self.view, self.folder, *self.entry.arguments()) if self.prepares else None
+            make = preparer(self.view, self.folder, *self.entry.arguments()) if preparer else None
 
         def prepare(sample: Sample) -> Any:
             with self._named():
@@ -128,8 +124,8 @@ class Target:
         the format needs of every frame.
         """
         shown = self.view.shown(sample)
-        absent = missing(getattr(self.module, "CHANNELS", ()), {*shown.channels, *shown.asked})
-        is_exempt = getattr(self.module, "LIDAR", False) and isinstance(sample.known_camera and sample.camera.distortion, Scan)
+        absent = missing(self.spec.channels or (), {*shown.channels, *shown.asked})
+        is_exempt = self.spec.lidar and isinstance(sample.known_camera and sample.camera.distortion, Scan)
         if sample.sensor != CAMERA and absent and not is_exempt:
             raise UserError(
                 f"expected channel {absent[0]} of every frame, found none of sensor {sample.sensor} (frame {sample.index}): "
@@ -141,8 +137,8 @@ class Target:
 def targets(dataset: Dataset, formats: Entries) -> tuple[Target, ...]:
     """The formats to be written of a data set."""
     views, least = Views(dataset), dataset.plan.keep_annotations_above
-    modules = ((entry, folder, plugins.load("formats", entry.name)) for entry, folder in formats)
-    return tuple(Target(entry, folder, module, views.of(entry, least)) for entry, folder, module in modules)
+    specs = ((entry, folder, plugins.load(FormatSpec, entry.name)) for entry, folder in formats)
+    return tuple(Target(entry, folder, spec, views.of(entry, least)) for entry, folder, spec in specs)
 
 
 def prepared(dataset: Dataset, found: Sequence[Target], workers: int = 0) -> Generator[dict[str, Any]]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.formats import Format, Scope
+from viewsphere.formats import Scope
 from viewsphere.formats._refusals import lacking_labels
 from viewsphere.labels import Needs, channel_labels, labels, on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
@@ -84,11 +85,10 @@ def telling(samples: Iterable[Sample]) -> tuple[Sample, ...]:
     return tuple(kinds.values())
 
 
-def needs_of(module: Format, entry: FormatEntry) -> tuple[str, ...]:
+def needs_of(spec: FormatSpec, entry: FormatEntry) -> tuple[str, ...]:
     """The channels and the labels on request that a format reads as these options want it."""
-    more: Callable[..., Sequence[str]] | None = getattr(module, "needs", None)
-    always: Sequence[str] = getattr(module, "CHANNELS", ())
-    return tuple(dict.fromkeys((*always, *(more(*entry.arguments()) if more else ()))))
+    more = spec.needs(*entry.arguments()) if spec.needs is not None else ()
+    return tuple(dict.fromkeys((*(spec.channels or ()), *more)))
 
 
 def is_computed(name: str) -> bool:
@@ -102,30 +102,29 @@ def is_computed(name: str) -> bool:
 
 def refuse(entries: Sequence[FormatEntry], scope: Scope, where: object) -> None:
     """Raise UserError with a line for each of the formats that cannot hold the data set at `where`: all that it cannot."""
-    found = {e.name: list(refusals(plugins.load("formats", e.name), e, scope)) for e in entries}
+    found = {e.name: list(refusals(plugins.load(FormatSpec, e.name), e, scope)) for e in entries}
     lines = [f"{where}: format {name}: {', and '.join(problems)}" for name, problems in found.items() if problems]
     if lines:
         raise UserError("\n".join(lines))
 
 
-def refusals(module: Format, entry: FormatEntry, scope: Scope) -> Iterator[str]:
+def refusals(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
     """What of a data set a format cannot hold, as these options want it."""
-    yield from not_held(module, entry, scope)
-    yield from lacking_labels(scope, getattr(module, "CHANNELS", ()))
-    if not getattr(module, "LIDAR", False):
-        yield from _pointless(module, entry, scope)
+    yield from not_held(spec, entry, scope)
+    yield from lacking_labels(scope, spec.channels or ())
+    if not spec.lidar:
+        yield from _pointless(spec, entry, scope)
 
 
-def not_held(module: Format, entry: FormatEntry, scope: Scope) -> Iterator[str]:
+def not_held(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
     """The same but for a LiDAR's frames, which a run that is planned tells by its sensors' channels."""
-    refuses: Callable[..., Iterator[str]] | None = getattr(module, "refuses", None)
-    if refuses:
-        yield from refuses(scope, *entry.arguments())
+    if spec.refuses is not None:
+        yield from spec.refuses(scope, *entry.arguments())
 
 
-def _pointless(module: Format, entry: FormatEntry, scope: Scope) -> Iterator[str]:
+def _pointless(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
     """Of a format of pictures: a LiDAR, whose frames are none."""
-    needed = [name for name in needs_of(module, entry) if name in PASSES]
+    needed = [name for name in needs_of(spec, entry) if name in PASSES]
     for sensor in scope.rig.sensors if scope.rig else ():
         lacking = missing(needed, sensor.kept(scope.channels))
         if sensor.lidar is not None and lacking:

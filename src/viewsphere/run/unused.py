@@ -11,6 +11,7 @@ from itertools import islice
 from viewsphere import plugins
 from viewsphere.errors import StoreError
 from viewsphere.model.channel import PICTURES
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.scope import needs_of
 from viewsphere.store import Store
@@ -70,5 +71,5 @@ def channel_bytes(store: Store) -> Counter[str]:
 
 def _is_used(channel: str, formats: Iterable[FormatEntry]) -> bool:
     """Whether it is a picture, or one of the formats needs it, or does not say what it needs: such a format takes all."""
-    modules = ((plugins.load("formats", entry.name), entry) for entry in formats)
-    return channel in PICTURES or any(not hasattr(m, "CHANNELS") or channel in needs_of(m, entry) for m, entry in modules)
+    specs = ((plugins.load(FormatSpec, entry.name), entry) for entry in formats)
+    return channel in PICTURES or any(spec.channels is None or channel in needs_of(spec, entry) for spec, entry in specs)

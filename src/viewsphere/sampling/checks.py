@@ -78,7 +78,7 @@ def check_names(recipe: Recipe) -> None:
         check_orientation(company.orientation, "scene.company")
     _check_plugin("scenes.sampler", "samplers", recipe.sampler)
     if isinstance(recipe.scenes, SamplerEntry):
-        plugins.load(SamplerSpec, recipe.sampler).read(recipe.sampler, recipe.scenes.options, "scenes")
+        plugins.load(SamplerSpec, recipe.sampler).read_options(recipe.sampler, recipe.scenes.options, "scenes")
     if isinstance(recipe.scenes, ScenesEntry):
         check_layout(recipe.scenes.layout, "scenes")
         check_orientation(recipe.scenes.orientation, "scenes")

@@ -42,18 +42,13 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 from viewsphere.urls import here
 from viewsphere.zoo import build_zoo_model
 
 ENGINE = "cycles"
 """The engine that builds and saves the scenes."""
-
-HOLDS = ("the scene itself",)
-READ_BY = ("Blender",)
-ANNOTATES = False  # what is hidden is part of a scene, too
-CREDITS = False
-CHANNELS = ()
 
 
 def check() -> None:
@@ -245,3 +240,16 @@ class StoredModels:
             if info.node is None:
                 return load_normalised(_spec(own, str(file)))
             return normalise(*load_model(file, node=info.node), _spec(own, str(file)))
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("the scene itself",),
+    read_by=("Blender",),
+    channels=(),
+    keeps_all_objects=True,  # what is hidden is part of a scene, too
+    names_credits=False,
+    refuses=refuses,
+    check=check,
+    writer=writer,
+)

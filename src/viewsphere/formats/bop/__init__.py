@@ -54,7 +54,7 @@ from viewsphere.formats._paper import json_bytes
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._refusals import known_cameras, lacking_labels, pinhole
 from viewsphere.formats._tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item, member
-from viewsphere.formats.bop.again import again as again
+from viewsphere.formats.bop.again import again
 from viewsphere.formats.bop.entries import (
     Entry,
     camera,
@@ -67,15 +67,12 @@ from viewsphere.formats.bop.entries import (
     targets,
 )
 from viewsphere.formats.bop.models import facts, ply
-from viewsphere.formats.bop.options import Options as Options
-from viewsphere.formats.bop.reading import read as read
+from viewsphere.formats.bop.options import Options
+from viewsphere.formats.bop.reading import read
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "depth")
-CREDITS = False
-HOLDS = ("object poses", "visible and whole masks", "depth", "camera poses", "models", "symmetries")
-READ_BY = ("bop_toolkit", "BlenderProc", "webdataset")
 KINDS = (".png", ".jpg")
 SCENE = 1000
 """Still pictures of a scene, and pictures of a shard."""
@@ -201,3 +198,20 @@ def _place(dataset: Dataset, sample: Sample) -> tuple[int, int]:
 
 
 preparer, writer, verify = functions(Bop)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("object poses", "visible and whole masks", "depth", "camera poses", "models", "symmetries"),
+    read_by=("bop_toolkit", "BlenderProc", "webdataset"),
+    options=Options,
+    channels=("rgb", "depth"),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+    again=again,
+)

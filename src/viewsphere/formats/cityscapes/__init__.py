@@ -57,12 +57,8 @@ from viewsphere.formats.cityscapes.classes import COLORS, LABELS, labels_of
 from viewsphere.formats.cityscapes.instances import EACH, Region, regions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb", "instances", "semantic")
-CREDITS = False
-HOLDS = ("semantic masks", "instance masks", "polygons", "stereo pairs", "disparity", "calibration")
-READ_BY = ("torchvision", "cityscapesScripts")
 
 TYPES = 4
 """Files of a frame in one folder, at most."""
@@ -154,3 +150,18 @@ def _camera(sample: Sample, baseline: float) -> dict[str, dict[str, float]]:
 
 
 preparer, writer, verify = functions(Cityscapes)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("semantic masks", "instance masks", "polygons", "stereo pairs", "disparity", "calibration"),
+    read_by=("torchvision", "cityscapesScripts"),
+    options=Options,
+    channels=("rgb", "instances", "semantic"),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -33,19 +33,17 @@ from pathlib import Path
 
 from viewsphere.errors import UserError
 from viewsphere.formats._contents import put
-from viewsphere.formats.coco.categories import keeps_ids
-from viewsphere.formats.coco.categories import notes as notes
+from viewsphere.formats.coco.categories import keeps_ids, notes
 from viewsphere.formats.coco.entries import Entries, Entry, files, seen
 from viewsphere.formats.coco.instances import instances
-from viewsphere.formats.coco.options import Options as Options
-from viewsphere.formats.coco.proving import verify as verify
-from viewsphere.formats.coco.reading import read as read
+from viewsphere.formats.coco.options import Options
+from viewsphere.formats.coco.proving import verify
+from viewsphere.formats.coco.reading import read
 from viewsphere.model.channel import missing
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-HOLDS = ("boxes", "masks", "keypoints", "captions", "poses", "3D boxes")
-READ_BY = ("pycocotools", "torchvision", "datumaro", "supervision", "FiftyOne")
 CHANNELS = ("rgb",)
 
 
@@ -75,3 +73,17 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options:
     with instances(dataset, folder / "annotations", options) as append:
         yield append
     dataset.link_models(folder / "MODELS")
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("boxes", "masks", "keypoints", "captions", "poses", "3D boxes"),
+    read_by=("pycocotools", "torchvision", "datumaro", "supervision", "FiftyOne"),
+    options=Options,
+    channels=CHANNELS,
+    notes=notes,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+)

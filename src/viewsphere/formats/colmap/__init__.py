@@ -37,19 +37,16 @@ from viewsphere.formats._cameras import Moment, Rigs, world_of
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._refusals import known_cameras, no_skew
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
-from viewsphere.formats.colmap.again import again as again
+from viewsphere.formats.colmap.again import again
 from viewsphere.formats.colmap.points import Sights
-from viewsphere.formats.colmap.reading import read as read
+from viewsphere.formats.colmap.reading import read
 from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "depth")
-CREDITS = False
-HOLDS = ("cameras", "poses", "rigs", "points")
-READ_BY = ("pycolmap", "COLMAP", "Gaussian splatting")
 SHARED = 1
 """The rig that all frames have whose lenses are those of the first."""
 
@@ -146,3 +143,19 @@ def _rig(number: int, cameras: Iterable[int], mounts: Iterable[np.ndarray[Any, A
 
 
 preparer, writer, verify = functions(Colmap)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("cameras", "poses", "rigs", "points"),
+    read_by=("pycolmap", "COLMAP", "Gaussian splatting"),
+    options=Options,
+    channels=("rgb", "depth"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+    again=again,
+)

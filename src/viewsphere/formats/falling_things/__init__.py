@@ -56,12 +56,10 @@ from viewsphere.model.channel import missing
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 CHANNELS = ("rgb", "depth", "instances")
-CREDITS = False
-HOLDS = ("object poses", "3D boxes", "boxes", "depth", "class masks", "camera poses")
-READ_BY = ("torchvision", "DOPE")
 FOLDER = 1000
 """Numbers of pictures in a folder."""
 
@@ -170,3 +168,17 @@ class FallingThings(Tree):
 
 
 preparer, writer, verify = functions(FallingThings)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("object poses", "3D boxes", "boxes", "depth", "class masks", "camera poses"),
+    read_by=("torchvision", "DOPE"),
+    options=Options,
+    channels=CHANNELS,
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -17,14 +17,12 @@ from viewsphere.errors import UserError
 from viewsphere.formats.huggingface.arrow import arrow
 from viewsphere.formats.huggingface.card import CARD, card
 from viewsphere.formats.huggingface.columns import Columns
-from viewsphere.formats.huggingface.options import Options as Options
-from viewsphere.formats.huggingface.proving import verify as verify
+from viewsphere.formats.huggingface.options import Options
+from viewsphere.formats.huggingface.proving import verify
 from viewsphere.formats.huggingface.shards import Shards, split_name
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-HOLDS = ("everything but maps of points",)
-READ_BY = ("datasets",)
 
 
 def check() -> None:
@@ -54,3 +52,14 @@ def writer(
     yield add
     shards.end()
     (folder / CARD).write_text(card(dataset, shards), "utf-8", newline="\n")
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("everything but maps of points",),
+    read_by=("datasets",),
+    options=Options,
+    check=check,
+    writer=writer,
+    verify=verify,
+)

@@ -52,15 +52,9 @@ from viewsphere.formats import Scope
 from viewsphere.formats._kitti import other_cars
 from viewsphere.formats._refusals import pinhole, plain_names, sequences
 from viewsphere.formats._tree import functions
-from viewsphere.formats.kitti.reading import read as read
-from viewsphere.formats.kitti.writing import Kitti, type_of
-from viewsphere.formats.kitti.writing import Options as Options
-
-CHANNELS = ("rgb",)
-CREDITS = False
-LIDAR = True
-HOLDS = ("boxes", "3D boxes", "tracks", "calibrations", "stereo", "LiDAR points")
-READ_BY = ("datumaro", "torchvision")
+from viewsphere.formats.kitti.reading import read
+from viewsphere.formats.kitti.writing import Kitti, Options, type_of
+from viewsphere.plugins.format import FormatSpec
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
@@ -77,3 +71,19 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 
 
 preparer, writer, verify = functions(Kitti)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("boxes", "3D boxes", "tracks", "calibrations", "stereo", "LiDAR points"),
+    read_by=("datumaro", "torchvision"),
+    options=Options,
+    channels=("rgb",),
+    lidar=True,
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+)

@@ -22,13 +22,11 @@ from viewsphere.formats._contents import put
 from viewsphere.formats._refusals import any_view
 from viewsphere.formats.native.entries import Entry, entries_of, files
 from viewsphere.formats.native.poses import poses
-from viewsphere.formats.native.proving import verify as verify
-from viewsphere.formats.native.reading import read as read
+from viewsphere.formats.native.proving import verify
+from viewsphere.formats.native.reading import read
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-HOLDS = ("poses", "3D boxes", "masks", "depth")
-READ_BY = ("any JSON reader",)
 
 
 def refuses(scope: Scope) -> Iterator[str]:
@@ -53,3 +51,15 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gener
     with poses(dataset, folder) as append:
         yield append
     dataset.link_models(folder / "MODELS")
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("poses", "3D boxes", "masks", "depth"),
+    read_by=("any JSON reader",),
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+)

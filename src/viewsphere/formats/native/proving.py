@@ -6,12 +6,12 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
 from viewsphere.aside import temporary
-from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, models
 from viewsphere.formats._json_proof import check_json
 from viewsphere.formats._json_rows import Where
 from viewsphere.formats.native.entries import Entry, entries_of, files
 from viewsphere.formats.native.poses import FILE_NAME, poses
+from viewsphere.plugins.format import Remark
 from viewsphere.store import Dataset
 
 OPENED: tuple[Where, ...] = (

@@ -46,18 +46,15 @@ from viewsphere.formats._cameras import Rigs, measured_png, opengl_pose, points_
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, item
-from viewsphere.formats.nerfstudio.again import again as again
+from viewsphere.formats.nerfstudio.again import again
 from viewsphere.formats.nerfstudio.lenses import SYNTHETIC, lens_problem, model_of, said_of
-from viewsphere.formats.nerfstudio.reading import read as read
+from viewsphere.formats.nerfstudio.reading import read
 from viewsphere.formats.nerfstudio.synthetic import SPLITS, synthetic_files, synthetic_layout
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("cameras", "poses", "depth", "masks", "points")
-READ_BY = ("nerfstudio", "instant-ngp", "NeRF", "Gaussian splatting")
 MILLIMETRE = 0.001
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
 
@@ -160,3 +157,20 @@ def _points(path: str, sample: Sample) -> Piece:
 
 
 preparer, writer, verify = functions(Nerfstudio)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("cameras", "poses", "depth", "masks", "points"),
+    read_by=("nerfstudio", "instant-ngp", "NeRF", "Gaussian splatting"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+    again=again,
+)

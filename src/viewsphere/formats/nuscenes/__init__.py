@@ -52,14 +52,8 @@ from viewsphere.formats.nuscenes.story import story_of
 from viewsphere.formats.nuscenes.view import KINDS, View, points
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-
-CHANNELS = ("rgb",)
-CREDITS = False
-LIDAR = True
-ANNOTATES = False
-HOLDS = ("3D boxes", "tracks", "camera poses", "calibrations", "LiDAR points")
-READ_BY = ("nuscenes-devkit",)
 
 
 class Options(Frozen):
@@ -145,3 +139,19 @@ class NuScenes(Tree):
 
 
 preparer, writer, verify = functions(NuScenes)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("3D boxes", "tracks", "camera poses", "calibrations", "LiDAR points"),
+    read_by=("nuscenes-devkit",),
+    options=Options,
+    channels=("rgb",),
+    lidar=True,
+    keeps_all_objects=True,
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

@@ -54,16 +54,11 @@ from collections.abc import Iterator
 from viewsphere.formats import Scope
 from viewsphere.formats._refusals import most_categories, most_objects
 from viewsphere.formats._tree import functions
-from viewsphere.formats._viewpoint_mat import Options as Options
-from viewsphere.formats._viewpoint_mat import no_viewpoints, scipy_io
-from viewsphere.formats.pascal3d.again import again as again
-from viewsphere.formats.pascal3d.reading import read as read
+from viewsphere.formats._viewpoint_mat import Options, no_viewpoints, scipy_io
+from viewsphere.formats.pascal3d.again import again
+from viewsphere.formats.pascal3d.reading import read
 from viewsphere.formats.pascal3d.writing import CLASSES, MOST, Pascal3d
-
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("viewpoints", "CAD models", "boxes", "masks", "anchors")
-READ_BY = ("scipy", "MATLAB")
+from viewsphere.plugins.format import FormatSpec
 
 
 def check() -> None:
@@ -84,3 +79,21 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 
 
 preparer, writer, verify = functions(Pascal3d)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("viewpoints", "CAD models", "boxes", "masks", "anchors"),
+    read_by=("scipy", "MATLAB"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    check=check,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+    again=again,
+)

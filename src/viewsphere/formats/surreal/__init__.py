@@ -49,11 +49,7 @@ from viewsphere.formats._timeline import unknown_shots
 from viewsphere.formats._tree import functions
 from viewsphere.formats._viewpoint_mat import scipy_io
 from viewsphere.formats.surreal.writing import Surreal, film_encoder
-
-CHANNELS = ("rgb", "depth", "instances", "body_parts", "flow_backward", "normals")
-CREDITS = False
-HOLDS = ("videos", "depth", "body parts", "flow", "normals", "joints", "cameras")
-READ_BY = ("scipy", "MATLAB")
+from viewsphere.plugins.format import FormatSpec
 
 
 def check() -> None:
@@ -81,3 +77,18 @@ def refuses(scope: Scope) -> Iterator[str]:
 
 
 preparer, writer, verify = functions(Surreal)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("videos", "depth", "body parts", "flow", "normals", "joints", "cameras"),
+    read_by=("scipy", "MATLAB"),
+    channels=("rgb", "depth", "instances", "body_parts", "flow_backward", "normals"),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    check=check,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

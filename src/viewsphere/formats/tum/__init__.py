@@ -36,17 +36,14 @@ from viewsphere.formats._cameras import Rigs, measured_png, world_from_camera, w
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import known_cameras, lenses, no_skew, pinhole
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, line
-from viewsphere.formats.tum.reading import read as read
+from viewsphere.formats.tum.reading import read
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "depth")
-CREDITS = False
-HOLDS = ("depth", "trajectories")
-READ_BY = ("TUM's RGB-D tools", "SLAM systems", "evo")
 STEP = 1 / 5000
 """Metres of a step of depth."""
 
@@ -144,3 +141,18 @@ def _mirrored(pose: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 preparer, writer, verify = functions(Tum)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("depth", "trajectories"),
+    read_by=("TUM's RGB-D tools", "SLAM systems", "evo"),
+    options=Options,
+    channels=("rgb", "depth"),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+)

@@ -56,12 +56,9 @@ from viewsphere.formats.vkitti import maps, rows
 from viewsphere.formats.vkitti.names import Names
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
-CHANNELS = ("rgb", "depth", "instances", "semantic", "flow")
-CREDITS = False
-HOLDS = ("depth", "segmentation", "flow", "scene flow", "boxes", "3D boxes", "tracks", "cameras", "stereo")
-READ_BY = ("pandas", "numpy")
 MOST = 255
 FAR = 65535
 BACKWARD = ("backwardFlow", "backwardSceneFlow")
@@ -169,3 +166,18 @@ class VKitti(Tree):
 
 
 preparer, writer, verify = functions(VKitti)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("depth", "segmentation", "flow", "scene flow", "boxes", "3D boxes", "tracks", "cameras", "stereo"),
+    read_by=("pandas", "numpy"),
+    options=Options,
+    channels=("rgb", "depth", "instances", "semantic", "flow"),
+    names_credits=False,
+    needs=needs,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+)

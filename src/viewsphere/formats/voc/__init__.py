@@ -40,14 +40,9 @@ from collections.abc import Iterator
 from viewsphere.formats import Scope
 from viewsphere.formats._refusals import most_categories, most_objects, plain_names
 from viewsphere.formats._tree import functions
-from viewsphere.formats.voc.reading import read as read
-from viewsphere.formats.voc.writing import Options as Options
-from viewsphere.formats.voc.writing import Voc
-
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("boxes", "class masks", "instance masks", "truncation", "occlusion", "pose categories")
-READ_BY = ("torchvision", "supervision", "datumaro")
+from viewsphere.formats.voc.reading import read
+from viewsphere.formats.voc.writing import Options, Voc
+from viewsphere.plugins.format import FormatSpec
 
 MOST = 254  # 255 is void
 NAMES = r"[^:#\x00-\x1f][^:\x00-\x1f]*"
@@ -62,3 +57,18 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 
 
 preparer, writer, verify = functions(Voc)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("boxes", "class masks", "instance masks", "truncation", "occlusion", "pose categories"),
+    read_by=("torchvision", "supervision", "datumaro"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    refuses=refuses,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+)

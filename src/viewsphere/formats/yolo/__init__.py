@@ -22,14 +22,9 @@ Ultralytics' documentation, https://docs.ultralytics.com/datasets/.
 from __future__ import annotations
 
 from viewsphere.formats._tree import functions
-from viewsphere.formats.yolo.reading import read as read
-from viewsphere.formats.yolo.writing import Options as Options
-from viewsphere.formats.yolo.writing import Yolo
-
-CHANNELS = ("rgb",)
-CREDITS = False
-HOLDS = ("boxes", "masks", "keypoints", "oriented boxes")
-READ_BY = ("ultralytics", "supervision", "datumaro")
+from viewsphere.formats.yolo.reading import read
+from viewsphere.formats.yolo.writing import Options, Yolo
+from viewsphere.plugins.format import FormatSpec
 
 
 def needs(options: Options) -> tuple[str, ...]:
@@ -38,3 +33,18 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 preparer, writer, verify = functions(Yolo)
+
+
+FORMAT = FormatSpec(
+    about=__doc__,
+    holds=("boxes", "masks", "keypoints", "oriented boxes"),
+    read_by=("ultralytics", "supervision", "datumaro"),
+    options=Options,
+    channels=("rgb",),
+    names_credits=False,
+    needs=needs,
+    writer=writer,
+    preparer=preparer,
+    verify=verify,
+    read=read,
+)

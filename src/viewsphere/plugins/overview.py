@@ -1,0 +1,38 @@
+"""All plug-ins that are installed, and those that cannot be loaded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from viewsphere.errors import UserError
+from viewsphere.plugins.format import FormatSpec
+from viewsphere.plugins.registry import SEAMS, Kind, load, names, origin
+from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.plugins.spec import Spec
+
+SPECS: tuple[type[Spec], ...] = (FormatSpec, SamplerSpec)
+"""The specs of all kinds."""
+
+
+@dataclass(frozen=True)
+class Installed:
+    """A plug-in, the distribution that it comes from, with its version, and why it cannot be loaded (None: it can)."""
+
+    kind: Kind
+    name: str
+    distribution: str
+    error: str | None
+
+
+def overview() -> tuple[Installed, ...]:
+    """All plug-ins, by kind and name; each is loaded."""
+    return tuple(Installed(kind, name, origin(kind, name), _error(kind, name)) for kind in SEAMS for name in names(kind))
+
+
+def _error(kind: Kind, name: str) -> str | None:
+    spec = {spec.KIND: spec for spec in SPECS}.get(kind)
+    try:
+        load(kind if spec is None else spec, name)
+    except UserError as error:
+        return str(error)
+    return None
