@@ -19,7 +19,7 @@ from statistics import quantiles
 
 ROOT = Path(__file__).parent.parent
 LIMITS = Path(__file__).with_suffix(".json")
-GENERATED = re.compile(r"<!-- [^>]*written by \w+/\w+ -->.*?<!-- end -->", re.DOTALL)
+GENERATED = re.compile(r"<!-- [^>]*\b(?:scripts|benchmarks)/\w+ -->.*?<!-- end -->", re.DOTALL)
 NO_PROSE = re.compile(
     r"^( *)```.*?^\1```|^    .*?$|<!--.*?-->|^#.*?$|^\|[-:| ]+\|$|!\[[^\]]*\]\([^)]*\)", re.DOTALL | re.MULTILINE
 )
