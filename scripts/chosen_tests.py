@@ -28,7 +28,8 @@ from pathlib import Path
 
 import grimp
 
-from viewsphere import _HOMES, plugins
+from viewsphere import _HOMES
+from viewsphere.plugins.registry import SEAMS
 
 ROOT = Path(__file__).parent.parent
 MAIN = "origin/main"
@@ -43,6 +44,8 @@ LISTS = {
     "families": "viewsphere.zoo.",
     "places": "viewsphere.zoo.",
     "zoo": "viewsphere.zoo.",
+    "loadable": "viewsphere.",
+    "plugins": "viewsphere.",
     "names": "viewsphere.",
 }
 """What lists plug-ins without naming them, a function or a command of the program, and those that it lists."""
@@ -113,7 +116,7 @@ class Modules:
         graph = grimp.build_graph("viewsphere", exclude_type_checking_imports=True)
         self.all = frozenset(graph.modules)
         self.plugins = defaultdict[str, set[str]](set)
-        homes = {*plugins.PACKAGES.values(), "viewsphere.zoo", "viewsphere.zoo.places"}
+        homes = {*(seam.package for seam in SEAMS.values()), "viewsphere.zoo", "viewsphere.zoo.places"}
         for module in self.all:
             package, _, name = module.rpartition(".")
             if package in homes and not name.startswith("_"):
