@@ -56,8 +56,10 @@ def encode_png(
     more = b"" if palette is None else _chunk(b"PLTE", palette.tobytes())
     if unit is not None:
         more += _chunk(b"pCAL", struct.pack(">6siiBB2s", b"depth", 0, 65535, 0, 2, b"m") + f"0\0{65535 * unit!r}".encode())
-    lines = _filtered(array, components)
-    body = _zlib(lines, components) if rendered and array.dtype == np.uint8 and components > 1 else compressed(lines)
+    if rendered and array.dtype == np.uint8 and components > 1:
+        body = _zlib(array.reshape(height, -1), components)
+    else:
+        body = compressed(_filtered(array, components))
     return b"".join((_SIGNATURE, _chunk(b"IHDR", header), more, _chunk(b"IDAT", body), _chunk(b"IEND", b"")))
 
 
@@ -80,8 +82,12 @@ def _filtered(array: NDArray[Any], components: int) -> NDArray[np.uint8]:
     return lines
 
 
-def _zlib(lines: NDArray[np.uint8], components: int) -> bytes:
-    """The zlib stream of a rendered picture's filtered scan lines."""
+def _zlib(rows: NDArray[np.uint8], components: int) -> bytes:
+    """The zlib stream of a rendered picture, filtered."""
+    from viewsphere.codecs.kernels_huffman import subtract_left
+
+    lines = np.empty((len(rows), 1 + rows.shape[1]), np.uint8)
+    subtract_left(np.ascontiguousarray(rows), components, lines)
     return b"".join((b"\x78\x01", deflate_lines(lines, components), struct.pack(">I", isal_zlib.adler32(lines))))
 
 

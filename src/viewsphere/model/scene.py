@@ -246,6 +246,8 @@ class Finish(Frozen):
 
     def with_background(self, transparent: bool) -> Finish:
         """The same finish, with its background, or transparent behind the scene."""
+        if self.background.transparent == transparent:
+            return self
         background = self.background.model_copy(update={"transparent": transparent})
         return self.model_copy(update={"background": background})
 

@@ -116,6 +116,17 @@ def over_bytes(p, background, curve, out):
 
 
 @njit(fastmath=FAST)
+def standard_bytes(radiance, matrix, background, curve, p, out):
+    """The bytes (N, 3) of nearly all pictures in one call: `expose`, `standard` and `over_bytes`, block by block."""
+    for first in range(0, out.shape[0], BLOCK):
+        stop = min(first + BLOCK, out.shape[0])
+        low, high = (0, 1) if background.shape[0] == 1 else (first, stop)
+        expose(radiance[4 * first : 4 * stop], matrix, p)
+        standard(p)
+        over_bytes(p, background[low:high], curve, out[first:stop])
+
+
+@njit(fastmath=FAST)
 def straight_bytes(p, curve, out):
     """A block as bytes (n, 4), straight alpha."""
     for i in range(U(out.shape[0])):

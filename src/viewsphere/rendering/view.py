@@ -57,6 +57,10 @@ def develop(radiance: Float32, background: Float32 | None, view: ViewTransform, 
     from viewsphere.rendering import kernels_view as kernels
 
     out, curve = np.empty((*radiance.shape[:2], 4 if alpha else 3), np.uint8), srgb_bytes()
+    if view.transform == "standard" and not alpha:
+        p = np.zeros(4 * kernels.BLOCK, np.float32)
+        kernels.standard_bytes(radiance.reshape(-1), exposure_matrix(view), _rows(background), curve, p, _rows(out))
+        return out
     for p, part, under in _blocks(radiance, background, view):
         if alpha:
             kernels.straight_bytes(p, curve, _rows(out)[part])

@@ -25,6 +25,9 @@ EDGE_ON = 1e-9
 OUTSIDE = (-1e9, 0.0, 1.0, 1.0)
 """`homogeneous` of a vertex that is far from the picture."""
 
+_CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
+"""For each corner of a box, along each axis: 0 for the lowest, 1 for the highest."""
+
 Runs = NDArray[np.int64]
 """Ranges [first, stop), (n, 2)."""
 
@@ -152,7 +155,8 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     are arbitrary. `in_picture` gives those that are not.
     """
     k = camera.K if camera.distortion is None else np.eye(3)
-    moved = np.column_stack((camera.R, camera.t))
+    moved = np.empty((3, 4))
+    moved[:, :3], moved[:, 3] = camera.R, camera.t
     m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
     if base or stop is not None or camera.distortion is not None:
         return projected(geometry, m, base, stop)
@@ -180,8 +184,16 @@ def left_out(geometry: Geometry, q: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _shown(without: NDArray[np.bool_], starts: tuple[int, ...], end: int) -> Runs:
-    """Runs, up to the end, of what things own that are not left out, from these starts on, and the ground."""
-    is_shown = np.array([False, *~without, True, False])
+    """Runs, up to the end, of what things own that are not left out, from these starts on, and the ground. Do not write to it:
+    several frames ask for the same.
+    """
+    return _known_runs(without.tobytes(), starts, end)
+
+
+@lru_cache(maxsize=16)
+def _known_runs(without: bytes, starts: tuple[int, ...], end: int) -> Runs:
+    """`_shown`, of the bytes of its flags."""
+    is_shown = np.array([False, *~np.frombuffer(without, np.bool_), True, False])
     borders = np.flatnonzero(is_shown[1:] != is_shown[:-1])
     return np.array([*starts, end], np.int64)[borders].reshape(-1, 2)
 
@@ -210,8 +222,7 @@ def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.fl
     """Which things of a geometry lie wholly outside of a pinhole's picture, a pixel away from it, or behind the camera: all
     corners of their boxes do.
     """
-    which = np.indices((2, 2, 2)).reshape(3, 8).T
-    corners = geometry.bounds[:, which, np.arange(3)]  # (N, 8, 3)
+    corners = geometry.bounds[:, _CORNERS, np.arange(3)]  # (N, 8, 3)
     with np.errstate(invalid="ignore"):  # of things without triangles
         u, v, w = (corners[..., 0] * m[0] + corners[..., 1] * m[1] + corners[..., 2] * m[2] + m[3] for m in pixels_from_world)
         sides = u < -w, u > (camera.width + 1) * w, v < -w, v > (camera.height + 1) * w, w < 0

@@ -201,13 +201,16 @@ def sky_behind(view: PictureRays, surrounding: Surrounding, radiance: Float32) -
     to_map = turn @ view.rotation.T
     has_rays = len(view.rays) > 0
     if not has_rays:
-        to_map = to_map @ np.vstack([view.lens, [0, 0, 1]])
+        lens = np.eye(3)
+        lens[:2] = view.lens
+        to_map = to_map @ lens
     # The mip level of the picture whose texels are about as large as a pixel.
     texels = float(view.pixel) * float(surrounding.picture_levels[0, 1]) / (2 * math.pi)
     level = min(math.floor(math.log2(max(texels, 1.0)) + 0.5), len(surrounding.picture_levels) - 1)
-    light, sun = surrounding.light[[kernels.SCALE, kernels.BEHIND]], surrounding.sun
-    disc = np.array([surrounding.half_angle, 1 / max(view.pixel, 1e-6), 0])
-    numbers = np.vstack([to_map, turn @ sun[0], light, sun[1:], disc]).astype(np.float32)
+    sun, numbers = surrounding.sun, np.zeros((9, 3), np.float32)
+    numbers[:3], numbers[3] = to_map, turn @ sun[0]
+    numbers[4], numbers[5] = surrounding.light[kernels.SCALE], surrounding.light[kernels.BEHIND]
+    numbers[6:8], numbers[8, :2] = sun[1:], (surrounding.half_angle, 1 / max(view.pixel, 1e-6))
     kernels.lay_over_sky(
         view.rays if has_rays else view.places, np.int32(view.columns), numbers.ravel(), surrounding.picture,
         *surrounding.picture_levels[level], np.empty(kernels.ROWS * kernels.CHUNK, np.float32), radiance,

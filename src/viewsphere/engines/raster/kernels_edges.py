@@ -24,20 +24,26 @@ STEEPEST = f4(0.9)  # of 1/z: how much farther than the centres around its pixel
 SLACK = f4(0.01)  # relative difference of 1/z at which two surfaces still pass for the same
 FLUSH = f4(1.001)  # of 1/z: a vertex in a surface that is already drawn does not count as behind it
 NARROW = 8  # pixels: up to this size every pixel of a triangle's box is looked at
+CELL = 16  # pixels: numbered pixels are found by the cell of their row that they are in
+FEW = 4  # pixels of a row: up to so many are tested one by one, which is faster than computing what the triangle covers
 THIN = 2.0  # pixels: a triangle as wide as this is seen at some pixel's centre
 
 
 @njit
-def begin(pixels, total, triangle, depth, grid, limit, bound, nearest, seen, wanted):
+def begin(pixels, total, triangle, depth, grid, limit, starts, bound, nearest, seen, wanted):
     """Number the `total` marked pixels, and mark in `wanted` (T,) also the triangles that the centres around these pixels show.
 
-    Fills grid (H, W); limit (H, W): 1/z that a surface must exceed to matter to a pixel; bound (n,): 1/z of the farthest
-    surface that may show at each number, 0 where none may; nearest (n, 4) float32 1/z and seen (n, 4) triangles, -1 where none
-    is drawn yet.
+    Fills starts (H * cells a row + 1,): the first number in each `CELL`, or behind it; grid (H, W); limit (H, W): 1/z that a
+    surface must exceed to matter to a pixel; bound (n,): 1/z of the farthest surface that may show at each number, 0 where none
+    may; nearest (n, 4) float32 1/z and seen (n, 4) triangles, -1 where none is drawn yet.
     """
     height, width = triangle.shape
+    cells, cell = (width + CELL - 1) // CELL, U(0)
     for k in range(U(total)):
         y, x = pixels[k] // width, pixels[k] % width
+        while cell <= U(y * cells + x // CELL):
+            starts[cell] = k
+            cell += U(1)
         least = depth[U(y), U(x)]
         for j in range(U(max(y - 1, 0)), U(min(y + 2, height))):
             for i in range(U(max(x - 1, 0)), U(min(x + 2, width))):
@@ -49,6 +55,7 @@ def begin(pixels, total, triangle, depth, grid, limit, bound, nearest, seen, wan
         grid[U(y), U(x)], limit[U(y), U(x)], bound[k] = k, least, least
         for i in range(U(4)):
             nearest[k, i], seen[k, i] = least, np.int32(-1)
+    starts[cell:] = total
 
 
 @njit
@@ -90,11 +97,12 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
 ):
     """Draw these triangles at the four samples (`offsets` (2, 4)) of the `count` numbered pixels.
 
-    `room` is `samples._room`; starts (H + 1,): each row's first number; the other arrays are those of `begin`. Raises
-    limit of a numbered pixel to 1/z of its farthest sample. Returns how many pixels are numbered in the end.
+    `room` is `samples._room`; the other arrays are those of `begin`. Raises limit of a numbered pixel to 1/z of its farthest
+    sample. Returns how many pixels are numbered in the end.
     """
     height, width = triangle.shape
     found, inverse = room
+    cells = (width + CELL - 1) // CELL
     a, b, c, d = U(0), U(1), U(2), U(3)
     lowest, highest = offsets[a, d], offsets[a, b]  # the outermost samples along either axis
     for o in range(U(order.shape[0])):
@@ -135,19 +143,23 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
         thin = not crossing and abs(det) * w0 * w1 * w2 < THIN * max(xb - xa, yb - ya)
         for y in range(ya, ya + 1 if narrow else yb + 1):
             if not narrow:
-                left, right = span((e0, e1, e2), y, xa, xb, lowest, highest)
                 n, row = U(0), U(y)
-                if thin:
-                    for x in range(left, right + 1):
-                        found[n] = row << U(16) | U(x)
-                        n += U(before > limit[row, U(x)])
-                else:
-                    k, last = _first_from(pixels, starts[y], starts[y + 1], y * width + left), U(starts[y + 1])
-                    while k < last and pixels[k] <= y * width + right:
+                if not thin:
+                    for k in range(U(starts[y * cells + xa // CELL]), U(starts[y * cells + xb // CELL + 1])):
                         x = U(pixels[k] - y * width)
                         found[n] = row << U(16) | x
-                        n += U(before > limit[row, x])
-                        k += U(1)
+                        n += U((x >= U(xa)) & (x <= U(xb)) & (before > limit[row, x]))
+                if thin or n > U(FEW):
+                    left, right = span((e0, e1, e2), y, xa, xb, lowest, highest)
+                    listed, n = n, U(0)
+                    if thin:
+                        for x in range(left, right + 1):
+                            found[n] = row << U(16) | U(x)
+                            n += U(before > limit[row, U(x)])
+                    for j in range(listed):
+                        found[n] = found[j]
+                        x = np.int64(found[j] & np.uint32(0xFFFF))
+                        n += U((x >= left) & (x <= right))
             for j in range(n):
                 row, column = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF))
                 k = grid[row, column]
@@ -174,18 +186,6 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
                     count += 1
                 limit[row, column] = put_before(which, inverse, np.int32(t), nearest, seen, u)
     return count
-
-
-@inner
-def _first_from(pixels, first, last, least):
-    """The first of pixels[first:last], which are in order, that is `least` or more; `last` where none is."""
-    while first < last:
-        middle = (first + last) >> 1
-        if pixels[U(middle)] < least:
-            first = middle + 1
-        else:
-            last = middle
-    return U(first)
 
 
 @inner

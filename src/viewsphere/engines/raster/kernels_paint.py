@@ -286,6 +286,19 @@ def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals,
     return like, rows[:count]
 
 
+@njit
+def own_samples(rows, like, position, triangle, depth, places, shown, inverses, is_other):
+    """Fill places (4 R, 2), shown and inverses (4 R,) with the samples of these rows of pixels, as `shared_samples` found them.
+    Samples that have a colour of another kind show nothing, -1, and are marked in is_other (4 R,).
+    """
+    for r in range(U(rows.shape[0])):
+        for i in range(U(4)):
+            k, m = U(4) * r + i, U(4) * U(rows[r]) + i
+            is_other[k] = like[m] != ~np.int32(k)
+            places[k, U(0)], places[k, U(1)] = position[m, U(0)], position[m, U(1)]
+            shown[k], inverses[k] = np.int32(-1) if is_other[k] else triangle[m], depth[m]
+
+
 @njit(fastmath=FAST, _nrt=True)
 def average_samples(pixels, like, samples, radiance):
     """Set each pixel to the mean of its four samples (premultiplied), whose colours `shared_samples` found.

@@ -141,21 +141,22 @@ def _smooth(
     shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
     surfaces = baked.owner, baked.surfaces.normals
     like, rows = kernels_paint.shared_samples(samples.pixels, *shown, *centres, *surfaces, behind, radiance)
-    at = (4 * rows[:, None] + np.arange(4, dtype=np.int32)).reshape(-1)
-    is_own = like[at] == ~np.arange(len(at))
-    own = Samples(
-        samples.pixels[rows],
-        samples.position[at],
-        samples.rays[at] if len(samples.rays) else samples.rays,
-        np.where(is_own, samples.triangle[at], np.int32(-1)),
-        samples.inverse_depth[at],
+    count = 4 * len(rows)
+    is_other, places, triangle, inverse = (
+        np.empty(count, np.bool_),
+        np.empty((count, 2), np.float32),
+        np.empty(count, np.int32),
+        np.empty(count, np.float32),
     )
+    kernels_paint.own_samples(rows, like, samples.position, *shown, places, triangle, inverse, is_other)
+    rays = samples.rays.reshape(-1, 4, 3)[rows].reshape(-1, 3) if len(samples.rays) else samples.rays
+    own = Samples(samples.pixels[rows], places, rays, triangle, inverse)
     view = view_of(baked, camera, own)
-    colors, parts = np.empty((len(at), 4), np.float32), np.zeros((len(at) if len(split) else 0, split.shape[1]), np.float32)
+    colors, parts = np.empty((count, 4), np.float32), np.zeros((count if len(split) else 0, split.shape[1]), np.float32)
     air = None if fog is None else Air.of(fog, camera, _rays(camera, own), is_outdoors)
     shade_all(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
     if has_sky:
-        colors[~is_own, 3] = 1  # the sky need not be looked up for these
+        colors[is_other, 3] = 1  # the sky need not be looked up for these
         _lay_sky(view, baked.surrounding, colors, air)
     if len(split):
         kernels_split.average_split(samples.pixels, like, colors, radiance, parts, split)

@@ -307,10 +307,10 @@ def _pinhole_edges(
     most = len(marked) + height * width // 8  # room for pixels that are found while drawing
     pixels = np.empty(most, np.int32)
     pixels[: len(marked)] = marked
-    starts = np.searchsorted(marked, width * np.arange(height + 1)).astype(np.int32)
+    starts = np.empty(height * -(-width // kernels_edges.CELL) + 1, np.int32)
     grid, limit = np.full((height, width), -1, np.int32), shown[1] * np.float32(1 + kernels_edges.SLACK)
     bound, nearest, seen = np.empty(len(marked), np.float32), np.empty((most, 4), np.float32), np.empty((most, 4), np.int32)
-    kernels_edges.begin(pixels, len(marked), *shown, grid, limit, bound, nearest, seen, wanted)
+    kernels_edges.begin(pixels, len(marked), *shown, grid, limit, starts, bound, nearest, seen, wanted)
     surfaces = q, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays
     canvas = _room(width), _ROTATED, *shown, grid, limit, pixels, starts
     count = kernels_edges.draw(_within(runs[1], are_wanted), *surfaces, *canvas, len(bound), nearest, seen)
@@ -323,9 +323,8 @@ def _pinhole_edges(
 
 def _within(runs: Runs, marks: Bool) -> NDArray[np.int64]:
     """The marked ones among runs of triangles, in their order."""
-    return np.concatenate(
-        [np.empty(0, np.int64), *(first + np.flatnonzero(marks[first:stop]) for first, stop in runs.tolist())]
-    )
+    found = [first + marks[first:stop].nonzero()[0] for first, stop in runs.tolist()]
+    return found[0] if len(found) == 1 else np.concatenate([np.empty(0, np.int64), *found])
 
 
 def _room(width: int) -> tuple[NDArray[np.uint32], Float32]:
