@@ -19,10 +19,14 @@ from viewsphere.errors import MissingExtraError, RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import IDENTITY
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling import placing
 from viewsphere.sampling.placing import Footprint, Room, Shape, checked, footprint, standing
-from viewsphere.sampling.placing._footprint import first_crowded
+from viewsphere.sampling.placing._crowd import Crowd, TakenMap, inner_class
+from viewsphere.sampling.placing._footprint import Outline, first_crowded, outline
+from viewsphere.sampling.placing._spot import Others
+from viewsphere.sampling.placing.scatter import _roomy
 from viewsphere.sampling.plan import plan
 from viewsphere.sampling.seeds import generator
 from viewsphere.zoo import build_zoo_model
@@ -153,6 +157,57 @@ def test_a_sweep_of_a_thousand_cells_compares_neighbours_alone(step, monkeypatch
     prints = [footprint(box(1, 1), standing(box(1, 1), step * x, step * y)) for x, y in cells]
     assert first_crowded(prints, 0.25) == (None if step > 1.25 - 1e-9 else (1, 0))
     assert len(compared) < 10_000  # of 499,500
+
+
+@settings(deadline=None)
+@given(floor_prints, st.floats(0, 2), st.booleans())
+def test_a_crowd_compares_neighbours_and_decides_as_all_pairs_do(measures, gap, of_hulls):
+    """Also for triangles and for lines, whose sides separate them only from afar, or never."""
+    crowd, covers = Crowd(), []
+    for k, (w, n, x, y, turn) in enumerate(measures):
+        b, pose = box(w, n), standing(box(w, n), x, y, turn)
+        covers.append(outline(b[: 2 + k % 3], pose) if of_hulls else footprint(b, pose))
+        assert crowd.is_clear(covers[-1], gap) == all(covers[-1].apart(other, gap) for other in covers[:-1])
+        crowd.add(covers[-1])
+
+
+@settings(deadline=None)
+@given(floor_prints, st.tuples(sizes, sizes, st.floats(-2, 2)), st.floats(0, 2), st.booleans(), st.integers(0, 99))
+def test_a_map_leaves_out_crowded_spots_alone(measures, own, gap, of_hulls, seed):
+    width, length, x = own
+    shape = box(width, length, x=x)
+    cover = partial(outline if of_hulls else footprint, shape)
+    others = Others((TakenMap.of(gap, inner_class(cover(IDENTITY).circle.inner), 20.0),))
+    for w, n, *at in measures:
+        others.add((outline if of_hulls else footprint)(box(w, n), standing(box(w, n), *at)))
+    draws = np.random.default_rng(seed).random((60, 3))
+    spots, turns = 50 * draws[:, :2] - 25, 360 * draws[:, 2]
+    left = set(others.untaken(cover, spots, np.radians(turns)).tolist())
+    for i in set(range(60)) - left:
+        assert not others.crowd.is_clear(cover(standing(shape, *spots[i].tolist(), turns[i])), gap)
+
+
+@pytest.mark.parametrize("floor", [None, Footprint(np.array([1.0, 2.0]), np.eye(2), np.array([17.3, 17.3]))])
+@pytest.mark.parametrize("between", ["boxes", "hulls"])
+def test_many_things_are_compared_with_few(floor, between, monkeypatch):
+    compared = []
+    for kind in (Footprint, Outline):
+        apart = kind.apart
+        monkeypatch.setattr(kind, "apart", lambda one, two, gap, apart=apart: compared.append(two) or apart(one, two, gap))
+    shapes = [Shape(box(0.5, 0.6), lambda: box(0.5, 0.6))] * 150
+    module = plugins.load("placers", "scatter")
+    rng, cast = partial(generator, 3, "layout"), [spec(f"m{i}") for i in range(150)]
+    poses = module.place(cast, Room(free=floor, gap=0.1), shapes, (), rng, module.Options(between=between))
+    assert first_crowded([footprint(shapes[0].box, pose) for pose in poses], 0.1) is None
+    assert len(compared) < 30 * len(shapes)  # looking at all before each spot, there are 200,000
+
+
+def test_a_floor_whose_size_is_rounded_is_taken_as_a_whole():
+    """Clipping 1.0 +- 17.30000001 rounds; the search for a floor large enough ended never."""
+    free = Footprint(np.array([1.1, 2.3]), np.eye(2), np.array([17.30000001, 17.1]))
+    shapes = [Shape(box(3, 3), lambda: box(3, 3))] * 40
+    floor = _roomy(free, shapes)
+    np.testing.assert_allclose(floor.half, free.half, rtol=1e-12)
 
 
 def test_the_first_mistake_is_told_of_crowds_and_of_floors():

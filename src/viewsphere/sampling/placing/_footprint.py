@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,19 @@ Float = NDArray[np.float64]
 FAR = 2.000001  # a little above 2, as radii are rounded
 """Circles around two rectangles that are sqrt(2) times as far apart as they reach, and a gap, are separated by it along a side:
 the sides of a rectangle are at right angles, so that one of them is within 45 degrees of every direction."""
+
+
+class Circle(NamedTuple):
+    """The middle of a cover, metres; radii of a circle around it and of one within it.
+
+    Two covers are apart by a gap if their middles are `spread` times as far apart as the outer radii and the gap reach.
+    """
+
+    x: float
+    y: float
+    outer: float
+    inner: float
+    spread: float
 
 
 @dataclass(frozen=True)
@@ -64,6 +78,11 @@ class Footprint:
         (x, y), (h, k) = self.center.tolist(), self.half.tolist()
         return Sides(x, y, math.hypot(h, k), ((ax, ay), (bx, by)), (h, k))
 
+    @cached_property
+    def circle(self) -> Circle:
+        """The circles around and within it."""
+        return Circle(self.sides.x, self.sides.y, self.sides.radius, min(self.sides.half), math.sqrt(FAR))
+
     def contains(self, other: Footprint | Outline) -> bool:
         """Whether all of the other lies in this one."""
         return bool((np.abs((other.corners - self.center) @ self.axes.T) <= self.half + 1e-9).all())
@@ -83,14 +102,29 @@ class Outline:
 
     def apart(self, other: Outline, gap: float) -> bool:
         """Whether a side of one of the two separates them by at least `gap`: then nothing of them is nearer than that."""
-        for polygon in (self.corners, other.corners):
-            sides = np.roll(polygon, -1, axis=0) - polygon
-            axes = sides[:, ::-1] * (1, -1) / np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), 1e-12)
-            a, b = self.corners @ axes.T, other.corners @ axes.T
+        for polygon in (self, other):
+            a, b = self.corners @ polygon.axes.T, other.corners @ polygon.axes.T
             between = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
             if between.max() >= gap - 1e-9:
                 return True
         return False
+
+    @cached_property
+    def axes(self) -> Float:
+        """The unit normals (N, 2) of its sides, outward; zero for a point."""
+        sides = np.roll(self.corners, -1, axis=0) - self.corners
+        return sides[:, ::-1] * (1, -1) / np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), 1e-12)
+
+    @cached_property
+    def circle(self) -> Circle:
+        """The circles around and within it. Every direction is within half the widest angle between two sides of a normal."""
+        middle = self.corners.mean(axis=0)
+        outer = float(np.linalg.norm(self.corners - middle, axis=1).max())
+        inner = float(((self.corners - middle) * self.axes).sum(axis=1).min())
+        angles = np.sort(np.arctan2(self.axes[:, 1], self.axes[:, 0]) % math.pi)
+        widest = float(np.diff(angles, append=angles[0] + math.pi).max())
+        x, y = middle.tolist()
+        return Circle(x, y, outer, max(inner, 0.0), (1 + 1e-6) / max(math.cos(widest / 2), 1e-9))
 
 
 def first_crowded(prints: Sequence[Footprint], gap: float, start: int = 0) -> tuple[int, int] | None:

@@ -11,6 +11,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
+from viewsphere.sampling.placing._crowd import Crowd
 from viewsphere.sampling.placing._footprint import Footprint, Outline, first_crowded, footprint
 from viewsphere.sampling.placing._obstacles import Obstacles
 from viewsphere.sampling.placing._shape import Shape
@@ -69,9 +70,9 @@ class Room:
         highest = max(float(np.ptp(shape.box[:, 2])) for shape in shapes)
         return replace(self, blocked=self.built(highest, reach))
 
-    def is_clear(self, own: Footprint | Outline, others: Sequence[Any]) -> bool:
+    def is_clear(self, own: Footprint | Outline, others: Crowd) -> bool:
         """Return whether something that covers so much of the floor is clear of others and of the place, by the gap."""
-        if not all(own.apart(other, self.gap) for other in others):
+        if not others.is_clear(own, self.gap):
             return False
         return self.blocked is None or not self.blocked.meets(own.corners, self.gap)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,12 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.hull import convex_hull
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Matrix4
+from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, footprint, outline
-from viewsphere.sampling.placing._spot import Cover
+from viewsphere.sampling.placing._crowd import TakenMap, inner_class
+from viewsphere.sampling.placing._spot import Cover, Others
 
-Spot = Callable[[np.random.Generator, Room, NDArray[np.float64], Sequence[Any], Cover | None], Matrix4 | None]
+Spot = Callable[[np.random.Generator, Room, NDArray[np.float64], Others, Cover], Matrix4 | None]
 """Finds a pose for a box in a room, clear of what others cover."""
 
 
@@ -43,21 +44,27 @@ def scattered(
     """Poses, no two boxes, or hulls, nearer than the room's gap, and none nearer to the place's mesh; raises RecipeError where
     no spot is found for one. Each member's draws are for its slot and its key. `floor`: where spots are; by default the room's.
     """
-    room = room.obstacles(shapes, _reach(floor, room, shapes))
+    reach = _reach(floor, room, shapes)
+    room = room.obstacles(shapes, reach)
     poses: list[Matrix4] = []
     of_hulls = options.between == "hulls"
-    prints: list[Any] = [outline(shape.vertices(), pose) for shape, pose in room.taken] if of_hulls else list(room.prints)
-    for slot, (spec, shape) in enumerate(zip(cast, shapes, strict=True)):
-        cover = partial(outline, _seen_from_above(shape)) if of_hulls else partial(footprint, shape.box)
-        pose = spot(rng(str(slot), spec.key), room, shape.box, prints, cover if of_hulls else None)
+    covers: list[Cover] = [
+        partial(outline, _seen_from_above(shape)) if of_hulls else partial(footprint, shape.box) for shape in shapes
+    ]
+    slims = {inner_class(cover(IDENTITY).circle.inner) for cover in covers}
+    others = Others(tuple(TakenMap.of(room.gap, slim, reach) for slim in sorted(slims)))
+    for shape, pose in room.taken:
+        others.add(outline(shape.vertices(), pose) if of_hulls else footprint(shape.box, pose))
+    for slot, (spec, shape, cover) in enumerate(zip(cast, shapes, covers, strict=True)):
+        pose = spot(rng(str(slot), spec.key), room, shape.box, others, cover)
         if pose is None:
             _check_size(spec, shape, floor or room.free, room.field)
             raise RecipeError(
-                f"{room.field}: expected room for {len(prints) + len(cast) - slot} models; found none for {spec.key}: ask for "
-                "fewer, or for a smaller gap"
+                f"{room.field}: expected room for {len(others.crowd.covers) + len(cast) - slot} models; found none for "
+                f"{spec.key}: ask for fewer, or for a smaller gap"
             )
         poses.append(pose)
-        prints.append(cover(pose))
+        others.add(cover(pose))
     return poses
 
 

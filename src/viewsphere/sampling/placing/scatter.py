@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import Drawn, drawn
 from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, draws_of
 from viewsphere.sampling.placing._scattered import Gaps, scattered
-from viewsphere.sampling.placing._spot import Cover, free_spot, spread_spot
+from viewsphere.sampling.placing._spot import Cover, Others, free_spot, spread_spot
 
 NEAR = 10.0
 """Metres from the middle in which models stand where they have room: cameras look there, and a street is 200 m long."""
@@ -49,9 +48,7 @@ def place(
     else:
         floor = _within(room.free, drawn(options.reach, draws_of(rng, "reach")))
 
-    def spot(
-        draws: np.random.Generator, room: Room, box: NDArray[np.float64], others: Sequence[Any], cover: Cover | None
-    ) -> Matrix4 | None:
+    def spot(draws: np.random.Generator, room: Room, box: NDArray[np.float64], others: Others, cover: Cover) -> Matrix4 | None:
         return spread_spot(draws, room, floor, box, others, cover)
 
     return scattered(cast, room, shapes, rng, options, spot, floor)
@@ -60,9 +57,9 @@ def place(
 def _roomy(free: Footprint, shapes: Sequence[Shape]) -> Footprint:
     """The part of a floor around the middle that holds the models loosely; all of a smaller floor."""
     needed = LOOSE * sum(float(np.prod(shape.box[4, :2] - shape.box[2, :2])) for shape in shapes)
-    reach = NEAR
+    reach, all_of_it = NEAR, float((np.abs(free.axes @ free.center) + free.half).max())
     floor = _within(free, reach)
-    while 4 * float(np.prod(floor.half)) < needed and (floor.half < free.half).any():
+    while 4 * float(np.prod(floor.half)) < needed and reach < all_of_it and (floor.half < free.half).any():
         reach *= 2
         floor = _within(free, reach)
     return floor

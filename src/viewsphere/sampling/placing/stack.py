@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from viewsphere.recipe.draws import CountDrawn, drawn
 from viewsphere.sampling.physics import Touch, World, body_of
 from viewsphere.sampling.placing import Draws, Room, Shape, draws_of, footprint, standing
 from viewsphere.sampling.placing._dropping import MOST_OVERLAP, Matter, poses_of
-from viewsphere.sampling.placing._spot import free_spot
+from viewsphere.sampling.placing._spot import Others, free_spot
 
 Float = NDArray[np.float64]
 
@@ -63,14 +64,17 @@ def place(
 
 def _piled(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> list[Matrix4]:
     poses: list[Any] = [IDENTITY] * len(cast)
-    prints, first, highest, asked = list(room.prints), 0, 1, 1
+    others, first, highest, asked = Others(), 0, 1, 1
+    for there in room.prints:
+        others.add(there)
     while first < len(cast):
         high = min(drawn(options.high, draws_of(rng, "high", str(first))), len(cast) - first)
         pile = _highest(cast, shapes, range(first, first + high), rng, options)
-        spot = free_spot(rng("pile", cast[first].key, str(first)), room, pile.box, prints)
+        cover = partial(footprint, pile.box)
+        spot = free_spot(rng("pile", cast[first].key, str(first)), room, pile.box, others, cover)
         if spot is None:
             raise RecipeError(f"{room.field}: expected room for piles of {len(cast)} models; found none for {cast[first].key}")
-        prints.append(footprint(pile.box, spot))
+        others.add(cover(spot))
         for slot, pose in zip(pile.slots, pile.poses, strict=True):
             poses[slot] = tuple(map(tuple, (np.round(np.array(spot) @ np.array(pose), 10) + 0.0).tolist()))
         first, highest, asked = first + len(pile.slots), max(highest, len(pile.slots)), max(asked, high)

@@ -18,6 +18,7 @@ from viewsphere.model.numbers import Length, Portion, Strength
 from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import Drawn, drawn
 from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, draws_of, footprint, standing
+from viewsphere.sampling.placing._crowd import Crowd
 from viewsphere.sampling.scenery import composed
 from viewsphere.zoo.places import Bay, Lane
 from viewsphere.zoo.townscape.street_life import stretches
@@ -72,18 +73,20 @@ def place(
     or no spot is found for one.
     """
     roads = _roads(room, shapes, drawn(options.reach, draws_of(rng, "reach")))
-    prints, poses = list(room.prints), list[Matrix4]()
+    crowd, poses = Crowd(), list[Matrix4]()
+    for there in room.prints:
+        crowd.add(there)
     for slot, (spec, shape) in enumerate(zip(cast, shapes, strict=True)):
         draws = rng(str(slot), spec.key)
         own = drawn(options, draws_of(rng, str(slot), spec.key))
-        placed = _free(draws, roads, shape, own, prints)
+        placed = _free(draws, roads, shape, own, crowd)
         if placed is None:
             raise RecipeError(
                 f"{room.field}: expected room for {len(cast)} models along the lanes; found none for {spec.key}: ask for "
                 "fewer, for a smaller gap or for a larger reach"
             )
         poses.append(placed[0])
-        prints.append(placed[1])
+        crowd.add(placed[1])
     return poses
 
 
@@ -104,7 +107,7 @@ def _roads(room: Room, shapes: Sequence[Shape], reach: float) -> _Roads:
 
 
 def _free(
-    draws: np.random.Generator, roads: _Roads, shape: Shape, options: Options, others: Sequence[Footprint]
+    draws: np.random.Generator, roads: _Roads, shape: Shape, options: Options, others: Crowd
 ) -> tuple[Matrix4, Footprint] | None:
     """A pose on the roads, and what it covers, clear of others; None where none is found."""
     drives = _size(shape)[1] >= VEHICLE
@@ -116,7 +119,7 @@ def _free(
     return _clear(_along(draws, roads, shape, options, drives, is_parked), roads.room, shape, others)
 
 
-def _clear(poses: Iterator[Matrix4], room: Room, shape: Shape, others: Sequence[Footprint]) -> tuple[Matrix4, Footprint] | None:
+def _clear(poses: Iterator[Matrix4], room: Room, shape: Shape, others: Crowd) -> tuple[Matrix4, Footprint] | None:
     """The first pose that is clear of others, and what it covers."""
     for pose in poses:
         cover = footprint(shape.box, pose)
