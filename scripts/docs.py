@@ -40,6 +40,7 @@ from viewsphere.labels import (
 from viewsphere.limits import table
 from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.plugins.format import FormatSpec
+from viewsphere.plugins.material import MaterialSpec
 from viewsphere.plugins.overview import SPECS
 from viewsphere.recipe.file import schema
 from viewsphere.run.listing import Listed, listed
@@ -210,9 +211,9 @@ def options_page(plugin: plugins.Kind, page: str) -> str:
 
 def options_table(plugin: plugins.Kind, kind: str) -> str:
     """The options of a plug-in, and of what it has lists of."""
-    spec = {spec.KIND: spec for spec in SPECS}.get(plugin)
-    made: Any = plugins.load(spec, kind) if spec else plugins.load(plugin, kind)
-    told = (made.options if spec else made.Options).model_json_schema()
+    spec = {spec.KIND: spec for spec in SPECS}[plugin]
+    made: Any = plugins.load(spec, kind)
+    told = made.options.model_json_schema()
     parts = {name: part for name, part in told.get("$defs", {}).items() if name not in ("Distribution", "Gaussian")}
     text = fields_table({kind: told}, [kind])
     return text + "".join(f"\nEach {name.lower()}:\n{fields_table(parts, [name])}" for name in parts)
@@ -424,14 +425,14 @@ def materials_page() -> str:
     heads = ("material", "what it is", "in sentences", "repeats after, m", "mean linear colour", "roughness", "draws")
     text = f"\n| {' | '.join(heads)} |\n{'|---' * len(heads)}|\n"
     for name in plugins.names("materials"):
-        module = plugins.load("materials", name)
-        made, (told, *_) = getattr(module, name)(None, 256), (inspect.getdoc(module) or "").splitlines()
+        spec = plugins.load(MaterialSpec, name)
+        made, (told, *_) = spec.surface(None, 256), (inspect.getdoc(inspect.getmodule(spec.surface)) or "").splitlines()
         color = " ".join(f"{share:.2f}" for share in made.color.mean(axis=(0, 1)).tolist())
-        draws, _, _ = (inspect.getdoc(module.draw) or "").partition("\n")
+        draws, _, _ = (inspect.getdoc(spec.draw) or "").partition("\n")
         row = (
             f"`{name}`",
             told.rstrip("."),
-            module.WORD,
+            spec.word,
             f"{made.metres:g}",
             color,
             f"{made.roughness.mean():.2f}",

@@ -9,6 +9,7 @@ from viewsphere import materials, plugins
 from viewsphere.errors import UserError
 from viewsphere.materials._patterns.kernels_noise import add_noise
 from viewsphere.materials._patterns.noise import cells, noise, wave
+from viewsphere.plugins.material import MaterialSpec
 
 NAMES = plugins.names("materials")
 SIZE = 192
@@ -17,7 +18,7 @@ SIZE = 192
 @pytest.fixture(scope="module")
 def made():
     """Of each material its default and two draws."""
-    whole = {name: getattr(plugins.load("materials", name), name) for name in NAMES}
+    whole = {name: plugins.load(MaterialSpec, name).surface for name in NAMES}
     return {name: [whole[name](None, SIZE), *(materials.surface(name, seed, SIZE) for seed in (1, 2))] for name in NAMES}
 
 

@@ -14,6 +14,7 @@ from viewsphere.errors import RecipeError, StoreError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.mistakes import read_options
 from viewsphere.model.scene import IDENTITY
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.run.generate import generate
 from viewsphere.sampling.physics import Board
 from viewsphere.sampling.placing import Room, Shape, footprint
@@ -24,13 +25,13 @@ from viewsphere.zoo.open_box import boards
 
 
 def options(name, **given):
-    return read_options(plugins.load("placers", name).Options, given, "scenes.layout")
+    return read_options(plugins.load(PlacerSpec, name).options, given, "scenes.layout")
 
 
 def fallen(shapes, name="fall", seed=0, given=None, **room):
     keys = [spec(f"m{i}") for i in range(len(shapes))]
     rng, room = partial(generator, seed, "layout"), Room(**{"field": "scenes", **room})
-    return plugins.load("placers", name).place(keys, room, shapes, (), rng, options(name, **(given or {})))
+    return plugins.load(PlacerSpec, name).place(keys, room, shapes, (), rng, options(name, **(given or {})))
 
 
 def rectangle(width, length):

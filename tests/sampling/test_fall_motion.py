@@ -14,6 +14,7 @@ from viewsphere.assets.cache import load_normalised
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.scene import IDENTITY
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.sampling.layouts import Carried
 from viewsphere.sampling.placing import Room, Way
 from viewsphere.sampling.plan import plan
@@ -29,7 +30,7 @@ def box_of(model, step=None):
 def ways(shapes, seed=0, **given):
     keys, rng = [spec(f"m{i}") for i in range(len(shapes))], partial(generator, seed, "layout")
     room, own = Room(field="scenes", moves=True), options("fall", **given)
-    module = plugins.load("placers", "fall")
+    module = plugins.load(PlacerSpec, "fall")
     return module.ways(keys, room, shapes, rng, own), module.place(keys, room, shapes, (), rng, own)
 
 

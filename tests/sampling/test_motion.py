@@ -3,7 +3,6 @@
 import re
 import sys
 from functools import partial
-from importlib.metadata import EntryPoint
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from installed import installed
 from small import ROOT
 from viewsphere import plugins
 from viewsphere.assets.timeline import Timeline
@@ -447,17 +447,13 @@ def test_a_plan_finds_mistakes_without_a_start():
 def bounce(request, tmp_path, monkeypatch):
     """The motion in the docs, in a package of somebody's or beside ours."""
     if request.param == "entry point":
-        name = "my_bounce"
-        monkeypatch.syspath_prepend(tmp_path)
-        entry = EntryPoint("bounce", name, "viewsphere.motions")
-        monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
-    else:
-        name = "bounce"
-        monkeypatch.setattr(motion, "__path__", [*motion.__path__, str(tmp_path)])
-    (tmp_path / f"{name}.py").write_text(FALL)
+        with installed(tmp_path, "motions", "bounce", FALL):
+            yield
+        return
+    monkeypatch.setattr(motion, "__path__", [*motion.__path__, str(tmp_path)])
+    (tmp_path / "bounce.py").write_text(FALL)
     yield
-    for module in (name, f"{motion.__name__}.{name}"):
-        sys.modules.pop(module, None)
+    sys.modules.pop(f"{motion.__name__}.bounce", None)
     motion.__dict__.pop("bounce", None)
 
 

@@ -4,14 +4,15 @@ import itertools
 import math
 import re
 import sys
+from contextlib import ExitStack
 from functools import partial
-from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from installed import installed as packaged
 from small import ROOT
 from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
@@ -20,6 +21,7 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling import placing
 from viewsphere.sampling.placing import Footprint, Room, Shape, checked, footprint, standing
@@ -45,8 +47,8 @@ def place(name, boxes, keys, seed=0, names=(), **room):
 
 def alone(name, shapes, keys, seed=0, names=(), **room):
     rng = partial(generator, seed, "layout", *names)
-    module = plugins.load("placers", name)
-    options = [module.Options()] if hasattr(module, "Options") else []
+    module = plugins.load(PlacerSpec, name)
+    options = [module.options()] if module.options else []
     return tuple(module.place([spec(key) for key in keys], Room(**room), shapes, (), rng, *options))
 
 
@@ -327,18 +329,15 @@ def installed(request, tmp_path, monkeypatch):
 
     def install(name, text):
         if request.param == "entry point":
-            (tmp_path / f"my_{name}.py").write_text(text)
-            monkeypatch.syspath_prepend(tmp_path)
-            entry = EntryPoint(name, f"my_{name}", "viewsphere.placers")
-            monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
-            made.append(f"my_{name}")
+            stack.enter_context(packaged(tmp_path, "placers", name, text))
         else:
             (tmp_path / f"{name}.py").write_text(text)
             monkeypatch.setattr(placing, "__path__", [*placing.__path__, str(tmp_path)])
             made.append(f"{placing.__name__}.{name}")
 
     made = []
-    yield install
+    with ExitStack() as stack:
+        yield install
     for module in made:
         sys.modules.pop(module, None)
         placing.__dict__.pop(module.rpartition(".")[2], None)
@@ -375,12 +374,15 @@ def test_a_placer_gets_the_hulls_of_the_models_themselves(installed):
     installed(
         "leaning",
         """
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.sampling.placing import standing
 
 def place(cast, room, shapes, views, rng):
     reaches = [float(shape.hull[:, 0].max()) for shape in shapes]
     assert len(shapes) == 3 and all(len(shape.hull) > 8 for shape in shapes) and list(views) == []
     return [standing(shape.box, x) for shape, x in zip(shapes, reaches)]
+
+PLACER = PlacerSpec(place=place)
 """,
     )
     boxes = {}

@@ -1,8 +1,6 @@
 """Materials that are drawn from numbers: wood, brick, leather, ..., as squares that repeat, in metres.
 
-A material is one module, named as its file: `NAME(parameters, size)` draws a `Surface` from frozen parameters, and `draw(rng)`
-draws these, `metres` among them, the square's side. `WORD` is what sentences say of things that are made of it, and `GRAINED`
-says that it runs along what is made of it. Third parties use the entry-point group `viewsphere.materials`.
+A material is one module with a `viewsphere.plugins.material.MaterialSpec`, which draws a `Surface` from frozen parameters.
 """
 
 from __future__ import annotations
@@ -13,13 +11,14 @@ import numpy as np
 
 from viewsphere import plugins
 from viewsphere.materials._patterns.surface import Color, Light, Map, Surface
+from viewsphere.plugins.material import MaterialSpec
 
 __all__ = ["Color", "Light", "Map", "Surface", "drawn", "is_grained", "metres", "surface", "word"]
 
 
 def drawn(name: str, seed: int) -> Any:
     """The parameters that a seed means; raises UserError for an unknown material, with the nearest known one."""
-    return plugins.load("materials", name).draw(np.random.default_rng(seed))
+    return plugins.load(MaterialSpec, name).draw(np.random.default_rng(seed))
 
 
 def surface(name: str, seed: int, size: int) -> Surface:
@@ -27,7 +26,7 @@ def surface(name: str, seed: int, size: int) -> Surface:
 
     Raises UserError for an unknown name, with the nearest known one.
     """
-    return getattr(plugins.load("materials", name), name)(drawn(name, seed), size)
+    return plugins.load(MaterialSpec, name).surface(drawn(name, seed), size)
 
 
 def metres(name: str, seed: int) -> float:
@@ -37,9 +36,9 @@ def metres(name: str, seed: int) -> float:
 
 def word(name: str) -> str:
     """What sentences say of things that are made of a material: wooden."""
-    return plugins.load("materials", name).WORD
+    return plugins.load(MaterialSpec, name).word
 
 
 def is_grained(name: str) -> bool:
     """Whether a material runs along the longest side of what is made of it."""
-    return getattr(plugins.load("materials", name), "GRAINED", False)
+    return plugins.load(MaterialSpec, name).grained

@@ -9,8 +9,7 @@ import numpy as np
 from viewsphere.materials._patterns.noise import cells, noise, smooth
 from viewsphere.materials._patterns.surface import Color, Map, Surface
 from viewsphere.materials._patterns.tones import colored, mixed, shaded
-
-WORD = "asphalt"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -69,3 +68,6 @@ def draw(rng: np.random.Generator) -> Asphalt:
         metres=float(rng.uniform(2.2, 3.0)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="asphalt", surface=asphalt, draw=draw)

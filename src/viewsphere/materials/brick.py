@@ -10,8 +10,7 @@ from viewsphere.materials._patterns.courses import bonded, courses, even
 from viewsphere.materials._patterns.noise import cells, noise, smooth
 from viewsphere.materials._patterns.surface import Color, Surface
 from viewsphere.materials._patterns.tones import colored, mixed, shaded, times
-
-WORD = "brick"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -84,3 +83,6 @@ def draw(rng: np.random.Generator) -> Brick:
         wear=float(rng.uniform(0.1, 0.9)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="brick", surface=brick, draw=draw)

@@ -9,8 +9,7 @@ import numpy as np
 from viewsphere.materials._patterns.noise import cells, noise, smooth
 from viewsphere.materials._patterns.surface import Color, Map, Surface
 from viewsphere.materials._patterns.tones import shaded
-
-WORD = "concrete"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -66,3 +65,6 @@ def draw(rng: np.random.Generator) -> Concrete:
         metres=float(rng.uniform(1.6, 2.6)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="concrete", surface=concrete, draw=draw)

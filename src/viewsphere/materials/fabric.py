@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from viewsphere.materials._patterns.noise import noise, wave
 from viewsphere.materials._patterns.surface import Color, Map, Surface
 from viewsphere.materials._patterns.tones import mixed, shaded
-
-WORD = "fabric"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -92,3 +91,6 @@ def draw(rng: np.random.Generator) -> Fabric:
         metres=threads * float(rng.uniform(0.0012, 0.0022)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="fabric", surface=fabric, draw=draw)

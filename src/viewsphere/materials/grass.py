@@ -10,8 +10,7 @@ from viewsphere.materials._patterns.blades import strokes
 from viewsphere.materials._patterns.noise import noise, smooth
 from viewsphere.materials._patterns.surface import Color, Surface
 from viewsphere.materials._patterns.tones import colored, mixed, shaded
-
-WORD = "grass"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -65,3 +64,6 @@ def draw(rng: np.random.Generator) -> Grass:
         metres=float(rng.uniform(1.0, 1.5)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="grass", surface=grass, draw=draw)

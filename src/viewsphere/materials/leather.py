@@ -9,8 +9,7 @@ import numpy as np
 from viewsphere.materials._patterns.noise import cells, noise, smooth
 from viewsphere.materials._patterns.surface import Color, Surface
 from viewsphere.materials._patterns.tones import mixed, shaded, times
-
-WORD = "leather"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -66,3 +65,6 @@ def draw(rng: np.random.Generator) -> Leather:
         metres=metres,
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="leather", surface=leather, draw=draw)

@@ -9,8 +9,7 @@ import numpy as np
 from viewsphere.materials._patterns.noise import noise, smooth
 from viewsphere.materials._patterns.surface import Color, Map, Surface
 from viewsphere.materials._patterns.tones import colored, mixed, times
-
-WORD = "marble"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -72,3 +71,6 @@ def draw(rng: np.random.Generator) -> Marble:
         metres=float(rng.uniform(0.8, 2.0)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="marble", surface=marble, draw=draw)

@@ -8,9 +8,7 @@ import numpy as np
 
 from viewsphere.materials._patterns.noise import noise, smooth
 from viewsphere.materials._patterns.surface import Color, Surface
-
-WORD = "metal"
-GRAINED = True
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -60,3 +58,6 @@ def draw(rng: np.random.Generator) -> Metal:
         metres=float(rng.uniform(0.3, 0.6)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="metal", surface=metal, draw=draw, grained=True)

@@ -10,8 +10,7 @@ from viewsphere.materials._patterns.blades import strokes
 from viewsphere.materials._patterns.noise import cells, noise, smooth
 from viewsphere.materials._patterns.surface import Color, Surface
 from viewsphere.materials._patterns.tones import shaded
-
-WORD = "paper"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -80,3 +79,6 @@ def draw(rng: np.random.Generator) -> Paper:
         metres=float(rng.uniform(0.25, 0.4)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="paper", surface=paper, draw=draw)

@@ -11,9 +11,7 @@ from viewsphere.materials._patterns.noise import noise, smooth
 from viewsphere.materials._patterns.surface import Surface
 from viewsphere.materials._patterns.timber import OAK, Timber, draw_timber, grain
 from viewsphere.materials._patterns.tones import colored, shaded
-
-WORD = "wooden"
-GRAINED = True
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -65,3 +63,6 @@ def draw(rng: np.random.Generator) -> Planks:
         metres=metres,
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="wooden", surface=planks, draw=draw, grained=True)

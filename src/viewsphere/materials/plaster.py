@@ -9,8 +9,7 @@ import numpy as np
 from viewsphere.materials._patterns.noise import cells, noise, smooth
 from viewsphere.materials._patterns.surface import Color, Surface
 from viewsphere.materials._patterns.tones import shaded
-
-WORD = "plaster"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -61,3 +60,6 @@ def draw(rng: np.random.Generator) -> Plaster:
         metres=float(rng.uniform(0.8, 1.4)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="plaster", surface=plaster, draw=draw)

@@ -9,8 +9,7 @@ import numpy as np
 from viewsphere.materials._patterns.noise import cells, noise, smooth
 from viewsphere.materials._patterns.surface import Color, Surface
 from viewsphere.materials._patterns.tones import shaded
-
-WORD = "plastic"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -53,3 +52,6 @@ def draw(rng: np.random.Generator) -> Plastic:
         metres=float(rng.uniform(0.2, 0.5)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="plastic", surface=plastic, draw=draw)

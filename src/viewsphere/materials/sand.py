@@ -9,8 +9,7 @@ import numpy as np
 from viewsphere.materials._patterns.noise import cells, noise, smooth, wave
 from viewsphere.materials._patterns.surface import Color, Surface
 from viewsphere.materials._patterns.tones import mixed, shaded, times
-
-WORD = "sandy"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -59,3 +58,6 @@ def draw(rng: np.random.Generator) -> Sand:
         metres=metres,
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="sandy", surface=sand, draw=draw)

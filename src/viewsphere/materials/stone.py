@@ -10,8 +10,7 @@ from viewsphere.materials._patterns.courses import courses, uneven
 from viewsphere.materials._patterns.noise import noise, smooth
 from viewsphere.materials._patterns.surface import Color, Surface
 from viewsphere.materials._patterns.tones import colored, mixed, shaded, times
-
-WORD = "stone"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -81,3 +80,6 @@ def draw(rng: np.random.Generator) -> Stone:
         metres=float(rng.uniform(1.2, 2.0)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="stone", surface=stone, draw=draw)

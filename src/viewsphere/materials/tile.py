@@ -10,8 +10,7 @@ from viewsphere.materials._patterns.courses import bonded, courses, even
 from viewsphere.materials._patterns.noise import noise, smooth
 from viewsphere.materials._patterns.surface import Color, Surface
 from viewsphere.materials._patterns.tones import mixed, shaded
-
-WORD = "tiled"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -86,3 +85,6 @@ def draw(rng: np.random.Generator) -> Tile:
         metres=metres,
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="tiled", surface=tile, draw=draw)

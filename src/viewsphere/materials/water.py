@@ -9,8 +9,7 @@ import numpy as np
 from viewsphere.materials._patterns.noise import noise, smooth, wave
 from viewsphere.materials._patterns.surface import Color, Map, Surface
 from viewsphere.materials._patterns.tones import mixed, shaded
-
-WORD = "watery"
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -74,3 +73,6 @@ def draw(rng: np.random.Generator) -> Water:
         metres=metres,
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="watery", surface=water, draw=draw)

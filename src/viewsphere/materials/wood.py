@@ -10,9 +10,7 @@ from viewsphere.materials._patterns.courses import courses, even
 from viewsphere.materials._patterns.surface import Surface
 from viewsphere.materials._patterns.timber import OAK, Timber, draw_timber, grain
 from viewsphere.materials._patterns.tones import colored, shaded
-
-WORD = "wooden"
-GRAINED = True
+from viewsphere.plugins.material import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -50,3 +48,6 @@ def draw(rng: np.random.Generator) -> Wood:
         metres=float(rng.uniform(0.5, 0.8)),
         seed=int(rng.integers(2**31)),
     )
+
+
+MATERIAL = MaterialSpec(word="wooden", surface=wood, draw=draw, grained=True)

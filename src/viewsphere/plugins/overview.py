@@ -6,11 +6,14 @@ from dataclasses import dataclass
 
 from viewsphere.errors import UserError
 from viewsphere.plugins.format import FormatSpec
+from viewsphere.plugins.material import MaterialSpec
+from viewsphere.plugins.motion import MotionSpec
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.plugins.registry import SEAMS, Kind, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.spec import Spec
 
-SPECS: tuple[type[Spec], ...] = (FormatSpec, SamplerSpec)
+SPECS: tuple[type[Spec], ...] = (FormatSpec, MaterialSpec, MotionSpec, PlacerSpec, SamplerSpec)
 """The specs of all kinds."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +14,18 @@ from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import random_rotation, rigid
-from viewsphere.model.mistakes import one_of, read_options
+from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.thing import TimeStep
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.layout import Layout, options_of, placer_of
 from viewsphere.recipe.scenery import CompanyEntry
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.sampling.filling import shape_of
 from viewsphere.sampling.packages import check_packages
 from viewsphere.sampling.physics import EDITION
-from viewsphere.sampling.placing import Draws, Piece, Placer, Room, Shape, Way
+from viewsphere.sampling.placing import Draws, Piece, Room, Shape, Way
 from viewsphere.sampling.scenery import composed
 from viewsphere.sampling.stable_poses import NEEDS as STABLE_NEEDS
 from viewsphere.sampling.stable_poses import stable_turn
@@ -85,26 +86,26 @@ class Laid:
     @cached_property
     def poses(self) -> tuple[Matrix4, ...]:
         """World from object of each; raises RecipeError where there is no room."""
-        module, options = _module(self.layout, self.room.field)
-        poses = module.place(self.members, self.room, self.shapes, (), self.rng, *options)
+        placer, options = _placer(self.layout, self.room.field)
+        poses = placer.place(self.members, self.room, self.shapes, (), self.rng, *options)
         return tuple(self._in_world(pose, turn) for pose, turn in zip(poses, self.turns, strict=True))
 
     @cached_property
     def ways(self) -> tuple[Carried, ...]:
         """How each came there; none where the placer does not know."""
-        module, options = _module(self.layout, self.room.field)
-        if not hasattr(module, "ways"):
+        placer, options = _placer(self.layout, self.room.field)
+        if placer.ways is None:
             return ()
-        ways: Sequence[Way] = cast(Any, module).ways(self.members, self.room, self.shapes, self.rng, *options)
+        ways: Sequence[Way] = placer.ways(self.members, self.room, self.shapes, self.rng, *options)
         return tuple(Carried(way, self.world_from_room, turn) for way, turn in zip(ways, self.turns, strict=True))
 
     @cached_property
     def around(self) -> tuple[Piece, ...]:
         """The pieces of scenery that they stand in, in the world."""
-        module, options = _module(self.layout, self.room.field)
-        if not hasattr(module, "around"):
+        placer, options = _placer(self.layout, self.room.field)
+        if placer.around is None:
             return ()
-        pieces: Sequence[Piece] = cast(Any, module).around(self.members, self.room, self.shapes, self.rng, *options)
+        pieces: Sequence[Piece] = placer.around(self.members, self.room, self.shapes, self.rng, *options)
         return tuple(Piece(p.family, p.size, composed(self.world_from_room, p.world_from_piece)) for p in pieces)
 
     def _in_world(self, pose: Matrix4, turn: Matrix4) -> Matrix4:
@@ -138,8 +139,8 @@ def check_layout(layout: Layout, field: str) -> None:
     """See that a placer can place; raises RecipeError for an unknown one and for options that it does not have, which begins
     with the field's name, and MissingExtraError for packages that it needs.
     """
-    module, _ = _module(layout, field)
-    check_packages(getattr(module, "NEEDS", ()), "physics", f"{field}.layout: {placer_of(layout)}")
+    placer, _ = _placer(layout, field)
+    check_packages(placer.packages, "physics", f"{field}.layout: {placer_of(layout)}")
 
 
 def check_orientation(orientation: str, field: str) -> None:
@@ -150,12 +151,12 @@ def check_orientation(orientation: str, field: str) -> None:
 
 def has_ways(layout: Layout) -> bool:
     """Whether the placer knows how things came to where they stand."""
-    return hasattr(plugins.load("placers", placer_of(layout)), "ways")
+    return plugins.load(PlacerSpec, placer_of(layout)).ways is not None
 
 
 def is_slow(layout: Layout) -> bool:
     """Whether where things stand is not asked before frames are rendered."""
-    return bool(getattr(plugins.load("placers", placer_of(layout)), "IS_SLOW", False))
+    return plugins.load(PlacerSpec, placer_of(layout)).is_slow
 
 
 def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
@@ -164,19 +165,14 @@ def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
     return Shape(box, partial(_vertices, spec), partial(_surface, spec))
 
 
-def _module(layout: Layout, field: str) -> tuple[Placer, tuple[Any, ...]]:
+def _placer(layout: Layout, field: str) -> tuple[PlacerSpec, tuple[Any, ...]]:
     """The placer, and its options, if it has any."""
     name, given, where = placer_of(layout), options_of(layout), f"{field}.layout"
     known = plugins.names("placers")
     if name not in known:
         raise RecipeError(f"{where}{'.kind' if given else ''}: {one_of(name, known)}")
-    module = plugins.load("placers", name)
-    kind = getattr(module, "Options", None)
-    if kind is not None:
-        return module, (read_options(kind, given, where),)
-    if given:
-        raise RecipeError(f"{where}: expected no options, {name} has none; found {', '.join(given)}")
-    return module, ()
+    spec = plugins.load(PlacerSpec, name)
+    return spec, spec.read_options(name, given, where)
 
 
 def _box(spec: ModelSpec) -> Float:

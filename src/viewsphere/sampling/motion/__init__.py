@@ -1,5 +1,5 @@
-"""Motions: where a thing is at a time, and what of its file it shows. One module a kind, named as its file; none imports
-another.
+"""Motions: where a thing is at a time, and what of its file it shows. A kind is one module with a `MotionSpec`;
+none imports another.
 
 What a kind needs stands here: what it is asked (`Start`, `Pose`), where it may go (`Lane`, `curve_through`), and how it
 turns on its way (`headed`). What a recipe says becomes a thing's motion by `mover`.
@@ -8,9 +8,7 @@ turns on its way (`headed`). What a recipe says becomes a thing's motion by `mov
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
 
-from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Strength
 from viewsphere.recipe.draws import Drawn
 from viewsphere.sampling.motion._heading import Heading, headed, to_the_right
@@ -24,7 +22,6 @@ __all__ = [
     "Heading",
     "Lane",
     "Move",
-    "Movement",
     "Mover",
     "Origin",
     "Pose",
@@ -44,19 +41,3 @@ Move = Callable[[float, Pose], Pose | None]
 """The pose at a time, seconds from the sequence's first instant, of a thing that is at a pose without this motion; None where
 it is not there. Called for any times in any order.
 """
-
-
-class Movement(Protocol):
-    """A module that is one kind of motion. `Options` is what a recipe says of it, beside `kind`, `enter` and `leave`; its
-    fields may be distributions (`viewsphere.recipe.draws.Drawn`).
-    """
-
-    Options: type[Frozen]
-
-    def moves(self, options: Any, start: Start) -> Move:
-        """The motion that these options (an `Options`, everything drawn) mean for one thing.
-
-        All randomness comes from `start.rng`. Raises RecipeError where that cannot be, which names the field: `start.field`,
-        a dot and the option.
-        """
-        ...

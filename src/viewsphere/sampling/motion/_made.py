@@ -15,13 +15,14 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import one_of, read_options
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion, TimeStep
+from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import RngOf, drawn
 from viewsphere.recipe.motion import MotionEntry, Motions, has_clip, listed
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.motion._start import Pose, Start
 
 if TYPE_CHECKING:
-    from viewsphere.sampling.motion import Move, Movement
+    from viewsphere.sampling.motion import Move
 
 T = TypeVar("T")
 
@@ -117,12 +118,12 @@ def _moves(motions: Motions | None, start: Start) -> Iterator[Move]:
 
 
 def _move(entry: MotionEntry, start: Start) -> Move:
-    module, options = _options(entry, start.field)
+    spec, options = _options(entry, start.field)
 
     def generator_of(path: tuple[str, ...]) -> np.random.Generator:
         return start.rng("option", ".".join(path))
 
-    move = module.moves(drawn(options, generator_of), start)
+    move = spec.moves(drawn(options, generator_of), start)
     return _between(entry, move, generator_of)
 
 
@@ -139,13 +140,13 @@ def _between(entry: MotionEntry, move: Move, generator_of: RngOf) -> Move:
     return moved
 
 
-def _options(entry: MotionEntry, field: str) -> tuple[Movement, Any]:
-    """The module of an entry's kind, and the entry's options as the module reads them."""
+def _options(entry: MotionEntry, field: str) -> tuple[MotionSpec, Any]:
+    """The motion of an entry's kind, and the entry's options as it reads them."""
     known = plugins.names("motions")
     if entry.kind not in known:
         raise RecipeError(f"{field}.kind: {one_of(entry.kind, known)}")
-    module: Movement = plugins.load("motions", entry.kind)
-    return module, read_options(module.Options, entry.options, field)
+    spec = plugins.load(MotionSpec, entry.kind)
+    return spec, read_options(spec.options, entry.options, field)
 
 
 def _recorded(pose: Pose, placed: Matrix4) -> Matrix4:

@@ -14,6 +14,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Strength
 from viewsphere.model.thing import TimeStep
+from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn
 from viewsphere.sampling.motion import Move, Pose, Start
 
@@ -66,3 +67,6 @@ def _back_and_forth(seconds: float, length: float) -> float:
 
 LOOPS: dict[Loop, Callable[[float, float], float]] = {"once": _once, "loop": _loop, "back_and_forth": _back_and_forth}
 """What of an animation that lasts `length` seconds is shown so many seconds after its beginning."""
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

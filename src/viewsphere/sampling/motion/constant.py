@@ -7,6 +7,7 @@ from pydantic import Field
 
 from viewsphere.geometry.rotation import rotation_about
 from viewsphere.model.frozen import Frozen
+from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn
 from viewsphere.sampling.motion import Move, Start
 
@@ -27,3 +28,6 @@ def moves(options: Options, start: Start) -> Move:
     """A straight line, and a turn about one axis through the thing's origin."""
     velocity, spin = np.array(options.velocity), np.radians(options.spin_deg)
     return lambda time, pose: pose.turned(rotation_about(spin * time)).moved(velocity * time)
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

@@ -8,6 +8,7 @@ from pydantic import Field
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Number, Positive
+from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Drawn
 from viewsphere.sampling.motion import Move, Pose, Start
 
@@ -34,3 +35,6 @@ def moves(options: Options, start: Start) -> Move:
         return Pose(np.array(way((time - options.begin) * options.speed)), pose.step)
 
     return moved
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

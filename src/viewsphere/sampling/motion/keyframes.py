@@ -14,6 +14,7 @@ from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_abou
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, shown
 from viewsphere.model.numbers import Number
+from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
 from viewsphere.sampling.motion import Move, Origin, Pose, Start
 
@@ -105,3 +106,6 @@ def _quaternion(key: Key) -> Float | None:
         return None
     x, y, z = (quaternion_about(np.radians(angle) * axis) for angle, axis in zip(key.rotation_deg, np.eye(3), strict=True))
     return quaternion_product(z, quaternion_product(y, x))
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

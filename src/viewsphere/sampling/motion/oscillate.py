@@ -10,6 +10,7 @@ from pydantic import Field
 from viewsphere.geometry.rotation import rotation_about
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Positive
+from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn
 from viewsphere.sampling.motion import Amplitude, Move, Pose, Start
 
@@ -37,3 +38,6 @@ def moves(options: Options, start: Start) -> Move:
         return pose.turned(rotation_about(turn * share)).moved(side * share)
 
     return moved
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

@@ -11,6 +11,7 @@ from viewsphere.geometry.curve import Curve
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.numbers import Positive
+from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
 from viewsphere.sampling.motion import Heading, Lane, Move, Pose, Start, curve_through, headed, to_the_right
 
@@ -90,3 +91,6 @@ def _lane(name: str, start: Start) -> Lane:
     if name not in lanes:
         raise RecipeError(f"{start.field}.lane: {one_of(name, (ANY, *lanes))}")
     return lanes[name]
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

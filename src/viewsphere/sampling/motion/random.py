@@ -9,6 +9,7 @@ from viewsphere.geometry.noise import noise
 from viewsphere.geometry.rotation import rotation_about
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Positive
+from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Drawn
 from viewsphere.sampling.motion import Amplitude, Move, Pose, Start
 
@@ -35,3 +36,6 @@ def moves(options: Options, start: Start) -> Move:
         return pose.turned(rotation_about(turns * shares[3:])).moved(sides * shares[:3])
 
     return moved
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Positive
+from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Drawn, PointDrawn
 from viewsphere.sampling.motion import Heading, Move, Origin, Pose, Start, curve_through, headed
 
@@ -39,3 +40,6 @@ def moves(options: Options, start: Start) -> Move:
         return headed(pose, direction, options.heading)
 
     return moved
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

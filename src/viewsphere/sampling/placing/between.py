@@ -16,6 +16,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Strength
 from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 from viewsphere.sampling.placing import Draws, Room, Shape, draws_of, footprint, standing
 
@@ -76,3 +77,6 @@ def place(
         poses.append(found)
         prints.append(covered)
     return poses
+
+
+PLACER = PlacerSpec(options=Options, place=place)

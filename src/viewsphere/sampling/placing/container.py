@@ -15,14 +15,12 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length
 from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 from viewsphere.sampling.physics import Board, body_of
 from viewsphere.sampling.placing import Draws, Piece, Room, Shape, Way, draws_of, footprint
 from viewsphere.sampling.placing._dropping import Drop, Ground, Matter, poses_of, ways_of
 from viewsphere.zoo.open_box import boards
-
-IS_SLOW = True
-NEEDS = ("mujoco", "scipy")
 
 FULL = 0.5
 """Share of a box's room that hulls of models which lie as they fall may fill at most; packings of alike ones reach 0.6."""
@@ -103,3 +101,6 @@ def _check(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], size:
             f"{where}: expected a box of at least {volume / FULL:.3g} cubic metres for {len(cast)} models; found {held:.3g}: "
             "ask for fewer, or for a larger box"
         )
+
+
+PLACER = PlacerSpec(options=Options, place=place, ways=ways, around=around, is_slow=True, packages=("mujoco", "scipy"))

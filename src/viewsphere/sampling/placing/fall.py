@@ -14,13 +14,11 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length
 from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 from viewsphere.sampling.physics import Board
 from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, Way, draws_of, footprint
 from viewsphere.sampling.placing._dropping import Drop, Ground, Matter, poses_of, ways_of
-
-IS_SLOW = True
-NEEDS = ("mujoco", "scipy")
 
 LOOSE = 2.0
 """How many times as large as the things' boxes together the floor is over which they are let go."""
@@ -80,3 +78,6 @@ def _top(free: Footprint, below: float) -> Board:
     half, (x, y) = min(TOP, below) / 2, free.center.tolist()
     turn = math.atan2(free.axes[0, 1], free.axes[0, 0])
     return Board((x, y, -half), (float(free.half[0]), float(free.half[1]), half), turn)
+
+
+PLACER = PlacerSpec(options=Options, place=place, ways=ways, is_slow=True, packages=("mujoco", "scipy"))

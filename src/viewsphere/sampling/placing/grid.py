@@ -9,6 +9,7 @@ from itertools import product
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.sampling.placing import Draws, Room, Shape, checked, footprint, standing
 
 
@@ -36,3 +37,6 @@ def _cells(count: int) -> list[tuple[int, int]]:
     reach = math.isqrt(count) + 1
     side = range(-reach, reach + 1)
     return sorted(product(side, side), key=lambda cell: (cell[0] ** 2 + cell[1] ** 2, cell[1], cell[0]))[:count]
+
+
+PLACER = PlacerSpec(place=place)

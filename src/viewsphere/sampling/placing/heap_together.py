@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.sampling.placing import Draws, Room, Shape
 from viewsphere.sampling.placing._scattered import Gaps, scattered
 from viewsphere.sampling.placing._spot import free_spot
@@ -21,3 +22,6 @@ def place(
 ) -> Sequence[Matrix4]:
     """Poses near the middle, or near what stands there before; raises RecipeError where no spot is found for one."""
     return scattered(cast, room, shapes, rng, options, free_spot)
+
+
+PLACER = PlacerSpec(options=Options, place=place)

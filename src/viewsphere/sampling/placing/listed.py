@@ -8,6 +8,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.sampling.placing import Draws, Room, Shape, checked, standing
 
 
@@ -22,3 +23,6 @@ def place(
         raise RecipeError(f"{room.field}.layout: expected a list of {len(cast)} spots [x, y, azimuth]; found {len(room.spots)}")
     poses = [standing(shape.box, *spot) for shape, spot in zip(shapes, room.spots, strict=True)]
     return checked(cast, room, shapes, poses)
+
+
+PLACER = PlacerSpec(place=place)

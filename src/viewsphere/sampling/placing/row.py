@@ -11,6 +11,7 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.sampling.placing import Draws, Room, Shape, checked, standing
 
 
@@ -33,3 +34,6 @@ def place(
             poses.append(standing(shape.box, left - room.gap - high))
             left -= room.gap + high - low
     return checked(cast, room, shapes, poses)
+
+
+PLACER = PlacerSpec(place=place)

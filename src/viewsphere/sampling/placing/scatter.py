@@ -15,6 +15,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length
 from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, draws_of
 from viewsphere.sampling.placing._scattered import Gaps, scattered
@@ -72,3 +73,6 @@ def _within(floor: Footprint, reach: float) -> Footprint:
     if (high <= low).any():
         return floor
     return replace(floor, center=(low + high) / 2 @ floor.axes, half=(high - low) / 2)
+
+
+PLACER = PlacerSpec(options=Options, place=place)

@@ -18,6 +18,7 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import CountDrawn, drawn
 from viewsphere.sampling.physics import Touch, World, body_of
 from viewsphere.sampling.placing import Draws, Room, Shape, draws_of, footprint, standing
@@ -26,8 +27,6 @@ from viewsphere.sampling.placing._spot import Others, free_spot
 
 Float = NDArray[np.float64]
 
-IS_SLOW = True
-NEEDS = ("mujoco", "scipy")
 
 TRIES = 12
 """Orders and turns of one pile that are tried."""
@@ -138,3 +137,6 @@ def _tried(world: World, shapes: Sequence[Shape], slots: tuple[int, ...], own: n
 def _body(spec: ModelSpec, shape: Shape, slot: int, rng: Draws, options: Options) -> Any:
     own = drawn(options, draws_of(rng, str(slot), spec.key))
     return body_of([shape.hull], own.density, own.mass, Touch(own.friction, own.restitution))
+
+
+PLACER = PlacerSpec(options=Options, place=place, is_slow=True, packages=("mujoco", "scipy"))

@@ -16,6 +16,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length, Portion, Strength
 from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 from viewsphere.sampling.placing import Draws, Footprint, Room, Shape, draws_of, footprint, standing
 from viewsphere.sampling.placing._crowd import Crowd
@@ -185,3 +186,6 @@ def _steps(lanes: Sequence[Lane], reach: float) -> Float:
             if max(abs(x), abs(y)) <= reach:
                 found.append((x, y, length / parts, (x1 - x0) / length, (y1 - y0) / length, width / 2, z))
     return np.array(found).reshape(-1, 7)
+
+
+PLACER = PlacerSpec(options=Options, place=place)

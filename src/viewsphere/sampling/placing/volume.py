@@ -18,6 +18,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length, Strength
 from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 from viewsphere.sampling.placing import Draws, Room, Shape, draws_of
 
@@ -104,3 +105,6 @@ def apart(a: Float, b: Float, gap: float) -> bool:
             if max(one.min() - other.max(), other.min() - one.max()) >= gap - 1e-9:
                 return True
     return False
+
+
+PLACER = PlacerSpec(options=Options, place=place)
