@@ -6,24 +6,24 @@ import subprocess
 import pytest
 import yaml
 
+from installed import installed
 from small import ROOT
-from test_extending import EXAMPLES, install
 
 PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 CHECK = (ROOT / "scripts" / "check").read_text("utf-8")
 PARTS = re.findall(r"^    (\w+)\) ", CHECK, re.MULTILINE)
 
 
-def test_the_first_plug_in_passes_the_test_on_the_page(monkeypatch, tmp_path):
+def test_the_first_plug_in_passes_the_test_on_the_page(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     assert "Save the first example" in PAGE
-    first, *_ = EXAMPLES.values()
+    first, *_ = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text("utf-8"), re.DOTALL)
     assert "boxes.csv" in first
-    install(monkeypatch, "csv_boxes", "viewsphere.formats", first)
     scope = {}
     exec(code, scope)
     (test,) = (made for name, made in scope.items() if name.startswith("test_"))
-    test(tmp_path)
+    with installed(tmp_path / "site", "formats", "csv_boxes", first):
+        test(tmp_path)
 
 
 in_a_clone = pytest.mark.skipif(not (ROOT / ".github").exists(), reason="no clone")
@@ -33,7 +33,9 @@ in_a_clone = pytest.mark.skipif(not (ROOT / ".github").exists(), reason="no clon
 @pytest.mark.parametrize("page", ["CONTRIBUTING.md", ".github/PULL_REQUEST_TEMPLATE.md", ".github/workflows/ci.yml"])
 def test_files_that_pages_name_are_there(page):
     text = (ROOT / page).read_text("utf-8")
-    named = re.findall(r"\]\(([\w./-]+\.\w+|LICENSE)\)", text) + re.findall(r"(?<!/)((?:scripts|benchmarks|\.ci)/\w+)", text)
+    named = re.findall(r"\]\(([\w./-]+\.\w+|LICENSE)\)", text) + re.findall(
+        r"(?<!/)((?:scripts|benchmarks|\.ci)/[\w.]*\w)", text
+    )
     assert named
     assert [name for name in named if not (ROOT / name).exists()] == []
 
