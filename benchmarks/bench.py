@@ -41,8 +41,8 @@ from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import SHOT_FRAMES
 from viewsphere.store import Store
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility, rasterize
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Visibility, rasterize
 
 ROOT = Path(__file__).parent.parent
 PARTS_OF_COLOUR = (

@@ -29,7 +29,7 @@ from viewsphere.model.scene import Scene, Sky, Sun
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 TURNS = 7
 WHITE, RED, GREEN, WOOD, BLUE = (0.75, 0.74, 0.72), (0.65, 0.12, 0.08), (0.15, 0.5, 0.15), (0.45, 0.28, 0.15), (0.2, 0.25, 0.5)

@@ -29,7 +29,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.rendering.sky.sky import sky_pictures
 from viewsphere.rendering.sky.sun import sun_light
 from viewsphere.run.stages import Stages
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 HERE = Path(__file__).parent
 EQUAL = {"samples": 16, "bounces": 3}

@@ -29,8 +29,8 @@ from viewsphere.labels import (
 from viewsphere.labels._label import later
 from viewsphere.labels._sight import Sight
 from viewsphere.run.stages import Stages
+from viewsphere.truth.raster.visibility import Visibility, rasterize
 from viewsphere.truth.shot_views import ShotViews
-from viewsphere.truth.visibility import Visibility, rasterize
 
 PLAIN = ("depth", "instances", "normals")
 RASTER = "truth: raster"

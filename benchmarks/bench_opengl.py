@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from viewsphere.model.camera import Camera
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.raster.geometry import Geometry
 
 NEAR = 0.1
 """Distance of the near plane, metres; there is no far plane."""

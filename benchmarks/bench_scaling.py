@@ -24,7 +24,7 @@ from viewsphere.model.scene import Ground, Scene, Sun
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.sampling.camera import looking
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000, 5_000_000)
 SIDES = (128, 256, 512, 1024, 2048, 4096)

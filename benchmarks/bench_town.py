@@ -23,7 +23,7 @@ from viewsphere.engines.raster import staging
 from viewsphere.model.shot import Shot
 from viewsphere.run import stages
 from viewsphere.truth import view
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.raster.geometry import Geometry
 
 RECIPE = Path(__file__).parent.parent / "recipes" / "town.yaml"
 MOVING, LANE, APART, SHORT = 20, 1.7, 4.3, 3.8

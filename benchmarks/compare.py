@@ -42,7 +42,7 @@ from viewsphere.rendering.ground.material import SLABS, ground_material
 from viewsphere.rendering.ground.slab_picture import laid_with_slabs
 from viewsphere.rendering.view import develop
 from viewsphere.sampling.camera import looking
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.zoo import build
 from viewsphere.zoo.household.vessels import vessel
 from viewsphere.zoo.shapes.assembly import Piece, assemble

@@ -24,7 +24,7 @@ from viewsphere.model.instant import Instant
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 SIZE = 320, 240
 BOUNCES = 24

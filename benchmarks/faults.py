@@ -81,7 +81,7 @@ def row(fault: str, work: str, tally: Tally) -> str:
 def cost(turns: int = 5) -> None:
     """Print what durability costs, in pairs of runs that take turns: frames of 640 x 480, 16 a shot, by two workers."""
     from viewsphere.run.generate import generate
-    from viewsphere.store.moving import DURABILITY
+    from viewsphere.store.shots.moving import DURABILITY
 
     views = {"azimuth": {"start": 0, "stop": 351, "step": 9}, "elevation": [15, 40], "distance": 1.0}
     asked = recipe(viewpoints=views, camera={"size": [640, 480], "fov_deg": 35}, shot_frames=16, formats=[])

@@ -40,7 +40,7 @@ from viewsphere.model.scene import (
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.sampling.camera import looking
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.zoo import build, build_zoo_model
 
 TILE = (320, 240)

@@ -26,10 +26,10 @@ from viewsphere.model.thing import Motion, Thing
 from viewsphere.model.traits import Traits
 from viewsphere.sampling.camera import looking
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Store
-from viewsphere.store.records import PRODUCT
-from viewsphere.truth.geometry import build_geometry
+from viewsphere.store.shots.records import PRODUCT
+from viewsphere.truth.raster.geometry import build_geometry
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.shot_views import views_of
-from viewsphere.truth.visibility import rasterize
 
 HALVES = ((0, 1, 2), (0, 2, 3))
 TRIANGLES = np.array([[face[i] for i in half] for face in FACES.values() for half in HALVES], np.int32)

@@ -27,8 +27,8 @@ from deadline import DEADLINE, until
 from small import small_recipe, tree_hash
 from viewsphere.aside import LOCK
 from viewsphere.errors import StoreError
-from viewsphere.store.checksums import damaged_files
-from viewsphere.store.manifest import MANIFEST, Manifest
+from viewsphere.store.shots.checksums import damaged_files
+from viewsphere.store.shots.manifest import MANIFEST, Manifest
 
 CHANNELS = ["rgb", "depth", "instances"]
 STARTING = 2.0

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from viewsphere.errors import StoreError
-from viewsphere.store.checksums import CHECKSUMS, write_checksums
-from viewsphere.store.manifest import MANIFEST, SHARD, Manifest, Span, digest
+from viewsphere.store.shots.checksums import CHECKSUMS, write_checksums
+from viewsphere.store.shots.manifest import MANIFEST, SHARD, Manifest, Span, digest
 
 
 def seal_again(root: Path) -> None:

@@ -9,7 +9,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY, Finish, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.sampling.camera import looking
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 SMALL = Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4)
 AHEAD = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1)

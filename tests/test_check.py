@@ -15,7 +15,7 @@ from small import small_recipe
 from viewsphere import generate
 from viewsphere.check import check
 from viewsphere.check.digests import damaged
-from viewsphere.check.frames import FRAME_PROOFS
+from viewsphere.check.frames.comparing import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
 from viewsphere.geometry.mask import decode_rle, encode_rle
 from viewsphere.labels import Needs, channel_labels, channels, labels, labels_of, object_labels, on_request
@@ -24,8 +24,8 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
 from viewsphere.run.exporting import export
 from viewsphere.store import Dataset, encode
-from viewsphere.store.checksums import write_checksums
-from viewsphere.store.manifest import MANIFEST
+from viewsphere.store.shots.checksums import write_checksums
+from viewsphere.store.shots.manifest import MANIFEST
 
 
 @pytest.fixture(scope="module")
@@ -177,7 +177,7 @@ def test_pictures_alone_pass_without_the_proof_of_surfaces(tmp_path):
 def test_rays_are_cast_on_the_frames_asked_for(whole, monkeypatch):
     assert check(whole, sample=3).checked["surface"] == 3
     assert "surface" not in check(whole, rays=False).checked
-    monkeypatch.setattr("viewsphere.check.rays.find_spec", lambda name: None)
+    monkeypatch.setattr("viewsphere.check.frames.rays.find_spec", lambda name: None)
     report = check(whole)
     assert report.not_run["surface"] == "install viewsphere[check]"
     assert "surface (install viewsphere[check])" in report.verdict

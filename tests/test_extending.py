@@ -30,7 +30,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.overview import overview
 from viewsphere.run.exporting import export, writable_formats
 from viewsphere.run.listing import listed
-from viewsphere.store.sample_records import from_whole_sample, whole_sample
+from viewsphere.store.shots.sample_records import from_whole_sample, whole_sample
 
 PAGE = Path(__file__).parent.parent / "docs" / "extending.md"
 

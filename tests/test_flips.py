@@ -14,8 +14,8 @@ from viewsphere.labels import channels
 from viewsphere.model.files import Files
 from viewsphere.run.exporting import export
 from viewsphere.store import Dataset, decode
-from viewsphere.store.checksums import damaged_files
-from viewsphere.store.manifest import Manifest
+from viewsphere.store.shots.checksums import damaged_files
+from viewsphere.store.shots.manifest import Manifest
 
 KINDS = {
     "default": Files(),

@@ -10,7 +10,7 @@ import pytest
 import viewsphere as vs
 from small import ROOT
 from viewsphere.check import check
-from viewsphere.check.frames import files
+from viewsphere.check.frames.comparing import files
 from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.preview.frame import draw_sample
 from viewsphere.report.pictures import SCALES, layers

@@ -17,7 +17,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.recipe import extends
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling import models
-from viewsphere.store import moving
+from viewsphere.store.shots import moving
 
 SOURCE = sorted(
     file

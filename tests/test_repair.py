@@ -14,7 +14,7 @@ from viewsphere.check import check
 from viewsphere.check.repair import repair
 from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
-from viewsphere.store.manifest import MANIFEST, Manifest
+from viewsphere.store.shots.manifest import MANIFEST, Manifest
 
 
 @pytest.fixture

@@ -21,8 +21,8 @@ from viewsphere.labels import channels
 from viewsphere.model.tracks import TRACK
 from viewsphere.run.exporting import export
 from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
-from viewsphere.store.moving import DURABILITIES, DURABILITY, move, write_through
 from viewsphere.store.places import local
+from viewsphere.store.shots.moving import DURABILITIES, DURABILITY, move, write_through
 
 PART = Part(
     digest="d", version="1", name="n", recipe={"a": 1.5}, channels=("rgb",), first=0, frames=1, max_objects=1,

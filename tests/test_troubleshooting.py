@@ -16,7 +16,7 @@ from PIL import Image
 from animated import leaf
 from command_line import viewsphere
 from small import ROOT
-from viewsphere.store.manifest import sealed, unsealed
+from viewsphere.store.shots.manifest import sealed, unsealed
 
 PAGE = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
 HEADINGS = re.findall(r"^### `(.+)`$", PAGE, re.MULTILINE)

@@ -63,7 +63,7 @@ def test_stable_poses_and_rays_name_their_extras(tmp_path):
     stable, rays = said_without(
         """
         import numpy as np
-        from viewsphere.check.rays import RayCaster
+        from viewsphere.check.frames.rays import RayCaster
         from viewsphere.sampling.stable_poses import stable_ways
         print(refused(stable_ways, np.eye(3)))
         print(refused(RayCaster, None, None))

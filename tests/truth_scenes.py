@@ -11,9 +11,9 @@ from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.cutouts import ENDLESS
-from viewsphere.truth.geometry import Geometry, build_geometry
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.alpha_masks import ENDLESS
+from viewsphere.truth.raster.geometry import Geometry, build_geometry
+from viewsphere.truth.raster.visibility import rasterize
 
 BARREL = Distortion(model="brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))
 RATIONAL = Distortion(model="brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.6, 0.12, 0.02))

@@ -19,7 +19,7 @@ from viewsphere.codecs.exr import encode_exr
 from viewsphere.engines.raster.painting import paint
 from viewsphere.model import scene as model
 from viewsphere.rendering.view import EXPOSURE
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 pytestmark = pytest.mark.slow
 

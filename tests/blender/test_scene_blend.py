@@ -16,7 +16,7 @@ from viewsphere.errors import RecipeError, UserError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.rendering.view import develop
 from viewsphere.run.stages import Stages
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 pytestmark = [pytest.mark.usefixtures("blender", "blenders")]
 

@@ -15,16 +15,16 @@ from small import small_recipe
 from viewsphere import generate
 from viewsphere.check import check
 from viewsphere.check.claims import left_out, unclaimed
+from viewsphere.check.frames.recomputed import Recomputed
+from viewsphere.check.frames.sources import Sources
 from viewsphere.check.models import differing
-from viewsphere.check.recomputed import Recomputed
 from viewsphere.check.repair import repair
 from viewsphere.check.report import Finding, Report
-from viewsphere.check.sources import Sources
 from viewsphere.labels import channels
 from viewsphere.model.channel import PASSES
 from viewsphere.recipe.recipe import BEFORE_RENDERING
 from viewsphere.store import Dataset, encode
-from viewsphere.store.manifest import sealed, unsealed
+from viewsphere.store.shots.manifest import sealed, unsealed
 
 RECIPE = {
     "channels": ["rgb", "depth", "instances", "semantic"],

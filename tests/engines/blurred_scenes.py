@@ -19,7 +19,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, Scene, Sun, ViewTransform
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 LENS = Intrinsics(width=240, height=180, fx=210, fy=210, cx=120, cy=90)
 FINISH = Finish(view=ViewTransform(exposure=-1.5))  # nothing is clipped, so that pictures can be averaged

@@ -13,7 +13,7 @@ from viewsphere.engines.raster.surface import Lengths, Rows, pack_materials
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Thing
-from viewsphere.truth.geometry import build_geometry
+from viewsphere.truth.raster.geometry import build_geometry
 
 shown = called(material)
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)

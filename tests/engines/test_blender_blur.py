@@ -9,7 +9,7 @@ from blurred_scenes import LENS, SCENES, load, meshes, picture, sharp
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.shot import Shot
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 OPTIONS = {
     "cycles": {"samples": 16, "denoise": "off"},

@@ -25,7 +25,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, PointLight, Scene, Sky, Sun
 from viewsphere.model.thing import Thing
 from viewsphere.run import warm
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 EVEN = Sky(zenith=(1, 1, 1), horizon=(1, 1, 1))
 OUT = Finish(background=BLACK)

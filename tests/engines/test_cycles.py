@@ -19,7 +19,7 @@ from viewsphere.blender.process import BlenderProcess
 from viewsphere.engines._blender.border import border_of
 from viewsphere.engines._blender.staging import keeper_of
 from viewsphere.errors import BlenderDied, UserError
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("blender")]
 

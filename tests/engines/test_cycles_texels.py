@@ -20,7 +20,7 @@ from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Scene
 from viewsphere.model.thing import Motion, Repaint, Thing
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 RNG = np.random.default_rng(5)
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)

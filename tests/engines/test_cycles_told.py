@@ -21,8 +21,8 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Thing
-from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.geometry import build_geometry
+from viewsphere.truth.raster.visibility import rasterize
 
 WIDE = {"width": 80, "height": 60, "cx": 37.0, "cy": 33.0}
 BARREL = Distortion(model="brown_conrady", coefficients=(-0.2, 0.03, 0.001, -0.002))

@@ -15,7 +15,7 @@ from viewsphere.assets.srgb import linear as linear_light
 from viewsphere.engines.raster.samples import differs_behind, edge_samples, layers
 from viewsphere.model.camera import Distortion
 from viewsphere.model.scene import Background, Finish, Scene, ViewTransform
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 SIZE, FINE = 48, 8
 GREY = Background(color=(0.6, 0.6, 0.6))

@@ -23,7 +23,7 @@ from viewsphere.blender.interpreter import probe
 from viewsphere.engines._blender.border import border_of
 from viewsphere.engines._blender.staging import Keeper, clip_of, keeper_of
 from viewsphere.errors import UserError
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900), pytest.mark.usefixtures("drawing")]
 

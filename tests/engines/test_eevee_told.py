@@ -22,8 +22,8 @@ from viewsphere.errors import RecipeError
 from viewsphere.rendering.finish import finished
 from viewsphere.rendering.sky.sun import sun_light
 from viewsphere.sampling.engine_digest import engine_digest
-from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.geometry import build_geometry
+from viewsphere.truth.raster.visibility import rasterize
 
 NAMES = "eevee", "workbench"
 

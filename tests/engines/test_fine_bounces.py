@@ -22,7 +22,7 @@ from viewsphere.engines.raster.polish import NOWHERE
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground, Scene, Sun
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 
 @pytest.fixture(autouse=True)

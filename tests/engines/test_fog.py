@@ -18,7 +18,7 @@ from viewsphere.model.weather import CONTRAST, Fog
 from viewsphere.rendering.view import EXPOSURE
 from viewsphere.rendering.weather.conditions import METERED, clouded, floor_light, in_fog
 from viewsphere.rendering.weather.fog import Air
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 COLOR = np.array([0.8, 0.5, 0.3])
 AIR = (0.6, 0.7, 0.9)

@@ -21,7 +21,7 @@ from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Scene, ViewTransform
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 pytest.importorskip("embreex")
 

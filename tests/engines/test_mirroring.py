@@ -6,7 +6,7 @@ import pytest
 from truth_scenes import LENSES, cube, lens, orbit_camera, placed, random_soup
 from viewsphere.engines.raster.mirroring import blurred, looked_at, lying
 from viewsphere.geometry.camera import project
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 
 def raised(z):

@@ -18,7 +18,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Ground, Scene, Sun
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 SMALL = Intrinsics(width=96, height=72, fx=90, fy=90, cx=48, cy=36)
 BLOCK, BENT = (mesh_of(box((-0.4, -0.3, 0.0), (0.4, 0.3, high))) for high in (0.6, 1.4))

@@ -18,7 +18,7 @@ from viewsphere.engines.raster.panes import mirror_in_panes
 from viewsphere.engines.raster.polish import NOWHERE
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.scene import Scene, Sun
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 VIEW = camera(96, 72, 50, 180, 5, 2.0, (0.0, 0.0, 0.5))  # on the side of +Y, looks towards -Y
 PLATE = -1.0

@@ -25,7 +25,7 @@ from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PASSES
 from viewsphere.model.scene import Background, Finish, Ground, Scene, Sun, ViewTransform
 from viewsphere.rendering.background import display_background
 from viewsphere.rendering.view import EXPOSURE, develop
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 ALL = (*LIGHT_PASSES, *MATERIAL_PASSES)
 COLOR = np.array([0.8, 0.5, 0.3])

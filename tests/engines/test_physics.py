@@ -37,7 +37,7 @@ from viewsphere.model.scene import (
 )
 from viewsphere.model.thing import Thing
 from viewsphere.rendering.view import EXPOSURE
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
 DARK = Sky(strength=0.0)

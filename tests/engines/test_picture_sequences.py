@@ -15,7 +15,7 @@ from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Ground, PointLight, Scene, Sun
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 COUNT = 5
 LENS = Intrinsics(width=128, height=96, fx=120, fy=120, cx=64, cy=48)

@@ -14,7 +14,7 @@ from viewsphere.engines.raster.painting import paint
 from viewsphere.engines.raster.polish import mirror_in_polish
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.scene import Scene
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 SIGN = Material(base_color=(0.9, 0.1, 0.1, 1.0), unlit=True)
 VIEW = camera(96, 72, 55, 0, 22, 1.3, (2.0, 1.4, 0.3))

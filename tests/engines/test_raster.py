@@ -20,7 +20,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, ViewTransform
 from viewsphere.model.thing import Thing
 from viewsphere.rendering.view import EXPOSURE, KNEE
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 DARK = Sky(strength=0.0)
 BLACK = Background(color=(0, 0, 0))

@@ -13,7 +13,7 @@ from viewsphere.engines.raster.kernels_samples import TIE
 from viewsphere.engines.raster.samples import NOWHERE, OFFSETS, edge_samples, layers
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.zoo import build
 
 

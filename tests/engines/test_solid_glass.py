@@ -15,7 +15,7 @@ from viewsphere.engines.raster.painting import paint
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.scene import Ground, Scene, Sky
 from viewsphere.rendering.view import EXPOSURE
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 GLASS = Material(base_color=(1.0, 1.0, 1.0, 1.0), roughness=0.0, transmission=1.0, thickness=0.01)
 THIN = replace(GLASS, thickness=0.0)

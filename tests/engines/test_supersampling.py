@@ -14,7 +14,7 @@ from viewsphere.engines.raster.supersampling import larger
 from viewsphere.errors import RecipeError
 from viewsphere.model.channel import LIGHT_PASSES
 from viewsphere.model.scene import Background, Finish, Scene, Sun, ViewTransform
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 SIZE, FINE = 48, 16
 DARK = Scene(sun=None, finish=Finish(background=Background(color=(0.0, 0.0, 0.0)), view=ViewTransform(transform="raw")))

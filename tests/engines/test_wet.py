@@ -20,7 +20,7 @@ from viewsphere.model.scene import Ground, Scene, Sky
 from viewsphere.model.weather import Wet
 from viewsphere.rendering.view import EXPOSURE
 from viewsphere.rendering.weather.puddles import puddles
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 POOL = Wet(amount=1.0, puddles=1.0)
 SIGN = Material(base_color=(0.9, 0.1, 0.1, 1.0), unlit=True)

@@ -20,7 +20,7 @@ from viewsphere.geometry.camera import project
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.sampling.pose_files.colmap import read_colmap
-from viewsphere.store.choice import Choice
+from viewsphere.store.samples.choice import Choice
 
 KINDS = ("binary", "text")
 BENT = ("barrel", "rational", "fisheye")

@@ -30,7 +30,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
-from viewsphere.store.checksums import CHECKSUMS
+from viewsphere.store.shots.checksums import CHECKSUMS
 
 
 def _proves_itself(module) -> bool:

@@ -17,7 +17,7 @@ from viewsphere.run.exporting import export, writable_formats
 from viewsphere.run.preparing import Views
 from viewsphere.run.scope import refusals, scope_of
 from viewsphere.store import Choice
-from viewsphere.store.checksums import CHECKSUMS
+from viewsphere.store.shots.checksums import CHECKSUMS
 from worlds import WORLDS
 
 HEAVY = {"blend", "huggingface"}  # a program of its own; another library's files

@@ -12,7 +12,7 @@ from viewsphere import Dataset
 from viewsphere.formats.webdataset import Options, verify
 from viewsphere.model.files import Files
 from viewsphere.run.exporting import export
-from viewsphere.store.sample_records import from_whole_sample
+from viewsphere.store.shots.sample_records import from_whole_sample
 
 webdataset = pytest.importorskip("webdataset")
 

@@ -130,7 +130,7 @@ def findings(target: str, seeds: range) -> Iterator[Finding | int]:
     """Findings among these inputs, and each input's seed before it runs."""
     from viewsphere.check import digests
     from viewsphere.plugins import registry
-    from viewsphere.store import checksums
+    from viewsphere.store.shots import checksums
 
     warnings.simplefilter("ignore")
     os.environ |= SETTINGS

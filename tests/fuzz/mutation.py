@@ -14,7 +14,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Any
 
-from viewsphere.store.manifest import sealed, unsealed
+from viewsphere.store.shots.manifest import sealed, unsealed
 
 NUMBERS = (
     "0", "-0", "-1", "1", "2", "3", "0.5", "-2.5", "1e-7", "1e-320", "1e308", "-1e308", "1e999", "nan", "-inf", "inf", "255", "256",

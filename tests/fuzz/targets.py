@@ -552,8 +552,8 @@ def _made(short: bool, shots: str = "files") -> Path:
 
     from viewsphere.model.files import Files as Kinds
     from viewsphere.run.exporting import export
-    from viewsphere.store.heartbeat import Heartbeat
-    from viewsphere.store.records import NAME_BYTES
+    from viewsphere.store.shots.heartbeat import Heartbeat
+    from viewsphere.store.shots.records import NAME_BYTES
 
     lens = LENS.model_copy(update={"width": 24, "height": 18, "fx": 20.0, "fy": 20.0, "cx": 12.0, "cy": 9.0})
     root = Path(tempfile.mkdtemp(prefix="fuzz-")) / "out"
@@ -613,7 +613,7 @@ def _each(*calls: Callable[[], object]) -> None:
 
 def _read(root: Path) -> None:
     from viewsphere.store import Dataset
-    from viewsphere.store.films import films_of
+    from viewsphere.store.samples.films import films_of
 
     dataset = Dataset(root)
     for sample in dataset:

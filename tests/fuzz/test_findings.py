@@ -18,7 +18,7 @@ from viewsphere.run.status import status
 from viewsphere.sampling.rig_files import read_rig
 from viewsphere.store import Dataset
 from viewsphere.store.index import Block, Index
-from viewsphere.store.manifest import MANIFEST, Manifest, digest, sealed, unsealed
+from viewsphere.store.shots.manifest import MANIFEST, Manifest, digest, sealed, unsealed
 from viewsphere.store.texts import MOST_NESTED, parsed
 
 

@@ -33,7 +33,7 @@ def alone(monkeypatch):
     """What a campaign sets in its own process is as before."""
     from viewsphere.check import digests
     from viewsphere.plugins import registry
-    from viewsphere.store import checksums
+    from viewsphere.store.shots import checksums
 
     for name, value in SETTINGS.items():
         monkeypatch.setenv(name, value)

@@ -18,7 +18,7 @@ from viewsphere.labels import object_labels, on_request
 from viewsphere.model.camera import Distortion
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import Sample
-from viewsphere.store.sample_records import from_whole_sample, whole_sample
+from viewsphere.store.shots.sample_records import from_whole_sample, whole_sample
 
 ASKED = ("amodal", "occluders", "depth_order", "occlusion_level", "truncation_level", "obb", "contour", "birds_eye")
 LENSES = {

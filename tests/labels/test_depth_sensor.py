@@ -13,7 +13,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.labels import Sight
 from viewsphere.labels.depth_sensor import LABEL, STEPS, _seen, _shadow
 from viewsphere.store import Dataset
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 FOV = 40.0
 WIDTH, HEIGHT = 160, 120

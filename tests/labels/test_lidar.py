@@ -19,7 +19,7 @@ from viewsphere.labels.lidar import LABEL
 from viewsphere.preview.frame import draw_sample
 from viewsphere.preview.tiles import contact_sheet
 from viewsphere.store import Dataset
-from viewsphere.store.films import films_of
+from viewsphere.store.samples.films import films_of
 
 ROTATED = [5.0, 20.0, -3.0]
 LUMINANCE = (0.2126, 0.7152, 0.0722)

@@ -18,7 +18,7 @@ from viewsphere.check import check
 from viewsphere.labels import observe
 from viewsphere.labels.materials import LABEL
 from viewsphere.store import Dataset
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 NAMES = ("depth", "instances", "triangles", "materials")
 SIX = tuple(Material(name=f"m{i}") for i in range(6))

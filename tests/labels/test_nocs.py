@@ -12,7 +12,7 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels import observe
 from viewsphere.labels.nocs import LABEL, picture
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 NAMES = ("depth", "instances", "coordinates", "nocs")
 

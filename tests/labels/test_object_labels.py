@@ -19,9 +19,9 @@ from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.store.sample_records import from_whole_sample, whole_sample
-from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.visibility import rasterize
+from viewsphere.store.shots.sample_records import from_whole_sample, whole_sample
+from viewsphere.truth.raster.geometry import build_geometry
+from viewsphere.truth.raster.visibility import rasterize
 
 HALVES = ((0, 1, 2), (0, 2, 3))
 TRIANGLES = np.array([[face[i] for i in half] for face in FACES.values() for half in HALVES], np.int32)

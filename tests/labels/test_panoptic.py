@@ -12,7 +12,7 @@ from viewsphere.errors import StoreError
 from viewsphere.labels import Sight, channels
 from viewsphere.labels.panoptic import LABEL, MOST, class_of, compute, object_of, picture, renumbered
 from viewsphere.store import encode
-from viewsphere.store.channel_files import decode
+from viewsphere.store.samples.channel_files import decode
 
 NAMES = ("depth", "instances", "semantic", "panoptic")
 

@@ -10,7 +10,7 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
 from viewsphere.labels.position import LABEL, striped
 from viewsphere.model.camera import Camera
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 NAMES = ("depth", "instances", "coordinates", "position")
 

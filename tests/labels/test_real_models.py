@@ -11,7 +11,7 @@ from viewsphere.assets.cache import load_normalised
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 MODELS = Path(__file__).parents[2].parent / "shared" / "models"
 NAMES = ("car/NormalCar1.obj", "bicycle/Bicycle.obj", "chair/deck_chair.glb", "boat/Boat.obj")

@@ -32,9 +32,9 @@ from viewsphere.model.files import Files
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.store import Dataset, encode
-from viewsphere.store.channel_files import decode
-from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.visibility import rasterize
+from viewsphere.store.samples.channel_files import decode
+from viewsphere.truth.raster.geometry import build_geometry
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.zoo import build_zoo_model, families
 
 NAMES = ("depth", "instances", "categories", "semantic")

@@ -23,9 +23,9 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.surface_samples import SURFACE_SAMPLE
 from viewsphere.model.thing import Motion
 from viewsphere.store import Dataset, encode
-from viewsphere.store.channel_files import decode
+from viewsphere.store.samples.channel_files import decode
 from viewsphere.truth.shot_views import views_of
-from viewsphere.truth.surface_draws import points_on_model
+from viewsphere.truth.surface_points.draws import points_on_model
 
 
 def sampled(seed, lens_name, count=200, move=None, ground=False):

@@ -25,7 +25,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.model.voxels import FREE, INSIDE, OCCLUDED, OUTSIDE, RUN, SURFACE, TOUCHED, Grid, Voxels
 from viewsphere.store import Dataset, encode
-from viewsphere.store.channel_files import decode
+from viewsphere.store.samples.channel_files import decode
 
 SMALL = {"size": [40, 30, 50], "cell": 0.11, "distance": 4.0, "bottom": -1.7}
 NAMES = ("depth", "instances", "semantic")

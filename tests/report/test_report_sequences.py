@@ -15,7 +15,7 @@ from viewsphere.report.pictures import Scale, layers
 from viewsphere.report.sequences import MOST_POINTS, extents_of, played, sequence_data
 from viewsphere.run.generate import generate
 from viewsphere.store import Dataset
-from viewsphere.store.films import Film, films_of
+from viewsphere.store.samples.films import Film, films_of
 
 
 @pytest.fixture(scope="module")

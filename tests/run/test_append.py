@@ -33,7 +33,7 @@ from viewsphere.sampling.fitting import settings
 from viewsphere.sampling.plan import plan
 from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import PlanRecord, Store
-from viewsphere.store.manifest import sealed, unsealed
+from viewsphere.store.shots.manifest import sealed, unsealed
 
 BOX = {"source": "zoo:post_box", "category": "post box", "scale": {"length": 0.18}}
 POSES = {"azimuth": [0, 120, 240], "elevation": [15, 50], "distance": 1.0}

@@ -13,7 +13,7 @@ from viewsphere.run.completed import Completed, lacking
 from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Choice
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 from worlds import MODELS, rendered, shared_place, stills, videos
 
 FEW = {"channels": ["rgb", "tracks"], "annotations": []}

@@ -21,7 +21,7 @@ from viewsphere.sampling.plan import plan
 from viewsphere.sampling.samplers import _stock
 from viewsphere.sampling.scenes import Scenes
 from viewsphere.store import Exported
-from viewsphere.store.checksums import write_checksums, written_least, written_options
+from viewsphere.store.shots.checksums import write_checksums, written_least, written_options
 
 MOST_TRIES = limits.MAX_REDRAWS
 

@@ -10,7 +10,7 @@ from viewsphere.run.generate import generate
 from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.sampling.fitting import LOOK
 from viewsphere.store import Store
-from viewsphere.store.manifest import sealed, unsealed
+from viewsphere.store.shots.manifest import sealed, unsealed
 
 RECIPE = {"channels": ["rgb"], "formats": [], "shot_frames": 3}
 

@@ -21,9 +21,9 @@ from small import small_recipe, tree_hash
 from viewsphere.errors import UserError
 from viewsphere.run.generate import generate
 from viewsphere.run.merging import merge
-from viewsphere.store import moving
-from viewsphere.store.manifest import MANIFEST, digest, unsealed
 from viewsphere.store.places import local
+from viewsphere.store.shots import moving
+from viewsphere.store.shots.manifest import MANIFEST, digest, unsealed
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="asks /proc which file is synced")
 

@@ -11,7 +11,7 @@ from viewsphere.run.generate import Missing
 from viewsphere.sampling.extension import whole
 from viewsphere.store import Store
 from viewsphere.store.index import Index
-from viewsphere.store.manifest import MANIFEST
+from viewsphere.store.shots.manifest import MANIFEST
 
 ALL = {"azimuth": {"start": 0, "stop": 359, "step": 1}, "elevation": [15], "distance": 1.0}
 

@@ -20,9 +20,9 @@ from viewsphere.run.generate import generate
 from viewsphere.run.status import status
 from viewsphere.sampling.extension import whole
 from viewsphere.store import Store
-from viewsphere.store.folder import RUN
-from viewsphere.store.heartbeat import SILENT_S, Heartbeat, Pulse
 from viewsphere.store.index import Index
+from viewsphere.store.shots.folder import RUN
+from viewsphere.store.shots.heartbeat import SILENT_S, Heartbeat, Pulse
 
 SPHERE = {"kind": "sphere", "count": 50_000_000, "distance": 3}
 
@@ -45,8 +45,8 @@ def leave(store, told):
 @pytest.mark.parametrize("jump", [-3600, 86_400])
 def test_a_clock_that_jumps_changes_no_rate(jump, monkeypatch):
     ticks, now = [0.0], [1e9]
-    monkeypatch.setattr("viewsphere.store.heartbeat.time.monotonic", lambda: ticks[0])
-    monkeypatch.setattr("viewsphere.store.heartbeat.time.time", lambda: now[0])
+    monkeypatch.setattr("viewsphere.store.shots.heartbeat.time.monotonic", lambda: ticks[0])
+    monkeypatch.setattr("viewsphere.store.shots.heartbeat.time.time", lambda: now[0])
     pulse = Pulse(lambda text: None)
     pulse.enters("frames")
     pulse.now = replace(pulse.now, done=40, total=100)
@@ -113,7 +113,7 @@ def test_the_pulse_tells_what_is_under_way():
 
 
 def test_the_pulse_goes_on_by_itself(tmp_path, monkeypatch):
-    monkeypatch.setattr("viewsphere.store.heartbeat.BEAT_S", 0.02)
+    monkeypatch.setattr("viewsphere.store.shots.heartbeat.BEAT_S", 0.02)
     written = []
     with Pulse(written.append):
         assert until(lambda: len(written) > 3)

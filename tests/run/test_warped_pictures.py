@@ -11,8 +11,8 @@ from unlit import write_unlit
 from viewsphere.check import check
 from viewsphere.engines._arranged import Arrangements
 from viewsphere.run.stages import Stages
-from viewsphere.truth.points import points_seen
 from viewsphere.truth.shot_views import ShotViews
+from viewsphere.truth.surface_points.points import points_seen
 
 CHANNELS = [
     "rgb", "depth", "flow", "flow_backward", "flow_state", "flow_backward_state", "disparity", "disparity_change",

@@ -12,7 +12,7 @@ from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Dataset
 from viewsphere.store.index import Index
-from viewsphere.store.manifest import sealed, unsealed
+from viewsphere.store.shots.manifest import sealed, unsealed
 
 ENDLESS = 10**15
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from viewsphere.errors import StoreError
-from viewsphere.store.manifest import MANIFEST, Manifest, digest, seal_of, sealed, unsealed
+from viewsphere.store.shots.manifest import MANIFEST, Manifest, digest, seal_of, sealed, unsealed
 
 PLAIN = st.dictionaries(
     st.text(max_size=8), st.recursive(st.none() | st.integers() | st.text(max_size=9), st.lists, max_leaves=4)

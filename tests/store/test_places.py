@@ -19,7 +19,7 @@ from viewsphere.errors import RemoteError, StoreError, UserError
 from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Store, located
-from viewsphere.store.checksums import CHECKSUMS
+from viewsphere.store.shots.checksums import CHECKSUMS
 from viewsphere.urls import byte_range, files_below, here, remote_path
 from viewsphere.urls.remote_path import RemotePath
 

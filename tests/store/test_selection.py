@@ -13,7 +13,7 @@ from cube_dataset import make
 from small import small_recipe
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
-from viewsphere.store import dataset as reading
+from viewsphere.store.samples import dataset as reading
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,8 @@ from viewsphere.run.executors import local
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.store import Dataset
-from viewsphere.store.manifest import MANIFEST, Manifest, sealed, unsealed
 from viewsphere.store.paths import file_inside, is_name
+from viewsphere.store.shots.manifest import MANIFEST, Manifest, sealed, unsealed
 from viewsphere.store.texts import parsed
 from viewsphere.urls.inside import is_inside
 

@@ -20,7 +20,7 @@ from viewsphere.errors import StoreError
 from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import located
-from viewsphere.store.manifest import SHARD, Manifest, digest
+from viewsphere.store.shots.manifest import SHARD, Manifest, digest
 from viewsphere.urls import files_below
 
 CHANNELS = ["rgb", "depth", "instances", "normals"]

@@ -9,7 +9,7 @@ from truth_scenes import FISHEYE, LENSES, cube, lens, mesh_of, orbit_camera, pla
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import channels, observe
 from viewsphere.model.channel import PASSES
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 ALL = tuple(name for name in still_channels() if name not in PASSES)
 

@@ -8,7 +8,7 @@ import pytest
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, silhouette
 from viewsphere.geometry.camera import orbit_rotation
 from viewsphere.geometry.rotation import compose, rigid
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.zoo.fence import LENGTH, Fence, fence
 
 IMAGE = (0, 0, 160, 120)

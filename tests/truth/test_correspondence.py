@@ -12,7 +12,7 @@ from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup,
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.model.camera import Camera
-from viewsphere.truth.surface_draws import points_on
+from viewsphere.truth.surface_points.draws import points_on
 
 AHEAD = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +Y, Z up
 STILL = pose(0, 0, 0)
@@ -255,7 +255,7 @@ def test_a_flat_picture_is_nowhere_and_a_ground_of_another_height_is_another():
 @pytest.mark.parametrize("name", LENSES)
 def test_forward_and_backward_agree(name):
     """|f(p) + b(p + f(p))| where the point is seen in both pictures; b is evaluated from geometry, at any position."""
-    from viewsphere.truth.points import points_seen
+    from viewsphere.truth.surface_points.points import points_seen
 
     rng = np.random.default_rng(8)
     meshes, first, second = random_scene(rng)

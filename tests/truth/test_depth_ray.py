@@ -11,7 +11,7 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
 from viewsphere.labels.depth_ray import LABEL
 from viewsphere.model.sample import Sample
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 
 def seen(geometry, lens_name, distance=4.0):

@@ -13,8 +13,8 @@ from quick import quick
 from truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
-from viewsphere.truth.cutouts import NEVER, SURFACE
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.alpha_masks import NEVER, SURFACE
+from viewsphere.truth.raster.visibility import rasterize
 
 pytest.importorskip("embreex")
 

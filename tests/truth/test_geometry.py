@@ -6,8 +6,8 @@ import pytest
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.labels import observe
-from viewsphere.truth.cutouts import NEVER, SURFACE
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.alpha_masks import NEVER, SURFACE
+from viewsphere.truth.raster.visibility import rasterize
 
 QUAD = [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]
 UV = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]])  # v = 0 on top
@@ -63,7 +63,7 @@ def test_ground_lies_at_the_lowest_used_vertex():
 def test_ids_must_be_in_order():
     from viewsphere.model.model_spec import ModelSpec
     from viewsphere.model.thing import Thing
-    from viewsphere.truth.geometry import build_geometry
+    from viewsphere.truth.raster.geometry import build_geometry
 
     spec = ModelSpec(key="m", source="m", category="thing", category_id=1)
     with pytest.raises(ValueError, match=r"expected ids 1\.\.N in order, then 0, got \[2\]"):

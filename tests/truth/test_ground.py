@@ -9,8 +9,8 @@ from quick import quick
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
-from viewsphere.truth.geometry import without_ground
-from viewsphere.truth.visibility import rasterize, with_ground
+from viewsphere.truth.raster.geometry import without_ground
+from viewsphere.truth.raster.visibility import rasterize, with_ground
 
 UP_TO = 1e-9
 """Sine of the angle to the horizon up to which rounding may decide."""

@@ -13,8 +13,8 @@ from viewsphere.labels.lidar import LABEL
 from viewsphere.model.camera import Camera
 from viewsphere.model.rig import Sensor
 from viewsphere.recipe.lidar import LidarEntry
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.shot_views import Painted
-from viewsphere.truth.visibility import rasterize
 
 WHITE = Painted((), (), None)
 

@@ -10,8 +10,8 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import rigid, rotation_about
 from viewsphere.model.camera import Camera
 from viewsphere.recipe.lidar import LidarEntry
-from viewsphere.truth.sweeping import Turning, still_hits, swept_hits
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.lidar.sweeping import Turning, still_hits, swept_hits
+from viewsphere.truth.raster.visibility import rasterize
 
 RIGHT_HANDED = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along the world's y, its z is up
 

@@ -18,9 +18,9 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.files import Files
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.sample import Sample
-from viewsphere.store.channel_files import decode, encode
+from viewsphere.store.samples.channel_files import decode, encode
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.view import View
-from viewsphere.truth.visibility import rasterize
 
 NAMES = (
     "flow", "flow_backward", "scene_flow", "scene_flow_backward", "disparity", "disparity_change", "flow_state",

@@ -12,9 +12,9 @@ from viewsphere.labels import observe
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor, Ground, Scene
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.geometry import Geometry, build_geometry, present
 from viewsphere.truth.moving import ROOMS, Ring, shot_floor
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.geometry import Geometry, build_geometry, present
+from viewsphere.truth.raster.visibility import rasterize
 
 HELD = [field.name for field in dataclasses.fields(Geometry) if field.name not in ("cutouts", "meshes", "facing", "spare")]
 ARRAYS = [*HELD, "vertices", "normals", "triangle_normals", "triangle_side", "triangle_tops"]

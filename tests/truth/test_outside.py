@@ -9,8 +9,8 @@ from viewsphere.labels import Sight
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.visibility import OUTSIDE, homogeneous, in_picture, rasterize
+from viewsphere.truth.raster.geometry import build_geometry
+from viewsphere.truth.raster.visibility import OUTSIDE, homogeneous, in_picture, rasterize
 
 LENS = Intrinsics(width=64, height=48, fx=50.0, fy=50.0, cx=32.0, cy=24.0)
 MESHES = [sphere(1, 0.8), cube(0.5)]

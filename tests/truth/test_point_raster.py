@@ -11,12 +11,12 @@ from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup,
 from viewsphere.assets.mesh import Material
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.model.camera import Camera
-from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.point_raster import INVALID, OCCLUDED, VISIBLE, states
-from viewsphere.truth.points import points_in_world, points_seen
-from viewsphere.truth.surface_draws import points_on
+from viewsphere.truth.raster.geometry import build_geometry
+from viewsphere.truth.raster.visibility import rasterize
+from viewsphere.truth.surface_points.draws import points_on
+from viewsphere.truth.surface_points.points import points_in_world, points_seen
+from viewsphere.truth.surface_points.raster import INVALID, OCCLUDED, VISIBLE, states
 from viewsphere.truth.view import View
-from viewsphere.truth.visibility import rasterize
 
 
 def turned(rng):

@@ -9,9 +9,9 @@ from two_views import centers, matched, pose, view
 from proven import close
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere.geometry.rotation import matrix_from_quaternion
-from viewsphere.truth.point_raster import BEHIND, INVALID, OUTSIDE, VISIBLE
-from viewsphere.truth.points import FREE, GROUND, NOWHERE, SKY, SurfacePoints, points_in_world, points_seen
-from viewsphere.truth.surface_draws import points_on
+from viewsphere.truth.surface_points.draws import points_on
+from viewsphere.truth.surface_points.points import FREE, GROUND, NOWHERE, SKY, SurfacePoints, points_in_world, points_seen
+from viewsphere.truth.surface_points.raster import BEHIND, INVALID, OUTSIDE, VISIBLE
 
 STILL = pose(0, 0, 0)
 

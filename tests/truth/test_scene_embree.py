@@ -14,8 +14,8 @@ from viewsphere.labels import annotated, observe, sight_of
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.geometry import build_geometry
+from viewsphere.truth.raster.visibility import rasterize
 
 pytest.importorskip("embreex")
 

@@ -13,12 +13,12 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.lidar import LidarEntry
-from viewsphere.truth.correspondence import Match
-from viewsphere.truth.geometry import build_geometry, seen_from, with_both_sides
-from viewsphere.truth.point_raster import OCCLUDED, VISIBLE
-from viewsphere.truth.sweeping import Turning, still_hits, swept_hits
+from viewsphere.truth.correspondences.correspondence import Match
+from viewsphere.truth.lidar.sweeping import Turning, still_hits, swept_hits
+from viewsphere.truth.raster.geometry import build_geometry, seen_from, with_both_sides
+from viewsphere.truth.raster.visibility import homogeneous, rasterize
+from viewsphere.truth.surface_points.raster import OCCLUDED, VISIBLE
 from viewsphere.truth.view import View
-from viewsphere.truth.visibility import homogeneous, rasterize
 
 SINGLE = Material(double_sided=False)
 

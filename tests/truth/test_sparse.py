@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewsphere.truth.sparse import LEAST, MOST, Spare, sparse
+from viewsphere.truth.raster.sparse import LEAST, MOST, Spare, sparse
 
 RESIDENT = Path("/proc/self/statm")
 

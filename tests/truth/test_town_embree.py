@@ -11,11 +11,11 @@ from two_views import brute_hidden
 import viewsphere as vs
 from viewsphere.engines._arranged import Arrangements
 from viewsphere.run.stages import Stages
-from viewsphere.truth.correspondence import Match
-from viewsphere.truth.point_raster import OCCLUDED
+from viewsphere.truth.correspondences.correspondence import Match
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.shot_views import ShotViews
-from viewsphere.truth.surface_draws import points_on
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.surface_points.draws import points_on
+from viewsphere.truth.surface_points.raster import OCCLUDED
 
 pytest.importorskip("embreex")
 pytestmark = [pytest.mark.slow]

@@ -18,7 +18,7 @@ import viewsphere as vs
 from truth_scenes import LENSES, cube, lens, orbit_camera, placed, random_soup, silhouette, sphere
 from viewsphere.kernels.build import IS_STOCK, NUMBA
 from viewsphere.labels import channel_labels, observe
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.visibility import rasterize
 
 LABELS = [name for name, label in channel_labels().items() if not label.needs.is_some]
 """Those that still pictures of one sensor have."""

@@ -9,9 +9,9 @@ from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Motion, Thing, TimeStep
-from viewsphere.truth.correspondence import Match
-from viewsphere.truth.geometry import build_geometry, present
-from viewsphere.truth.point_raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE
+from viewsphere.truth.correspondences.correspondence import Match
+from viewsphere.truth.raster.geometry import build_geometry, present
+from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE
 from viewsphere.truth.view import View
 
 SURE = 1e-9

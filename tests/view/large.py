@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from viewsphere.store import Dataset
-from viewsphere.store.folder import Store
 from viewsphere.store.index import Block
-from viewsphere.store.manifest import Manifest, digest
-from viewsphere.store.sample_records import whole_sample
+from viewsphere.store.shots.folder import Store
+from viewsphere.store.shots.manifest import Manifest, digest
+from viewsphere.store.shots.sample_records import whole_sample
 
 FRAMES = 273_600
 """Those of the paper's largest data set."""

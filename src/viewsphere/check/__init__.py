@@ -13,16 +13,16 @@ from viewsphere.check.counts import credits, lacking_models, missing
 from viewsphere.check.cycles import Compared
 from viewsphere.check.digests import damaged
 from viewsphere.check.exports import export_report, exports
-from viewsphere.check.frame_proofs import Chosen, frame_report, indices_at, samples_at
+from viewsphere.check.frames.proofs import Chosen, frame_report, indices_at, samples_at
+from viewsphere.check.frames.recomputed import Recomputed, rows_of
+from viewsphere.check.frames.sources import Sources
 from viewsphere.check.models import differing
-from viewsphere.check.recomputed import Recomputed, rows_of
 from viewsphere.check.report import Finding, Report, joined
-from viewsphere.check.sources import Sources
 from viewsphere.errors import ViewsphereError
 from viewsphere.model.channel import PASSES
 from viewsphere.run.in_order import in_order
 from viewsphere.store import Dataset
-from viewsphere.store.checksums import damaged_files
+from viewsphere.store.shots.checksums import damaged_files
 
 Value = TypeVar("Value", int, str)
 

@@ -6,11 +6,11 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from viewsphere.check.sources import Sources
+from viewsphere.check.frames.sources import Sources
 from viewsphere.errors import StoreError
 from viewsphere.store import Dataset, Row
-from viewsphere.store.manifest import MANIFEST, SHARD, Manifest
-from viewsphere.store.simulated import MADE
+from viewsphere.store.samples.simulated import MADE
+from viewsphere.store.shots.manifest import MANIFEST, SHARD, Manifest
 
 OF_STORE = frozenset({"plan.json", "skipped.json", "lock", "models", "shots", "simulated", "writing", "failed"})
 """Names of what lies in a store's folder."""

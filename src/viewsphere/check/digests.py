@@ -7,8 +7,8 @@ from pathlib import Path
 
 from viewsphere.errors import StoreError
 from viewsphere.store import Dataset
-from viewsphere.store.checksums import AT_ONCE
-from viewsphere.store.manifest import Manifest
+from viewsphere.store.shots.checksums import AT_ONCE
+from viewsphere.store.shots.manifest import Manifest
 
 
 def damaged(dataset: Dataset) -> tuple[int, dict[Path, list[str]]]:

@@ -13,7 +13,7 @@ from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.preparing import Views
 from viewsphere.store import Dataset
-from viewsphere.store.checksums import damaged_files, written_least, written_options
+from viewsphere.store.shots.checksums import damaged_files, written_least, written_options
 from viewsphere.urls import here
 
 Verify = Callable[..., Iterator[Remark]]

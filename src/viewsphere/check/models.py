@@ -25,7 +25,7 @@ from viewsphere.files import open_text, read_bytes
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.diameter import diameter
 from viewsphere.store import Category, Dataset, ModelInfo
-from viewsphere.store.manifest import MANIFEST
+from viewsphere.store.shots.manifest import MANIFEST
 
 PRECISION = 1e-12
 """Share of a number by which texts may differ: brightness above 1 is kept as a product in a GLB."""

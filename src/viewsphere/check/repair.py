@@ -9,9 +9,9 @@ from typing import Any
 
 from viewsphere.check import Finding, Report, check, exports, lacking_models
 from viewsphere.check.digests import damaged
+from viewsphere.check.frames.recomputed import Recomputed
+from viewsphere.check.frames.sources import Sources
 from viewsphere.check.models import differing
-from viewsphere.check.recomputed import Recomputed
-from viewsphere.check.sources import Sources
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.limits import limits
 from viewsphere.run.exporting import export

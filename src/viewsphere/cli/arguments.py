@@ -68,8 +68,8 @@ AllowScripts = Annotated[
 
 def _keep(durability: str | None) -> str | None:
     """Have what is finished kept so in this process, and in those that it starts."""
-    from viewsphere.store.moving import DURABILITY
-    from viewsphere.store.moving import durability as asked
+    from viewsphere.store.shots.moving import DURABILITY
+    from viewsphere.store.shots.moving import durability as asked
 
     if durability is not None:
         os.environ[DURABILITY] = durability

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from viewsphere.run.progress import Listener, Progress
     from viewsphere.run.status import Status
     from viewsphere.sampling.plan import Plan
-    from viewsphere.store.heartbeat import Heartbeat
+    from viewsphere.store.shots.heartbeat import Heartbeat
 
 MOST_FINDINGS = 20
 

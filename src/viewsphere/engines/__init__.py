@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
     from viewsphere.assets.deforming import Load
     from viewsphere.model.shot import Shot
-    from viewsphere.truth.geometry import Geometry
-    from viewsphere.truth.visibility import Visibility
+    from viewsphere.truth.raster.geometry import Geometry
+    from viewsphere.truth.raster.visibility import Visibility
 
 
 class Stage(Protocol):

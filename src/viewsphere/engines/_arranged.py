@@ -17,8 +17,8 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint, Thing, TimeStep
-from viewsphere.truth.geometry import Geometry, placed_meshes, present
 from viewsphere.truth.moving import ROOMS, Ring, changed, differs_in_shape_only, shot_floor
+from viewsphere.truth.raster.geometry import Geometry, placed_meshes, present
 
 STEPS = 16
 """Time steps of models whose meshes are kept for the next instants."""

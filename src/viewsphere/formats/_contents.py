@@ -15,8 +15,8 @@ from viewsphere.errors import UserError
 from viewsphere.files import open_file, read_bytes
 from viewsphere.plugins.format import Remark
 from viewsphere.store import Dataset
-from viewsphere.store.checksums import CHECKSUMS
 from viewsphere.store.foreign import Loaded
+from viewsphere.store.shots.checksums import CHECKSUMS
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.store import Dataset
-from viewsphere.store.sample_records import whole_sample
+from viewsphere.store.shots.sample_records import whole_sample
 
 
 class Options(Frozen):

@@ -46,8 +46,8 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import Thing
 from viewsphere.model.traits import Traits
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Visibility
 
 __all__ = [
     "TAIL",

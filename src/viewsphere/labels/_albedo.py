@@ -13,9 +13,9 @@ from viewsphere.assets.srgb import linear
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint
 from viewsphere.rendering.ground.material import ground_frame, ground_material
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.lidar.sweeping import Hits
+from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.shot_views import Painted
-from viewsphere.truth.sweeping import Hits
 
 Float = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from viewsphere.labels._label import Array, Models, Proof, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
-from viewsphere.truth.correspondence import pixel_centers
-from viewsphere.truth.point_raster import BEHIND, INVALID, OUTSIDE
+from viewsphere.truth.correspondences.correspondence import pixel_centers
+from viewsphere.truth.surface_points.raster import BEHIND, INVALID, OUTSIDE
 
 EDGE = 1e-3
 """Pixels from the picture's border within which the rounding of stored flow decides whether it leads outside."""

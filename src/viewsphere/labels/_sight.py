@@ -19,13 +19,13 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import Sensor
 from viewsphere.model.scene import Finish
 from viewsphere.model.shot import Shot
-from viewsphere.truth.correspondence import Match
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.points import SurfacePoints
+from viewsphere.truth.correspondences.correspondence import Match
+from viewsphere.truth.lidar.sweeping import Turning
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
 from viewsphere.truth.shot_views import Followed, Moment, Painted
-from viewsphere.truth.sweeping import Turning
+from viewsphere.truth.surface_points.points import SurfacePoints
 from viewsphere.truth.view import View
-from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
 
 
 class Around(Protocol):
@@ -273,7 +273,7 @@ class Sight:
 
     def per_triangle(self, table: NDArray[np.int32], empty: int) -> NDArray[np.int32]:
         """An int32 channel: the table's number for the triangle seen, 0 beyond its end, `empty` where nothing is seen."""
-        from viewsphere.truth import kernels_channels as kernels
+        from viewsphere.truth.raster import kernels_channels as kernels
 
         out = self.empty(np.int32)
         kernels.labels(self.visibility.triangle, table, np.int32(empty), out)

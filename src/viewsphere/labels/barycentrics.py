@@ -19,7 +19,7 @@ large, and float32.
 
 def compute(sight: Sight) -> NDArray[np.float32]:
     """Weights (H, W, 3) of the seen triangle's corners; 0 where nothing is seen."""
-    from viewsphere.truth import kernels_channels as kernels
+    from viewsphere.truth.raster import kernels_channels as kernels
 
     out = sight.empty(np.float32, 3)
     kernels.barycentrics(sight.visibility.triangle, sight.geometry.triangles, sight.corners, sight.rays, out)

@@ -17,7 +17,7 @@ TOLERANCE = 1e-5
 
 def compute(sight: Sight) -> NDArray[np.float32]:
     """The seen point in its object's axes, (H, W, 3) metres; NaN on scenery, ground and where nothing is seen."""
-    from viewsphere.truth import kernels_channels as kernels
+    from viewsphere.truth.raster import kernels_channels as kernels
 
     out, g = sight.empty(np.float32, 3), sight.geometry
     seen = sight.visibility.triangle

@@ -15,7 +15,7 @@ from viewsphere.model.sample import Sample
 
 def compute(sight: Sight) -> NDArray[np.float32]:
     """z of the seen point, (H, W) metres, infinite where nothing is seen; negative behind the image plane of a fisheye."""
-    from viewsphere.truth import kernels_channels as kernels
+    from viewsphere.truth.raster import kernels_channels as kernels
 
     out = sight.empty(np.float32)
     kernels.depths(sight.visibility.inverse_depth, sight.rays, out)

@@ -84,7 +84,7 @@ def _seen(sight: Sight) -> tuple[Float, Float]:
     """Depth (H, W), infinite where nothing is before the camera, and the angle (H, W) from the triangle's normal to the ray, a
     right one where the lens has no ray.
     """
-    from viewsphere.truth import kernels_channels as kernels
+    from viewsphere.truth.raster import kernels_channels as kernels
 
     rays = pixel_rays(sight.camera.intrinsics)
     normals = sight.empty(np.float32, 3)

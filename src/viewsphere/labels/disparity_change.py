@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
-from viewsphere.truth.point_raster import in_lens
+from viewsphere.truth.surface_points.raster import in_lens
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

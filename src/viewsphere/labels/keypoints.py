@@ -19,8 +19,8 @@ from viewsphere.labels._sight import Sight
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Number
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.truth.point_raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE
-from viewsphere.truth.points import points_in_world
+from viewsphere.truth.surface_points.points import points_in_world
+from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw

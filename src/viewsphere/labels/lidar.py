@@ -17,7 +17,7 @@ from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, chann
 from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.lidar import POINT, Lidar
 from viewsphere.model.sample import Sample
-from viewsphere.truth.sweeping import Hits, still_hits, swept_hits
+from viewsphere.truth.lidar.sweeping import Hits, still_hits, swept_hits
 
 Float = NDArray[np.float64]
 Rays = tuple[NDArray[np.intp], NDArray[np.intp]]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
-from viewsphere.truth.correspondence import pixel_centers
+from viewsphere.truth.correspondences.correspondence import pixel_centers
 
 APART = 1.5
 """Pixels by which flows differ at a boundary (Mayer et al. 2016, "A Large Dataset to Train Convolutional Networks for

@@ -24,7 +24,7 @@ def compute(sight: Sight) -> NDArray[np.float32]:
     of the object's tight box has the length 1, and the box's centre is (0.5, 0.5, 0.5). The box is that of the model as it is
     then, `box3d_object`; the axes are the model's own (front -Y, up +Z). The paper's files keep z as 1 - z.
     """
-    from viewsphere.truth import kernels_channels as kernels
+    from viewsphere.truth.raster import kernels_channels as kernels
 
     out, g = sight.empty(np.float32, 3), sight.geometry
     boxes = np.zeros((g.object_count + 1, 2, 3))

@@ -14,7 +14,7 @@ def compute(sight: Sight) -> NDArray[np.float32]:
     """Interpolated vertex normals (H, W, 3) on the visible side of their triangle, bent to at most perpendicular to the ray
     where interpolation turns them away.
     """
-    from viewsphere.truth import kernels_channels as kernels
+    from viewsphere.truth.raster import kernels_channels as kernels
 
     out, g = sight.empty(np.float32, 3), sight.geometry
     kernels.normals_shading(

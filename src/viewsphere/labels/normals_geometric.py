@@ -12,7 +12,7 @@ from viewsphere.labels._sight import Sight
 
 def compute(sight: Sight) -> NDArray[np.float32]:
     """The triangle's normal (H, W, 3) in camera axes, towards the camera; 0 where nothing is seen."""
-    from viewsphere.truth import kernels_channels as kernels
+    from viewsphere.truth.raster import kernels_channels as kernels
 
     out, seen = sight.empty(np.float32, 3), sight.visibility.triangle
     kernels.normals_geometric(seen, sight.geometry.triangle_normals, sight.rays, sight.camera_from_ray, sight.camera.R, out)

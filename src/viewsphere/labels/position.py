@@ -22,7 +22,7 @@ def compute(sight: Sight) -> NDArray[np.float32]:
 
     It is the pixel's ray from the camera's centre, times 1/s of `truth.visibility`: it lies on that ray and at `depth`.
     """
-    from viewsphere.truth import kernels_channels as kernels
+    from viewsphere.truth.raster import kernels_channels as kernels
 
     out, world_from_camera = sight.empty(np.float32, 3), inverse(sight.camera.R)
     center = -transform(world_from_camera, sight.camera.t)

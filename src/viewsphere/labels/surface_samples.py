@@ -16,7 +16,7 @@ from viewsphere.labels._paint import color_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.surface_samples import SURFACE_SAMPLE, SurfaceSamples
-from viewsphere.truth.point_raster import BEHIND, OUTSIDE, VISIBLE
+from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE, VISIBLE
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw

@@ -16,8 +16,8 @@ from viewsphere.labels._label import ChannelLabel, Color, Drawing, Models, Needs
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 from viewsphere.model.tracks import TRACK
-from viewsphere.truth.point_raster import OCCLUDED, VISIBLE
-from viewsphere.truth.points import SKY
+from viewsphere.truth.surface_points.points import SKY
+from viewsphere.truth.surface_points.raster import OCCLUDED, VISIBLE
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw

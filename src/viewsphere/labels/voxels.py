@@ -23,7 +23,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.classes import FIRST_THING, SKY, thing_class
 from viewsphere.model.sample import Sample
 from viewsphere.model.voxels import EMPTY, FREE, INSIDE, OCCLUDED, OUTSIDE, RUN, SURFACE, TOUCHED, Grid, VoxelGrid, Voxels
-from viewsphere.truth.cutouts import NEVER
+from viewsphere.truth.raster.alpha_masks import NEVER
 
 Float = NDArray[np.float64]
 Rows = NDArray[np.int64]

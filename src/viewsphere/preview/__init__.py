@@ -6,7 +6,7 @@ from viewsphere.preview.sides import four_sides
 from viewsphere.preview.smallness import small_objects
 from viewsphere.preview.tiles import contact_sheet
 from viewsphere.preview.video import Video, write_video
-from viewsphere.store.films import Earlier, Film, films_of
+from viewsphere.store.samples.films import Earlier, Film, films_of
 
 __all__ = [
     "INK",

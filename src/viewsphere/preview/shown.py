@@ -26,8 +26,8 @@ from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, Row
-from viewsphere.store.films import Film
 from viewsphere.store.index import Ranges, length, nth, numbers
+from viewsphere.store.samples.films import Film
 
 ROW = 4
 """Instants of a sequence that a preview shows, where there are several sequences."""

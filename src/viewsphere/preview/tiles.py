@@ -20,7 +20,7 @@ from viewsphere.preview.frame import (
     extents,
     nothing,
 )
-from viewsphere.store.films import Film, films_of
+from viewsphere.store.samples.films import Film, films_of
 
 MARGIN = 8
 CAPTION = 18

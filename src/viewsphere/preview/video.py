@@ -16,8 +16,8 @@ from viewsphere.labels import is_shown
 from viewsphere.model.sample import Sample
 from viewsphere.preview.frame import INK, PAPER, Picture, check_drawn, draw_instant, extents
 from viewsphere.preview.tiles import CAPTION, MARGIN, film_caption, fitting, with_key
-from viewsphere.store.films import Earlier, Film, film_named, films_of
-from viewsphere.store.moving import move
+from viewsphere.store.samples.films import Earlier, Film, film_named, films_of
+from viewsphere.store.shots.moving import move
 
 PROBES = 12
 """Instants of a sequence that say which values all of its pictures tell apart."""

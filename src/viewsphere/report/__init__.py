@@ -23,7 +23,7 @@ from viewsphere.report.summary import summary
 from viewsphere.report.table import FrameTable, read_table
 from viewsphere.report.unknown import numbers
 from viewsphere.store import Dataset, ModelInfo
-from viewsphere.store.films import Film, films_of
+from viewsphere.store.samples.films import Film, films_of
 from viewsphere.urls import here
 
 LIMIT = 20_000_000

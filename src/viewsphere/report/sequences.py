@@ -13,7 +13,7 @@ from viewsphere.labels import Extent, channel_labels
 from viewsphere.labels.tracks import colors_of, positions
 from viewsphere.model.sample import Sample
 from viewsphere.report.unknown import number, numbers
-from viewsphere.store.films import Film
+from viewsphere.store.samples.films import Film
 
 MOST_INSTANTS = 60
 """Of a sequence that is played, evenly spaced."""

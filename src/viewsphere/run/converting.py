@@ -20,9 +20,9 @@ from viewsphere.run.importing import put_in_store, read_dataset
 from viewsphere.run.progress import Listener, unheard
 from viewsphere.run.scope import refuse, scope_of_foreign
 from viewsphere.store import Dataset, located, new_folder
-from viewsphere.store.checksums import CHECKSUMS, damaged_files
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.places.local import TAKEN
+from viewsphere.store.shots.checksums import CHECKSUMS, damaged_files
 
 
 @dataclass(frozen=True)

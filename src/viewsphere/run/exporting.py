@@ -18,8 +18,8 @@ from viewsphere.run.preparing import Entries, prepared, targets
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.scope import refuse, scope_of
 from viewsphere.store import Choice, Dataset, located, new_folder
-from viewsphere.store.checksums import write_checksums, written_credits, written_frames, written_least, written_options
 from viewsphere.store.credits import credits_digest
+from viewsphere.store.shots.checksums import write_checksums, written_credits, written_frames, written_least, written_options
 
 
 def export(

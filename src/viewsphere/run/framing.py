@@ -27,8 +27,8 @@ from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.plan import Plan
 from viewsphere.sampling.redraws import redraws_frames
 from viewsphere.store import Row
-from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.moving import Ring, shot_floor
+from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.shot_views import ShotViews
 
 NO_PLACE = -10.0

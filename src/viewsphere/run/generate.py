@@ -37,9 +37,9 @@ from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, Row, Store, located
-from viewsphere.store.checksums import damaged_files
 from viewsphere.store.credits import write_credits
-from viewsphere.store.heartbeat import Pulse
+from viewsphere.store.shots.checksums import damaged_files
+from viewsphere.store.shots.heartbeat import Pulse
 
 MOST_SUBJECTS = 10_000
 """Models or scenes whose cameras are looked at before rendering, evenly over all; the others are when their turn comes."""

@@ -16,8 +16,8 @@ from viewsphere.run.progress import Listener, Progress
 from viewsphere.store import Block, Dataset, Part, PlanRecord, Store, located
 from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignDataset
-from viewsphere.store.linking import link_model, link_shot
-from viewsphere.store.records import IMPORT, NAME_BYTES
+from viewsphere.store.shots.linking import link_model, link_shot
+from viewsphere.store.shots.records import IMPORT, NAME_BYTES
 
 SHOT_FRAMES = 1000
 """Frames that are kept in one folder and written at once."""

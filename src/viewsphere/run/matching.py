@@ -17,7 +17,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages
 from viewsphere.store import Store, located
-from viewsphere.truth.correspondence import Match
+from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.shot_views import views_of
 from viewsphere.truth.view import View
 

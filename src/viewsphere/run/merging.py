@@ -33,8 +33,8 @@ from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanReco
 from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignFrame, Loaded
 from viewsphere.store.index import length
-from viewsphere.store.linking import link_model, link_shot
 from viewsphere.store.paths import files_inside
+from viewsphere.store.shots.linking import link_model, link_shot
 
 SENTENCES = {"captions", "referring"}
 """Labels that tell categories' names."""

@@ -24,7 +24,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.run.stages import Stages, model_files
 from viewsphere.store import ModelInfo, PlanRecord, Store
-from viewsphere.store.manifest import Manifest
+from viewsphere.store.shots.manifest import Manifest
 from viewsphere.zoo import build_zoo_model
 
 Steps = dict[int, TimeStep]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from viewsphere.run.executors import Crew, Job, Outcome, Work
 from viewsphere.run.progress import Listener, Progress
-from viewsphere.store.heartbeat import Pulse
+from viewsphere.store.shots.heartbeat import Pulse
 
 
 def heard(pulse: Pulse, listener: Listener) -> Listener:

@@ -22,9 +22,9 @@ from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.run.composing import SceneryRecord
 from viewsphere.run.scenery import Scenery
 from viewsphere.store import Dataset, ModelInfo, Row
-from viewsphere.truth.geometry import Geometry, build_geometry, present
+from viewsphere.truth.raster.geometry import Geometry, build_geometry, present
+from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.shot_views import SampleViews, ShotViews, views_of
-from viewsphere.truth.visibility import rasterize
 
 MODELS = 200
 """Exported models that are kept in memory."""

@@ -36,9 +36,9 @@ from viewsphere.run.walls import Step, check_rooms, check_way
 from viewsphere.sampling.camera import inside_box
 from viewsphere.sampling.redraws import is_redrawn
 from viewsphere.store import ModelInfo, Store
-from viewsphere.truth.enclosure import sky_hidden
+from viewsphere.truth.raster.visibility import with_ground
 from viewsphere.truth.shot_views import ShotViews
-from viewsphere.truth.visibility import with_ground
+from viewsphere.truth.sky_visibility import sky_occlusion
 from viewsphere.zoo import build_zoo_model, rooms_of
 
 if TYPE_CHECKING:
@@ -246,7 +246,7 @@ class Stages:
         """Whether scenery hides most of the sky from a point in the world."""
         mesh = self.model(thing.model, thing.step)
         inside = transform(np.linalg.inv(np.array(thing.world_from_object)), point)
-        return sky_hidden(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY
+        return sky_occlusion(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY
 
     def stage(self, shot: Shot) -> Stage:
         """The engine's stage for this shot, built anew only when the scene is another one, or a picture in it has changed."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.store import Store, located
-from viewsphere.store.heartbeat import SILENT_S, Heartbeat
+from viewsphere.store.shots.heartbeat import SILENT_S, Heartbeat
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.scope import needs_of
 from viewsphere.store import Store
-from viewsphere.store.manifest import Manifest
+from viewsphere.store.shots.manifest import Manifest
 
 LARGE = 0.5
 """From this share of the frames' bytes on, channels that no format uses are told."""

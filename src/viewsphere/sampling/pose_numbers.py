@@ -24,7 +24,7 @@ from viewsphere.sampling.time_steps import TimedPoses
 from viewsphere.sampling.viewpoints import ListedPoses, Poses
 from viewsphere.store import Part, PlanRecord
 from viewsphere.store.index import Ranges
-from viewsphere.store.records import typed
+from viewsphere.store.shots.records import typed
 
 Indices = NDArray[np.int64]
 Names = NDArray[np.uint64]

@@ -14,15 +14,15 @@ disk or at a URL (`places`).
 a file.
 """
 
-from viewsphere.store.channel_files import check_codecs, decode, depth_step, encode
-from viewsphere.store.choice import Choice, frame_ranges
-from viewsphere.store.dataset import Dataset
-from viewsphere.store.exported import Exported
-from viewsphere.store.folder import Store, kept_shot, new_folder
 from viewsphere.store.index import Block, Row
-from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord
-from viewsphere.store.simulated import Simulated
-from viewsphere.store.watching import Finished, Watch
+from viewsphere.store.samples.channel_files import check_codecs, decode, depth_step, encode
+from viewsphere.store.samples.choice import Choice, frame_ranges
+from viewsphere.store.samples.dataset import Dataset
+from viewsphere.store.samples.exported import Exported
+from viewsphere.store.samples.simulated import Simulated
+from viewsphere.store.samples.watching import Finished, Watch
+from viewsphere.store.shots.folder import Store, kept_shot, new_folder
+from viewsphere.store.shots.records import Category, ModelInfo, Part, PlanRecord
 from viewsphere.urls import located
 
 __all__ = [

@@ -11,8 +11,8 @@ import xxhash
 
 from viewsphere.files import read_bytes
 from viewsphere.model.credit import Credit
-from viewsphere.store.dataset import Dataset
-from viewsphere.store.records import ModelInfo
+from viewsphere.store.samples.dataset import Dataset
+from viewsphere.store.shots.records import ModelInfo
 
 CREDITS = "CREDITS.md"
 """Name of the file."""

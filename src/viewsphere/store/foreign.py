@@ -14,7 +14,7 @@ import numpy as np
 from viewsphere.errors import StoreError
 from viewsphere.geometry.mask import rle_area, rle_box, rle_of_runs
 from viewsphere.model.sample import Box, ObjectAnnotation, ObjectView, Rle, Sample
-from viewsphere.store.records import Category, ModelInfo
+from viewsphere.store.shots.records import Category, ModelInfo
 
 MOST_SHOWN = 10
 """Number of problems that an error names."""

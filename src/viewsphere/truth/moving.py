@@ -14,7 +14,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.model.scene import Floor, Row
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.truth.geometry import Geometry, build_geometry, lay_ground, moved, present
+from viewsphere.truth.raster.geometry import Geometry, build_geometry, lay_ground, moved, present
 
 ROOMS = 3
 """Instants whose geometries are there at once: a picture's own, the one before and the one after."""

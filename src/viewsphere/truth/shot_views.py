@@ -22,11 +22,11 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.surface_samples import SurfaceSamples
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.model.tracks import TRACK, Tracks
-from viewsphere.truth.geometry import Geometry, without_ground
+from viewsphere.truth.lidar.sweeping import Turning
 from viewsphere.truth.moving import ROOMS, Ring, shot_floor
-from viewsphere.truth.points import SurfacePoints, points_seen
-from viewsphere.truth.surface_draws import Drawn, points_on_model
-from viewsphere.truth.sweeping import Turning
+from viewsphere.truth.raster.geometry import Geometry, without_ground
+from viewsphere.truth.surface_points.draws import Drawn, points_on_model
+from viewsphere.truth.surface_points.points import SurfacePoints, points_seen
 from viewsphere.truth.view import View
 
 Float = NDArray[np.float64]

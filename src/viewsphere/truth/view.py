@@ -14,8 +14,8 @@ from viewsphere.geometry.camera import has_unit_rays, inverse_camera_matrix
 from viewsphere.geometry.rotation import inverse, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.thing import Thing
-from viewsphere.truth.geometry import Geometry, seen_from
-from viewsphere.truth.visibility import Visibility, homogeneous, lens_rays, pixels_of, rasterize
+from viewsphere.truth.raster.geometry import Geometry, seen_from
+from viewsphere.truth.raster.visibility import Visibility, homogeneous, lens_rays, pixels_of, rasterize
 
 Float = NDArray[np.float64]
 Change = Literal["moved", "deformed", "gone"]

@@ -13,8 +13,8 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.rendering.ground.horizon import BEGIN, FLAT, OVER
 from viewsphere.rendering.sky.sky import SkyPictures, sky_pictures
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Visibility
 
 EDGE = 1
 """Pixels by which an object's smoothed outline reaches beyond the pixels whose rays hit the object."""

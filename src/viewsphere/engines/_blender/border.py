@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.model.camera import Camera
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import homogeneous
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import homogeneous
 
 Float = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ from viewsphere.rendering.ground.material import ground_frame, ground_material, 
 from viewsphere.rendering.ground.slab_picture import laid_with_slabs
 from viewsphere.rendering.sky.sky import SURROUNDINGS, SkyPictures, sky_pictures
 from viewsphere.rendering.sky.sun import sun_light
-from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.raster.geometry import Geometry
 
 Put = Callable[[NDArray[Any]], str]
 """Writes an array to a file that the worker can read, and returns the file's path."""

@@ -14,8 +14,8 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.weather import Fog
 from viewsphere.rendering.weather.fog import Air
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import rasterize
 
 Float32 = NDArray[np.float32]
 

@@ -31,7 +31,7 @@ from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.rendering.ground.material import SLABS, ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.rendering.sky.sky import even_light
-from viewsphere.truth.geometry import Geometry, with_blended_colors
+from viewsphere.truth.raster.geometry import Geometry, with_blended_colors
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,8 @@ from viewsphere.geometry.rotation import compose
 from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.shot import Shot
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility, rasterize
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Visibility, rasterize
 
 Float = NDArray[np.float64]
 

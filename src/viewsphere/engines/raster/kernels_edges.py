@@ -16,7 +16,7 @@ import numpy as np
 from viewsphere.engines.raster.kernels_chosen import ALIKE, LEVEL
 from viewsphere.engines.raster.kernels_four import nearer, put_before
 from viewsphere.kernels.jit import inner, njit
-from viewsphere.truth.kernels_draw import EPSILON, NEVER, crossing_at, edges_inside, hits_surface, plane
+from viewsphere.truth.raster.kernels_draw import EPSILON, NEVER, crossing_at, edges_inside, hits_surface, plane
 
 f4 = nb.float32
 U = nb.uintp

@@ -13,7 +13,7 @@ import numpy as np
 
 from viewsphere.engines.raster.kernels_edges import span
 from viewsphere.kernels.jit import inner, njit
-from viewsphere.truth.kernels_draw import NEVER, plane
+from viewsphere.truth.raster.kernels_draw import NEVER, plane
 
 f4 = nb.float32
 U = nb.uintp

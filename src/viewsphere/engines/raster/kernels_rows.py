@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from viewsphere.kernels.jit import njit
-from viewsphere.truth.kernels_place import there, turned
+from viewsphere.truth.raster.kernels_place import there, turned
 
 
 @njit

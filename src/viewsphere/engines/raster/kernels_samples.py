@@ -16,7 +16,7 @@ import numpy as np
 from viewsphere.engines.raster.kernels_chosen import CLOSED, TILE, level
 from viewsphere.kernels.jit import inner, njit
 from viewsphere.truth.kernel_constants import NEARER
-from viewsphere.truth.kernels_draw import (
+from viewsphere.truth.raster.kernels_draw import (
     BEHIND,
     EPSILON,
     NEVER,
@@ -27,7 +27,7 @@ from viewsphere.truth.kernels_draw import (
     hits_surface,
     plane,
 )
-from viewsphere.truth.kernels_rays import ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
+from viewsphere.truth.raster.kernels_rays import ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
 
 U = nb.uintp
 TIE = 1e-5  # relative difference of 1/z below which two surfaces count as lying on one another

@@ -14,9 +14,9 @@ from viewsphere.engines.raster.painting import NO_SPLIT, Baked, shade_all, view_
 from viewsphere.engines.raster.records import Float32
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.model.camera import Camera
-from viewsphere.truth.cutouts import NEVER
-from viewsphere.truth.geometry import Geometry, with_both_sides
-from viewsphere.truth.visibility import Visibility, lens_rays, rasterize
+from viewsphere.truth.raster.alpha_masks import NEVER
+from viewsphere.truth.raster.geometry import Geometry, with_both_sides
+from viewsphere.truth.raster.visibility import Visibility, lens_rays, rasterize
 
 Float = NDArray[np.float64]
 

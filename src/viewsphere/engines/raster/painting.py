@@ -24,8 +24,8 @@ from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.model.camera import Camera
 from viewsphere.model.weather import Fog
 from viewsphere.rendering.weather.fog import Air
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility, lens_rays
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Visibility, lens_rays
 
 _NO_RAYS = np.zeros((0, 3), np.float32)
 _NO_PLACES = np.zeros((0, 2), np.float32)

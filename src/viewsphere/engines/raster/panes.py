@@ -24,7 +24,7 @@ from viewsphere.engines.raster.patches import ANY_VIEW
 from viewsphere.engines.raster.records import Float32, Int32, PictureRays
 from viewsphere.engines.raster.tracing import Tree, cast
 from viewsphere.model.camera import Camera
-from viewsphere.truth.visibility import Visibility
+from viewsphere.truth.raster.visibility import Visibility
 
 SHARP, BLURRED = 0.1, 0.2
 """Roughness up to which what a ray sees counts in full, and from which on not at all."""

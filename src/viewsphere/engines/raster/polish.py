@@ -15,7 +15,7 @@ from viewsphere.engines.raster.mirroring import blurred, looked_at, lying, mirro
 from viewsphere.engines.raster.painting import Baked, view_of
 from viewsphere.engines.raster.records import Float32
 from viewsphere.model.camera import Camera
-from viewsphere.truth.visibility import Visibility
+from viewsphere.truth.raster.visibility import Visibility
 
 LEVEL = 0.9995
 """z of a normal from which on a surface is a level mirror."""

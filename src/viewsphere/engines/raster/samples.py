@@ -14,8 +14,17 @@ from viewsphere.engines.raster import kernels_chosen, kernels_edges, kernels_lin
 from viewsphere.engines.raster import kernels_samples as kernels
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.truth.geometry import Geometry, seen_from
-from viewsphere.truth.visibility import RayTable, Runs, Visibility, homogeneous, in_picture, index_rays, left_out, lens_table
+from viewsphere.truth.raster.geometry import Geometry, seen_from
+from viewsphere.truth.raster.visibility import (
+    RayTable,
+    Runs,
+    Visibility,
+    homogeneous,
+    in_picture,
+    index_rays,
+    left_out,
+    lens_table,
+)
 
 OFFSETS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
 """Places of the four samples in a pixel: a rotated grid, in which each row and each column of quarters holds one sample."""

@@ -35,8 +35,8 @@ from viewsphere.rendering.background import display_background, shows_sky
 from viewsphere.rendering.finish import finished
 from viewsphere.rendering.seen import seen_by
 from viewsphere.rendering.weather.falling import fall_in
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Visibility
 
 
 @dataclass(frozen=True, eq=False)

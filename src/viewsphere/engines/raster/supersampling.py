@@ -8,8 +8,8 @@ import numpy as np
 
 from viewsphere.engines.raster.records import Float32
 from viewsphere.model.camera import Camera
-from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility, rasterize
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Visibility, rasterize
 
 Paint = Callable[[Camera, Visibility, Float32, Float32], None]
 """Fills the light (H * W, 4) that a camera sees, and its parts (H * W, C), which are 0 before, or (0, 0)."""

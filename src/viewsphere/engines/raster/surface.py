@@ -19,9 +19,9 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint, Thing
 from viewsphere.rendering.ground.material import ground_frame, ground_material
-from viewsphere.truth.geometry import UP, Geometry, read_only
-from viewsphere.truth.sparse import sparse
-from viewsphere.truth.visibility import Visibility, homogeneous, left_out
+from viewsphere.truth.raster.geometry import UP, Geometry, read_only
+from viewsphere.truth.raster.sparse import sparse
+from viewsphere.truth.raster.visibility import Visibility, homogeneous, left_out
 
 
 class Lengths(NamedTuple):

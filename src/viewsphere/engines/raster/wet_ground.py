@@ -18,7 +18,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.classes import STUFF_IDS
 from viewsphere.model.weather import Wet
 from viewsphere.rendering.weather.puddles import puddles
-from viewsphere.truth.visibility import Visibility
+from viewsphere.truth.raster.visibility import Visibility
 
 LOW = 0.3
 """Metres above the ground up to which a surface mirrors, and is not mirrored: kerbs and pavements lie in between."""

@@ -25,8 +25,8 @@ from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.store.again import AgainModel
 from viewsphere.store.paths import file_inside
-from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.raster.geometry import build_geometry
+from viewsphere.truth.raster.visibility import rasterize
 
 MOST = 12
 """Masks that are compared, evenly over all."""

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from viewsphere.aside import Aside, aside, left_by_dead, of_this_process, sweep
 from viewsphere.errors import StoreError
-from viewsphere.store.manifest import MANIFEST
-from viewsphere.store.moving import move, write_through
+from viewsphere.store.shots.manifest import MANIFEST
+from viewsphere.store.shots.moving import move, write_through
 
 NEW, OLD = "new", "old"
 """What is being made, aside; and below the other, by its path in the data set, what it takes the place of."""

@@ -12,9 +12,9 @@ from typing import TypeVar, cast
 
 from viewsphere.aside import temporary
 from viewsphere.errors import StoreError
-from viewsphere.store.checksums import CHECKSUMS
-from viewsphere.store.manifest import MANIFEST
 from viewsphere.store.places.local import NEW, disk_errors
+from viewsphere.store.shots.checksums import CHECKSUMS
+from viewsphere.store.shots.manifest import MANIFEST
 from viewsphere.urls import files_below
 from viewsphere.urls.remote_path import RemotePath
 

@@ -1,0 +1,1 @@
+"""Proofs of frames: rays, labels computed again, pictures painted again."""

@@ -1,0 +1,255 @@
+"""An independent witness: Embree casts rays at the exported models, read back by trimesh, and at the scenery, made anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import MissingExtraError
+from viewsphere.files import read_bytes
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.sample import Sample
+from viewsphere.model.thing import Thing
+from viewsphere.run.composing import SceneryRecord
+from viewsphere.run.scenery import Scenery
+from viewsphere.store import Dataset, depth_step
+from viewsphere.store.samples.channel_files import MOST_STEPS
+from viewsphere.truth.raster.visibility import EDGE_ON
+
+Float = NDArray[np.float64]
+
+PIXELS = 5000
+"""Pixels of a frame that are cast at objects, spread evenly over them; as many at what is background."""
+
+TOLERANCE = 1e-4
+"""Share of the distance by which Embree's float32 and the stored depth may differ."""
+
+LEVEL = 1e-5
+"""Slope of a ray, and metres above the ground, up to which rounding decides whether they meet."""
+
+BEYOND = 1e-6
+"""Share of the distance, and of a metre, by which a ray goes on behind a back: some roundings of Embree's float32."""
+
+OUTLIERS = 0.01
+"""Share of the pixels that may differ: where a ray passes within rounding of a triangle's edge, or meets it at a glance."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Soup:
+    """Triangles (T, 3, 3) of one thing, which of them cannot be seen through (T,) bool, and which a camera sees from their
+    fronts alone (T,) bool.
+    """
+
+    corners: Float
+    opaque: NDArray[np.bool_]
+    single: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """A scene of Embree, and of its triangles the normals (T, 3) of single-sided ones, else 0."""
+
+    scene: Any
+    fronts: Float
+
+
+class RayCaster:
+    """Casts rays at a data set's scenes; the last one is kept, because frames of one scene follow one another.
+
+    Scenery that is background is made again from what its shot says of it; where that cannot be, only objects are looked at.
+    """
+
+    def __init__(self, dataset: Dataset, scenery: Scenery) -> None:
+        if find_spec("embreex") is None or find_spec("trimesh") is None:
+            raise MissingExtraError("expected embreex and trimesh, found none: pip install 'viewsphere[check]'")
+        self._dataset, self._scenery = dataset, scenery
+        self._files = {info.key: (dataset.path(info.glb), info.node, info.faces is not None) for info in dataset.models}
+        self._known: dict[str, _Soup] = {}
+        self._around: dict[str, _Soup | None] = {}
+        self._key: object = None
+        self._solid: Any = None
+        self._clear: Any = None
+        self._owners = np.zeros(0, np.int64), np.zeros(0, np.int64)
+        self._middle = np.zeros(3)
+        self._lowest = 0.0
+        self._has_ground = False
+        self._complete = True
+
+    def off_surface(self, sample: Sample) -> Iterator[str]:
+        """What stored depth and instances say and the models, seen by Embree, do not.
+
+        Each point must lie on the right object, and nothing that cannot be seen through may be in front of it; a point of the
+        background must lie on scenery, or on a ground at the lowest point of all (or lower, where the shot says so); through
+        empty pixels nothing may be seen, the ground neither.
+        """
+        if not sample.objects:
+            return
+        self._build(sample)
+        instances, depth = sample.channels["instances"], sample.channels["depth"]
+        rays = pixel_rays(sample.camera.intrinsics)
+        step = depth_step(self._dataset.read(sample.files["depth"])) / 2
+        castable = (np.abs(rays[..., 2]) > 1e-3) & ((step == 0) | np.isinf(depth) | (depth < (MOST_STEPS - 0.5) * 2 * step))
+        yield from self._off(
+            sample, rays, step, castable & (instances > 0) & np.isfinite(depth), "points are not on the exported model"
+        )
+        if self._complete:
+            rest = castable & (instances == 0)
+            yield from self._off(sample, rays, step, rest, "points of the background are not where scenery and ground are")
+
+    def _off(self, sample: Sample, rays: Float, rounded: float, asked: NDArray[np.bool_], what: str) -> Iterator[str]:
+        """Findings at the pixels asked for, whose depth was rounded by so many metres at most."""
+        rows, columns = np.nonzero(asked)
+        if not len(rows):
+            return
+        chosen = np.linspace(0, len(rows) - 1, min(PIXELS, len(rows))).astype(int)
+        rows, columns = rows[chosen], columns[chosen]
+        ids, depth = sample.channels["instances"][rows, columns], sample.channels["depth"][rows, columns]
+        directions = rays[rows, columns] @ sample.camera.R
+        s = depth / rays[rows, columns, 2]
+        slack = TOLERANCE * np.abs(np.where(np.isfinite(s), s, 0.0)) + rounded / np.abs(rays[rows, columns, 2])
+        eye = sample.camera.center - self._middle
+        start = np.where(np.isfinite(s), s - slack, 0.0)
+        found, owner = self._nearest(eye + start[:, None] * directions, directions)
+        found = found + start
+        first, _ = _cast(self._solid, np.broadcast_to(eye, directions.shape), directions)
+        with np.errstate(invalid="ignore"):
+            there = (np.abs(found - s) <= slack) & (owner == ids)
+            height = (eye + s[:, None] * directions)[:, 2]
+            off = np.abs(height - self._lowest)
+            on_ground = np.isfinite(s) & (off <= slack * np.maximum(1.0, np.abs(directions[:, 2])))
+        there |= (ids == 0) & on_ground & (not self._is_in_ground(eye))
+        there |= np.isinf(s) & (ids == 0) & ~self._meets_ground(eye, directions, rays[rows, columns, 2] > 0)
+        wrong = ~there | (first < np.where(np.isfinite(s), s - slack, np.inf))
+        if wrong.sum() > max(2, OUTLIERS * len(s)):
+            i = int(np.flatnonzero(wrong)[0])
+            nearest = min(found[i], first[i])
+            yield (
+                f"{wrong.sum()} of {len(s)} {what}: at pixel ({columns[i]}, {rows[i]}) object {ids[i]} is "
+                f"stored at {s[i]:.6g} m along the ray, Embree finds {max(owner[i], 0)} at {nearest:.6g} m"
+            )
+
+    def _nearest(self, origins: Float, directions: Float) -> tuple[Float, NDArray[np.int64]]:
+        """Distance along each ray (infinite where nothing is hit) and whose the surface is, 0 for scenery's, -1 for none."""
+        (solid, i), (clear, k) = _cast(self._solid, origins, directions), _cast(self._clear, origins, directions)
+        of_solid, of_clear = (np.append(own, -1)[which] for own, which in zip(self._owners, (i, k), strict=True))
+        return np.minimum(solid, clear), np.where(clear < solid, of_clear, of_solid)
+
+    def _is_in_ground(self, eye: Float) -> bool:
+        """Whether the camera stands in the plane of the ground, of which it then sees nothing."""
+        return abs(eye[2] - self._lowest) <= EDGE_ON * (1.0 + float(np.linalg.norm(eye + self._middle)))
+
+    def _meets_ground(self, eye: Float, directions: Float, ahead: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which rays meet the ground beyond doubt; depth of rays that look back is not kept by all files."""
+        height = eye[2] - self._lowest
+        steep = np.abs(directions[:, 2]) > LEVEL
+        return ahead & steep & (directions[:, 2] * height < 0) & (abs(height) > LEVEL) & self._has_ground
+
+    def _build(self, sample: Sample) -> None:
+        shot_key = self._scenery.key_of(sample.index)
+        scenery, shot = self._scenery.around(shot_key), self._scenery.shot(shot_key)
+        floor = None if shot is None else shot.scene.floor
+        ground = None if shot is None else shot.scene.ground
+        self._has_ground = ground is not None and ground.is_labelled
+        instant = 0 if shot is None else self._scenery.taken(sample, shot)[0]
+        behind = [thing for thing in (piece.at(instant) for piece in scenery.things) if thing.is_there]
+        key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], behind, scenery, floor
+        if key == self._key:
+            return
+        self._middle = np.mean([o.box3d.mean(axis=0) for o in sample.objects] or [np.zeros(3)], axis=0)
+        placed = [(o.id, o.world_from_object, self._exported(o.key)) for o in sample.objects]
+        remade = [(p.world_from_object, self._remade(scenery, p)) for p in behind]
+        self._complete = all(soup is not None for _, soup in remade)
+        placed += [(0, np.array(world), soup) for world, soup in remade if soup is not None]
+        nothing = np.zeros((0, 3, 3))
+        corners = np.concatenate([nothing, *(transform(world, soup.corners) - self._middle for _, world, soup in placed)])
+        opaque = np.concatenate([np.zeros(0, np.bool_), *(soup.opaque for _, _, soup in placed)])
+        single = np.concatenate([np.zeros(0, np.bool_), *(soup.single for _, _, soup in placed)])
+        owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
+        lowest = float(corners[..., 2].min(initial=np.inf))
+        self._lowest = lowest if floor is None else floor.under(lowest + self._middle[2]) - self._middle[2]
+        # A surface is in one of two scenes: one of all, beside that of what hides others, would take twice as long to make.
+        self._solid, self._clear = _target(corners, single, opaque), _target(corners, single, ~opaque)
+        self._owners = owner[opaque], owner[~opaque]
+        self._key = key
+
+    def _exported(self, key: str) -> _Soup:
+        soup = self._known.get(key) or _read(*self._files[key])
+        self._known[key] = soup
+        return soup
+
+    def _remade(self, record: SceneryRecord, thing: Thing) -> _Soup | None:
+        """A piece of scenery, None where it is not what it was."""
+        digest = record.digests[thing.key]
+        if digest not in self._around:
+            mesh = self._scenery.mesh(record, thing)
+            self._around[digest] = mesh and _soup_of(mesh)
+        return self._around[digest]
+
+
+def _soup_of(mesh: Mesh) -> _Soup:
+    solid = np.array([m.alpha_mode == "OPAQUE" for m in mesh.materials])
+    corners = mesh.vertices[mesh.triangles].astype(np.float64)
+    return _Soup(corners, solid[mesh.triangle_material], np.zeros(len(corners), np.bool_))
+
+
+def _target(corners: Float, single: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> _Target | None:
+    """The chosen ones of triangles (T, 3, 3), None if there are none."""
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    if not chosen.any():
+        return None
+    scene = EmbreeScene(robust=True)
+    own = corners[chosen]
+    TriangleMesh(scene, own.astype(np.float32))
+    a, b, c = (own[:, i] for i in range(3))
+    return _Target(scene, np.where(single[chosen, None], np.cross(b - a, c - a), 0.0))
+
+
+def _cast(target: _Target | None, origins: Float, directions: Float) -> tuple[Float, NDArray[np.int64]]:
+    """Distance along each ray (infinite where nothing is hit) and triangle (-1); rays pass the backs of single-sided ones."""
+    distance, triangle = np.full(len(origins), np.inf), np.full(len(origins), -1, np.int64)
+    if target is None:
+        return distance, triangle
+    left, passed = np.arange(len(origins)), np.zeros(len(origins))
+    while len(left):
+        start = origins[left] + passed[left, None] * directions[left]
+        hit = target.scene.run(start.astype(np.float32, order="C"), directions[left].astype(np.float32), output=True)
+        met = np.asarray(hit["primID"], np.int64)
+        further = np.where(met < 0, np.inf, np.asarray(hit["tfar"], np.float64))
+        distance[left], triangle[left] = passed[left] + further, met
+        is_back = (met >= 0) & ((target.fronts[met] * directions[left]).sum(axis=1) > 0)
+        left, further = left[is_back], further[is_back]
+        passed[left] += further + BEYOND * (1 + np.abs(start[is_back]).max(axis=1, initial=0) + further)
+    return distance, triangle
+
+
+def _read(file: Path, step: str | None, fronts_only: bool) -> _Soup:
+    """An exported GLB in the object's axes; of a model that deforms what is below a time step's node. fronts_only: whether
+    cameras do not see the backs of single-sided materials.
+    """
+    import trimesh
+
+    scene: Any = trimesh.load_scene(BytesIO(read_bytes(file, "MAX_FILE_BYTES")), file_type="glb", process=False)
+    corners: list[Float] = []
+    opaque: list[NDArray[np.bool_]] = []
+    single: list[NDArray[np.bool_]] = []
+    shown = scene.graph.transforms.successors(step or scene.graph.base_frame)
+    for name in filter(shown.__contains__, scene.graph.nodes_geometry):
+        matrix, geometry = scene.graph.get(name, step)
+        mesh = scene.geometry[geometry]
+        x, y, z = (trimesh.transform_points(mesh.vertices, matrix)).T
+        corners.append(np.stack([x, -z, y], axis=-1)[mesh.faces])
+        material = getattr(mesh.visual, "material", None)
+        opaque.append(np.full(len(mesh.faces), getattr(material, "alphaMode", None) in (None, "OPAQUE")))
+        single.append(np.full(len(mesh.faces), fronts_only and not getattr(material, "doubleSided", True)))
+    return _Soup(np.concatenate(corners), np.concatenate(opaque), np.concatenate(single))

@@ -1,0 +1,1 @@
+"""The samples of a data set, read back, selected and watched."""

@@ -1,0 +1,582 @@
+"""The data set that a store's finished shots make up."""
+
+from __future__ import annotations
+
+import os
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
+from itertools import chain
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any, Self, overload
+
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from viewsphere.errors import StoreError
+from viewsphere.files import read_bytes
+from viewsphere.labels import channels
+from viewsphere.model.classes import SemanticClass
+from viewsphere.model.files import Files
+from viewsphere.model.mistakes import one_of
+from viewsphere.model.model_spec import step_key
+from viewsphere.model.notebook import Shown
+from viewsphere.model.quantity import quantity
+from viewsphere.model.rig import CAMERA
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.shot import Shot
+from viewsphere.store.foreign import Loaded
+from viewsphere.store.index import Row
+from viewsphere.store.paths import file_inside, files_inside, names
+from viewsphere.store.samples.channel_files import decode
+from viewsphere.store.samples.choice import Choice
+from viewsphere.store.samples.made import Made
+from viewsphere.store.samples.point_tracks import PointTracks, joined
+from viewsphere.store.samples.selection import Selection
+from viewsphere.store.shots.folder import Store
+from viewsphere.store.shots.manifest import MANIFEST, Manifest
+from viewsphere.store.shots.records import Category, ModelInfo, typed
+from viewsphere.store.shots.sample_records import ShotRecords, from_whole_sample
+from viewsphere.store.texts import parsed
+from viewsphere.urls import here, link_file, located
+
+if TYPE_CHECKING:
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.model.voxels import Occupancy
+
+Options = Mapping[str, Mapping[str, Any]]
+"""Options of labels, by their names."""
+
+
+class Dataset(Shown, Sequence[Sample]):
+    """The finished frames of a data set, in frame order; what `viewsphere.open` gives.
+
+    `len`, indexing and iteration give samples whose channels are read when asked for. `link` and `path` serve exporters. With
+    a choice, only the chosen frames are there.
+    """
+
+    def __init__(self, root: str | os.PathLike[str], choice: Choice | None = None) -> None:
+        self.root = located(root)
+        self.choice = choice or Choice()
+        self.store = Store(self.root)
+        self.plan = self.store.plan()
+        self.link_kinds: set[str] = set()
+        self.made = Made()
+        self._records = lru_cache(maxsize=8)(self._read_records)
+        self._manifests = lru_cache(maxsize=8)(partial(_manifest_of, self.root))
+        self._info = lru_cache(maxsize=10_000)(self.store.model_info)
+        self._options = lru_cache(maxsize=8)(self._options_of)
+        self._facts = lru_cache(maxsize=10_000)(self._model_facts)
+
+    def __repr__(self) -> str:
+        return f"<Dataset {self.name} in {self.root}: {quantity(len(self), 'frame')}; {', '.join(self.plan.channels)}>"
+
+    def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice]]:
+        """A data set travels to other processes (data loaders) as its folder."""
+        return type(self), (self.root, self.choice)
+
+    @property
+    def name(self) -> str:
+        """The recipe's name."""
+        return self.plan.name
+
+    @property
+    def recipe(self) -> dict[str, Any]:
+        """The recipe, normalised, as plain data."""
+        return self.plan.recipe
+
+    @property
+    def categories(self) -> tuple[Category, ...]:
+        """All categories of the plan."""
+        return self.plan.categories
+
+    @property
+    def classes(self) -> tuple[SemanticClass, ...]:
+        """What the numbers of `semantic` and `panoptic` maps mean, stuff first; `plan.json` lists them, too."""
+        return self.plan.classes
+
+    @property
+    def splits(self) -> tuple[str, ...]:
+        """Names of the splits, in the recipe's order."""
+        return self.plan.splits
+
+    @property
+    def max_objects(self) -> int:
+        """Most objects in one frame."""
+        return self.plan.max_objects
+
+    @cached_property
+    def models(self) -> tuple[ModelInfo, ...]:
+        """The finished models in the plan's order, time steps behind their model; of a choice, those that its frames have."""
+        stored = (self.store.model_info(key) for key in self.plan.models)
+        found = tuple(info for model in stored if model is not None for info in (model, *model.steps))
+        if self.choice.is_some:
+            seen = {o.key for sample in self for o in sample.objects}
+            found = tuple(info for info in found if info.key in seen)
+        return found
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """The rows of all finished shots, chosen or not, in frame order; without those that add channels to others."""
+        keys = tuple(self.store.finished())
+        found = chain.from_iterable(index.found(keys) for index in self.plan.indices)
+        return tuple(sorted(found, key=lambda row: row.first))
+
+    @cached_property
+    def _shots(self) -> tuple[list[tuple[str, Sequence[int]]], list[int]]:
+        """Key and chosen places of each finished shot, in frame order; and the number of frames before each shot."""
+        shots: list[tuple[str, Sequence[int]]] = []
+        starts, total = [0], 0
+        for row in self.rows:
+            places = self._places(row)
+            if places:
+                shots.append((row.key, places))
+                total += len(places)
+                starts.append(total)
+        return shots, starts
+
+    @cached_property
+    def shots_of_parts(self) -> tuple[Shot | None, ...]:
+        """A finished shot of each part; None for a part whose shots are not kept, such as an imported one, and for one of which
+        nothing is finished, another part's.
+        """
+        found = {part: self.labelled(row.key) for part, row in self._first_rows.items()}
+        some = next(iter(found.values()), None)
+        return tuple(found.get(number, some) for number in range(len(self.plan.parts)))
+
+    @property
+    def samples_of_parts(self) -> Iterator[Iterator[Sample]]:
+        """The finished pictures, chosen or not, of each part that has any."""
+        for part in self._first_rows:
+            rows = (row for row in self.rows if row.part == part)
+            yield (self.sample_at(row.key, place) for row in rows for place in range(row.count))
+
+    @cached_property
+    def _first_rows(self) -> dict[int, Row]:
+        """The first finished shot of each part."""
+        first: dict[int, Row] = {}
+        for row in self.rows:
+            first.setdefault(row.part, row)
+        return first
+
+    def __len__(self) -> int:
+        return self._shots[1][-1]
+
+    @overload
+    def __getitem__(self, index: int) -> Sample: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Sample]: ...
+    def __getitem__(self, index: int | slice) -> Sample | Sequence[Sample]:
+        """The i-th finished frame; raises IndexError past the end."""
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        i = index + len(self) if index < 0 else index
+        if not 0 <= i < len(self):
+            raise IndexError(f"{self.root}: expected a frame in 0..{len(self) - 1}, got {index}")
+        shots, starts = self._shots
+        number = bisect_right(starts, i) - 1
+        key, places = shots[number]
+        return self.sample_at(key, places[i - starts[number]])
+
+    def __iter__(self) -> Iterator[Sample]:
+        for key, places in self._shots[0]:
+            yield from self.samples_of(key, places)
+
+    def select(self, *fields: str, split: str | None = None, sensor: str | None = None) -> Selection:
+        """Some fields of the frames, of one split and of one sensor or of all: a map-style data set for PyTorch's DataLoader.
+        Only what is named is decoded.
+
+        `fields`: names of channels (`rgb`), of values of samples (`index`, `split`, `sensor`, `time`, `camera.K`,
+        `pose.azimuth_deg`, `camera_from_next`, ...), and of objects (`objects.box2d`, `objects.category_id`, `objects.mask`,
+        `objects.keypoints`, ...). Those of objects become arrays (N, ...), float64, int64 or bool, NaN where there is no value,
+        of run-length codes masks (N, H, W); lists where they have no one shape, or are no numbers. `objects.view` is (N, 4):
+        azimuth, elevation (degrees), distance (metres), tilt (degrees). Raises UserError for others.
+        """
+        return Selection(self, fields, split, sensor)
+
+    def of(self, split: str | None = None, sensor: str | None = None) -> Iterator[int]:
+        """Positions of the frames of a split, and of a sensor, in the data set; reads all records."""
+        for (key, places), first in zip(*self._shots, strict=False):
+            records = self._read_records(key)
+            splits, sensors = records.splits, records.sensors
+            yield from (
+                first + i
+                for i, place in enumerate(places)
+                if split in (None, splits[place]) and sensor in (None, sensors[place])
+            )
+
+    def shots(self) -> Iterator[tuple[str, Sequence[int]]]:
+        """Key of every finished shot, in frame order, and which of its frames are chosen, counted from 0."""
+        yield from self._shots[0]
+
+    def samples_of(self, key: str, places: Sequence[int]) -> Iterator[Sample]:
+        """Some of a finished shot's samples."""
+        records = self._read_records(key)
+        for place in places:
+            yield self.shown(self._sample(records, place))
+
+    def sample_at(self, key: str, place: int) -> Sample:
+        """One of a finished shot's samples, counted from 0; the records of a few shots are kept for those who ask again."""
+        return self.shown(self._sample(self._records(key), place))
+
+    def shown(self, sample: Sample) -> Sample:
+        """A sample as it is given out: as it is kept."""
+        return sample
+
+    @property
+    def sequences(self) -> tuple[str, ...]:
+        """Names of the sequences of its frames, in their order; none where all are still pictures."""
+        return tuple(self._sequences)
+
+    @cached_property
+    def _sequences(self) -> dict[str, list[tuple[str, list[int]]]]:
+        """The chosen places of each sequence's shots, by the sequence's name."""
+        found: dict[str, list[tuple[str, list[int]]]] = {}
+        for key, places in self._shots[0]:
+            names = self._records(key).sequences
+            for name in dict.fromkeys(names[place] for place in places):
+                if name:
+                    found.setdefault(name, []).append((key, [place for place in places if names[place] == name]))
+        return found
+
+    def sequence(self, name: str, sensor: str = CAMERA) -> tuple[Sample, ...]:
+        """The samples of one sensor in a sequence, in the order of its instants; raises StoreError for a sequence or a sensor
+        that is not there.
+        """
+        if name not in self._sequences:
+            known = one_of(name, self.sequences) if self.sequences else "expected sequences, found still pictures only"
+            raise StoreError(f"{self.root}: sequence: {known}")
+        samples = [sample for key, places in self._sequences[name] for sample in self.samples_of(key, places)]
+        own = sorted((sample for sample in samples if sample.sensor == sensor), key=lambda sample: sample.instant)
+        if not own:
+            sensors = tuple(dict.fromkeys(sample.sensor for sample in samples))
+            raise StoreError(f"{self.root}: sensor: {one_of(sensor, sensors)}")
+        return tuple(own)
+
+    def tracks(self, sequence: str, sensor: str = CAMERA) -> PointTracks:
+        """The points that a sensor followed through a sequence; raises StoreError for a sequence or a sensor that is not there,
+        or follows no points.
+        """
+        samples = self.sequence(sequence, sensor)
+        if samples and "tracks" not in samples[0].channels and any(part.recipe.get("tracks") for part in self.plan.parts):
+            raise StoreError(
+                f"tracks: expected a sensor that follows points; found {sensor}, whose channels lack tracks: add tracks to "
+                f"rig.sensors.{sensor}.channels"
+            )
+        return joined(samples)
+
+    def _places(self, row: Row) -> Sequence[int]:
+        """Which of a finished shot's frames are chosen, by the model's key, or by the key of its moment if the model is
+        animated. Where the plan does not know a frame's model, as in imported data sets, the frame belongs to all models that
+        it shows.
+        """
+        places = self.choice.places(row.first, row.count)
+        if not self.choice.models or not places:
+            return places
+        part = self.plan.parts[row.part]
+        model = part.world(row.subject) if part.is_product else None
+        if model is not None and self.choice.has_model(model):
+            return places
+        if model is not None and not self._has_chosen_step(model):
+            return ()
+        shown = zip(places, self.samples_of(row.key, places), strict=True)
+        return [place for place, sample in shown if any(self._is_chosen(o, model) for o in sample.objects)]
+
+    def _is_chosen(self, shown: ObjectAnnotation, model: str | None) -> bool:
+        """Whether an object makes its frame a chosen one: if the frame's model is known, only an object of this model can."""
+        if model is None:
+            return self.choice.has_model(shown.key) or self.choice.has_model(shown.track)
+        return shown.track == model and self.choice.has_model(shown.key)
+
+    def _has_chosen_step(self, model: str) -> bool:
+        """Whether the choice names a time step of a model."""
+        if not self.choice.may_have(step_key(model, 0).rstrip("0")):
+            return False
+        info = self._info(model)
+        return info is not None and any(self.choice.has_model(step.key) for step in info.steps)
+
+    def _read_records(self, key: str) -> _Records:
+        file = self.store.shot_folder(key) / "frames.json"
+        for name in ("frames.json", "shot.json"):
+            file_inside(self.root, file.with_name(name).relative_to(self.root).as_posix())
+        try:
+            records: list[dict[str, Any]] = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
+            row = self.plan.find(key)
+            if not isinstance(records, list) or not all(isinstance(record, dict) for record in records):
+                raise ValueError("no list of records")
+            if row is None or len(records) != row.count:
+                raise ValueError(f"{quantity(len(records), 'frame')} instead of {row and row.count}")
+            if any(record.get("index") != row.first + i for i, record in enumerate(records)):
+                raise ValueError(f"other numbers of frames than {row.first} and on")
+            if not all(isinstance(record.get(name, ""), str) for record in records for name in ("sequence", "split")):
+                raise ValueError("a sequence or a split that is no text")
+            is_short = any("camera" not in record for record in records)
+        except (OSError, TypeError, ValueError) as error:
+            raise _damaged(file, error) from None
+        shot = self.labelled(key) if is_short else None
+        if shot is None:
+            return _Records(file, records)
+        try:
+            files = self.store.channel_files(key, shot)
+        except LookupError as error:
+            raise _damaged(file.with_name("shot.json"), error) from None
+        return _Records(file, records, ShotRecords(shot, self._facts, str(file), str(self.root)), files)
+
+    def labelled(self, key: str) -> Shot | None:
+        """A finished shot as `Store.labelled` gives it; raises StoreError for one of more or fewer samples than are planned."""
+        shot, row = self.store.labelled(key), self.plan.find(key)
+        if shot is not None and row is not None and (found := sum(1 for _ in shot.samples)) != row.count:
+            file = self.store.shot_folder(key) / "shot.json"
+            raise _damaged(file, ValueError(f"{found} samples instead of {row.count}"))
+        return shot
+
+    def _model_facts(self, key: str, frame: int | None) -> ModelInfo:
+        info = self._info(key)
+        if info is None:
+            raise ValueError(f"no model {key}")
+        return info.at(frame)
+
+    def _sample(self, records: _Records, place: int) -> Sample:
+        record = records.records[place]
+        try:
+            supplied, options = self._supplied(record)
+            if "camera" in record or records.shot is None:
+                files: dict[str, str] = record["files"] | supplied
+                whole = from_whole_sample(record, _ChannelFiles(self.root, files, self._manifests), files)
+                return self._named(_with_options(whole, options))
+            kept, number = records.shot.kept(place), f"{record['index']:08d}"
+            files = {name: head + number + tail for name, head, tail in records.files if name in kept}
+            files |= {name: file for name, file in supplied.items() if records.shot.keeps(place, name)}
+            short = records.shot.sample(place, record, _ChannelFiles(self.root, files, self._manifests), files)
+            return self._named(_with_options(short, options))
+        except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+            raise _damaged(records.file, error) from None
+
+    def _named(self, sample: Sample) -> Sample:
+        """A sample whose names may stand in an export's paths; raises ValueError for any other."""
+        if sample.split not in self.splits:
+            raise ValueError(f"split {sample.split!r:.100} where one of the plan's is expected")
+        names([*sample.files], "channel")
+        names([name for o in sample.objects for name in (o.key, o.track) if name], "the key")
+        strange = next((o.category_id for o in sample.objects if o.category_id not in self._category_ids), None)
+        if strange is not None:
+            raise ValueError(f"category {strange} where one of the plan's is expected")
+        return sample
+
+    @cached_property
+    def _category_ids(self) -> frozenset[int]:
+        return frozenset(category.id for category in self.categories)
+
+    def _supplied(self, record: dict[str, Any]) -> tuple[dict[str, str], Options]:
+        """Files of channels that were added to a frame later, and the options that these labels were given."""
+        files, options = dict[str, str](), dict[str, Mapping[str, Any]]()
+        number = record["index"]
+        for index, added in self.plan.supplements:
+            if index.first <= number < index.first + index.samples:
+                key = index.at(number).key
+                if self.store.has_shot(key):
+                    kinds = self.kinds[index.part]
+                    files |= {name: self.store.channel_file(key, name, number, kinds) for name in added}
+                    options |= {name: given for name, given in self._options(key).items() if name in added}
+        return files, options
+
+    def _options_of(self, key: str) -> Options:
+        """The options of labels in a finished shot."""
+        shot = self.store.labelled(key)
+        return {} if shot is None else shot.labels
+
+    @cached_property
+    def kinds(self) -> tuple[Files, ...]:
+        """The kinds of files that each part has written; raises StoreError where its recipe says others than there are."""
+        try:
+            return tuple(typed(_FILES, part.recipe.get("files", {})) for part in self.plan.parts)
+        except ValueError as error:
+            raise StoreError(
+                f"{self.store.plan_file}: expected kinds of files, found {error}: render the recipe anew"
+            ) from None
+
+    def path(self, relative: str) -> Path:
+        """A file of the data set; raises StoreError for a path that leads out of it."""
+        return file_inside(self.root, relative)
+
+    def read(self, relative: str) -> bytes:
+        """The bytes of a channel's file, wherever it lies. Raises StoreError where they are not those that were written, or for
+        a path that leads out of the data set; OSError where the file cannot be read.
+        """
+        return _read(self.root, self._manifests, relative)
+
+    def stored(self, relative: str) -> Path | Loaded:
+        """A stored file, or what it would hold where it lies in its shot's tar. Raises StoreError for a path that leads out of
+        the data set.
+        """
+        file = self.path(relative)
+        if relative.startswith("store/shots/"):
+            folder, inside = _parted(relative)
+            if inside in self._manifests(folder).spans:
+                return Loaded(file.suffix, self.read(relative))
+        return file
+
+    def link(self, relative: str, destination: Path) -> None:
+        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which. One out of a
+        shot's tar is always a copy. Raises StoreError for a path that leads out of the data set.
+        """
+        if not destination.parent.is_dir():
+            destination.parent.mkdir(parents=True, exist_ok=True)
+        file = self.stored(relative)
+        if isinstance(file, Loaded):
+            destination.write_bytes(file.data)
+        else:
+            self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
+
+    def put(self, frame: int, name: str, make: Callable[[], bytes], destination: Path) -> None:
+        """Put what `make` gives at `destination`; where another export of this pass put the same of a frame, by the name of its
+        encoding, it is linked.
+        """
+        kind = self.made.put(frame, name, make, destination)
+        if kind:
+            self.link_kinds.add(kind)
+
+    def mesh(self, key: str) -> Mesh:
+        """A finished model, or a time step of one, with its materials, in object axes: as its GLB has it. Raises StoreError for
+        one that is not there.
+        """
+        from viewsphere.assets.exporting.exported import read_exported
+
+        info = self._info(key)
+        if info is None:
+            moving = (self._info(model) for model in self.plan.models)
+            info = next((step for model in moving if model for step in model.steps if step.key == key), None)
+        if info is None:
+            raise StoreError(f"{self.root}: expected a finished model, found no {key!r}")
+        with here(self.path(info.glb).absolute()) as file:
+            return read_exported(file, info.parts, info.node, whole=True)
+
+    def occupancy(self, key: str, cells: int = 32) -> Occupancy:
+        """Which cells a model is in, of a cube of so many along each side around it: where its surface is, and the inside of
+        its pieces that are closed. Raises StoreError as `mesh` does, ValueError for too many cells.
+        """
+        from viewsphere.model.voxels import Occupancy
+
+        mesh = self.mesh(key)
+        return Occupancy.of(mesh.vertices, mesh.triangles, cells)
+
+    def model_files(self) -> Iterator[tuple[str, str]]:
+        """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A
+        model that deforms comes with all its time steps.
+        """
+        for key, folder in {info.track or info.key: self.path(info.obj).parent for info in self.models}.items():
+            for file in files_inside(self.root, folder):
+                if file.name not in {"model.json", MANIFEST}:
+                    yield f"{key}/{file.name}", file.relative_to(self.root).as_posix()
+
+    def link_models(self, folder: Path) -> None:
+        """Put the files of every finished model into `folder`/<key>, as `link` does."""
+        for inside, stored in self.model_files():
+            self.link(stored, folder / inside)
+
+
+def _with_options(sample: Sample, options: Options) -> Sample:
+    """The sample, of whose labels some have these options."""
+    return replace(sample, options={**sample.options, **options}) if options else sample
+
+
+@dataclass(frozen=True, eq=False)
+class _Records:
+    """A shot's frames.json, and, for short records, what else their samples need: the shot, and the names of its channels'
+    files (channel, and the path before and after a sample's number).
+    """
+
+    file: Path
+    records: list[dict[str, Any]]
+    shot: ShotRecords | None = None
+    files: tuple[tuple[str, str, str], ...] = ()
+
+    @property
+    def sequences(self) -> list[str]:
+        """The sequence of each sample, empty for still pictures."""
+        if self.shot is None:
+            return [record.get("sequence", "") for record in self.records]
+        return [self.shot.shot.sequence] * len(self.records)
+
+    @property
+    def splits(self) -> list[str]:
+        """The split of each sample."""
+        if self.shot is None:
+            return [record.get("split", "") for record in self.records]
+        shot = self.shot.shot
+        return [shot.instants[instant].split for _, instant, _ in shot.samples]
+
+    @property
+    def sensors(self) -> list[str]:
+        """The name of each sample's sensor."""
+        if self.shot is None:
+            return [record.get("sensor", CAMERA) for record in self.records]
+        shot = self.shot.shot
+        return [shot.rig.sensors[sensor].name for _, _, sensor in shot.samples]
+
+
+class _ChannelFiles(Mapping[str, NDArray[Any]]):
+    """A frame's channels, each read from its file the first time it is asked for."""
+
+    def __init__(self, root: Path, files: Mapping[str, str], manifest_of: ManifestOf) -> None:
+        self._root, self._files, self._manifest_of = root, files, manifest_of
+        self._arrays: dict[str, NDArray[Any]] = {}
+
+    def __copy__(self) -> Self:
+        """The same files; none of them is read so far."""
+        return type(self)(self._root, self._files, self._manifest_of)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What other processes are sent: they read manifests anew."""
+        return {**self.__dict__, "_manifest_of": partial(_manifest_of, self._root)}
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self._arrays:
+            file = file_inside(self._root, self._files[name])
+            if name not in channels():
+                raise StoreError(f"{file}: expected a label that is installed, found {name!r}: install the package that has it")
+            self._arrays[name] = decode(
+                channels()[name], file, partial(_read, self._root, self._manifest_of, self._files[name])
+            )
+        return self._arrays[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Without reading the file."""
+        return name in self._files
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._files)
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+
+_FILES = TypeAdapter(Files)
+
+ManifestOf = Callable[[str], Manifest]
+"""Gives the manifest of a folder, by its path from the data set's root."""
+
+
+def _manifest_of(root: Path, folder: str) -> Manifest:
+    return Manifest.read(file_inside(root, f"{folder}/{MANIFEST}").parent)
+
+
+def _read(root: Path, manifest_of: ManifestOf, relative: str) -> bytes:
+    """The bytes of a channel's file, which are those that were written."""
+    folder, inside = _parted(relative)
+    manifest = manifest_of(folder)
+    return manifest.content(inside, file_inside(root, f"{folder}/{manifest.holder(inside)}"))
+
+
+def _parted(file: str) -> tuple[str, str]:
+    """A channel's file by its shot's folder, and by its path there."""
+    path = PurePosixPath(file)
+    return path.parent.parent.as_posix(), f"{path.parent.name}/{path.name}"
+
+
+def _damaged(file: Path, error: Exception) -> StoreError:
+    return StoreError(
+        f"{file}: expected the frames of a finished shot, found {type(error).__name__}: {error}: "
+        f"delete {file.parent} and render again"
+    )

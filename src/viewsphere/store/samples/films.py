@@ -1,0 +1,144 @@
+"""Sequences as films: which samples are seen together, and for how long."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from viewsphere.errors import StoreError
+from viewsphere.labels import TAIL
+from viewsphere.model.channel import picture_of
+from viewsphere.model.mistakes import one_of
+from viewsphere.model.sample import Sample
+from viewsphere.model.shot import Shot
+from viewsphere.store.samples.dataset import Dataset
+
+ALONE = 1.0
+"""Seconds for which the only instant of a film is shown."""
+
+
+@dataclass(frozen=True)
+class Film:
+    """One sequence: the sensors that are shown, and, instant by instant, its number, its time in seconds and the place of each
+    sensor's sample among all samples.
+    """
+
+    sequence: str
+    sensors: tuple[str, ...]
+    instants: tuple[int, ...]
+    times: tuple[float, ...]
+    places: tuple[tuple[int, ...], ...]
+
+    @property
+    def shown_for(self) -> tuple[float, ...]:
+        """Seconds from each instant to the next; the last one is shown as long as the shortest of the others."""
+        if len(self.times) == 1:
+            return (ALONE,)
+        steps = np.diff(self.times).tolist()
+        return (*steps, min(steps))
+
+    def spread(self, count: int) -> tuple[int, ...]:
+        """Which of its instants are evenly spaced, counted from 0: the first, the last and others between; all if there are
+        so few.
+        """
+        last = len(self.instants) - 1
+        return tuple(np.unique(np.linspace(0, last, min(count, last + 1)).round().astype(int)).tolist())
+
+
+Seen = tuple[str, int, str, int, float]
+"""Sequence, instant, sensor, place among all samples, and time in seconds of a sample."""
+
+
+IsShown = Callable[[Container[str]], Any]
+"""Whether samples with these channels can be shown."""
+
+
+def films_of(samples: Sequence[Sample], is_shown: IsShown = picture_of) -> list[Film]:
+    """The sequences of samples, in their order; none of still pictures. Sensors and instants of which nothing is shown, by
+    default those without pictures, are left out.
+
+    Of a data set no sample is read.
+    """
+    return _films(_in_shots(samples, is_shown) if isinstance(samples, Dataset) else _in_memory(samples, is_shown))
+
+
+def _in_memory(samples: Iterable[Sample], is_shown: IsShown) -> Iterator[Seen]:
+    for place, sample in enumerate(samples):
+        if sample.sequence and is_shown(sample.channels):
+            yield sample.sequence, sample.instant, sample.sensor, place, sample.time
+
+
+def _in_shots(dataset: Dataset, is_shown: IsShown) -> Iterator[Seen]:
+    """Parts of a data set without a time have no sequences; their shots are not read."""
+    start = 0
+    parts = dataset.plan.parts
+    for key, places in dataset.shots():
+        row = dataset.plan.find(key)
+        if row is not None and row.part < len(parts) and parts[row.part].recipe.get("time"):
+            yield from _in_shot(dataset.labelled(key), places, start, is_shown)
+        start += len(places)
+
+
+def _in_shot(shot: Shot | None, places: Sequence[int], start: int, is_shown: IsShown) -> Iterator[Seen]:
+    if shot is None or not shot.sequence:
+        return
+    own = list(shot.samples)
+    for number, place in enumerate(places, start):
+        _, instant, sensor = own[place]
+        if is_shown(shot.kept(sensor)):
+            now = shot.instants[instant]
+            yield shot.sequence, now.index, shot.rig.sensors[sensor].name, number, now.seconds
+
+
+def _films(seen: Iterable[Seen]) -> list[Film]:
+    found: dict[str, dict[int, dict[str, tuple[int, float]]]] = {}
+    for sequence, instant, sensor, place, seconds in seen:
+        found.setdefault(sequence, {}).setdefault(instant, {})[sensor] = (place, seconds)
+    return [_film(sequence, instants) for sequence, instants in found.items()]
+
+
+def _film(sequence: str, seen: dict[int, dict[str, tuple[int, float]]]) -> Film:
+    """Instants that lack a sensor, as where only some samples were chosen, are left out."""
+    sensors = tuple(max(seen.values(), key=len))
+    whole = {number: [own[name] for name in sensors] for number, own in sorted(seen.items()) if set(sensors) <= set(own)}
+    return Film(
+        sequence,
+        sensors,
+        tuple(whole),
+        tuple(own[0][1] for own in whole.values()),
+        tuple(tuple(place for place, _ in own) for own in whole.values()),
+    )
+
+
+def film_named(films: Sequence[Film], name: str) -> Film:
+    """The film of a sequence; raises StoreError for another name."""
+    for film in films:
+        if film.sequence == name:
+            return film
+    known = tuple(film.sequence for film in films)
+    raise StoreError(f"--sequence: {one_of(name, known)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Earlier:
+    """What sensors saw before: of a sample, those of its own sensor at up to `labels.TAIL` instants before, in order."""
+
+    samples: Sequence[Sample]
+    films: Sequence[Film]
+
+    def __call__(self, sample: Sample) -> list[Sample]:
+        """The samples before one."""
+        film = self._by_name.get(sample.sequence)
+        if film is None or sample.sensor not in film.sensors:
+            return []
+        sensor, now = film.sensors.index(sample.sensor), bisect_left(film.instants, sample.instant)
+        return [self.samples[film.places[i][sensor]] for i in range(max(0, now - TAIL), now)]
+
+    @cached_property
+    def _by_name(self) -> dict[str, Film]:
+        return {film.sequence: film for film in self.films}

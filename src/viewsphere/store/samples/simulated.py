@@ -1,0 +1,47 @@
+"""What is simulated, such as where a heap comes to rest: made once, and kept.
+
+Two machines need not agree on the last bit of it, so all shots of a scene, whichever machine makes them and after whatever
+crash, take what was kept first. An entry is a folder with one file: OUT/store/simulated/ab/<the rest of the digest>/made.json.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from viewsphere.errors import StoreError
+from viewsphere.files import read_text
+from viewsphere.store.shots.folder import Store
+
+MADE = "made.json"
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Keeps what is simulated for a data set in its store; without `writes` it only reads what is kept there."""
+
+    root: Path
+    writes: bool = True
+
+    def __call__(self, names: tuple[str, ...], make: Callable[[], Any]) -> Any:
+        """The plain data that was first made for these names, else what `make` makes. Raises StoreError for an entry that
+        cannot be read.
+        """
+        digest = hashlib.sha256("\0".join(names).encode()).hexdigest()
+        store = Store(self.root)
+        folder = store.folder / "simulated" / digest[:2] / digest[2:40]
+        if not (folder / MADE).is_file():
+            made = make()
+            if not self.writes:
+                return made
+            text = json.dumps(made, separators=(",", ":"))
+            with store.aside(folder) as aside:
+                (aside / MADE).write_text(text, "utf-8", newline="\n")
+        try:
+            return json.loads(read_text(folder / MADE, "MAX_RECORD_BYTES"))
+        except (OSError, ValueError) as error:
+            raise StoreError(f"{folder / MADE}: expected what was simulated, found {error}: remove this file") from None

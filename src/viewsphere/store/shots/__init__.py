@@ -1,0 +1,1 @@
+"""The folders of shots: records, manifests, checksums, heartbeats."""

@@ -1,0 +1,151 @@
+"""The digests of an export's files, one line a file, in a file that `xxhsum --check` reads, too, and that proves itself.
+
+    # options {"category_ids":"contiguous"}         of a format that has some: those that the export was written with
+    # keep_annotations_above 0.1                    of an export that leaves annotations out: the visibility it was written with
+    # credits "0c94a3..."                           of an export that names them: the digest of what CREDITS.md said then
+    # frames 12                                     how many frames it has: those that were finished then
+    6f0c3b...  annotations/instances_train.json
+    # 91d2...
+
+No more of it is held in memory than a line. The last line is the digest of all lines above.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from itertools import islice, takewhile
+from pathlib import Path
+from typing import Any
+
+import xxhash
+
+from viewsphere.errors import StoreError
+from viewsphere.files import open_file, open_text
+from viewsphere.store.paths import file_inside
+from viewsphere.store.shots.manifest import seal_of
+from viewsphere.store.texts import parsed
+from viewsphere.urls import files_below
+
+CHECKSUMS = "checksums.xxh128"
+"""Name of the file in an export's folder."""
+
+AT_ONCE = 8
+"""Files that are read at once: disks and storages answer many faster than one after another."""
+
+OPTIONS = "# options "
+KEPT = "# keep_annotations_above "
+CREDITED = "# credits "
+FRAMES = "# frames "
+AGAIN = "export again, or mend it with viewsphere check --repair"
+
+
+def write_checksums(
+    folder: Path,
+    options: Mapping[str, Any] | None = None,
+    least: float | None = None,
+    credited: str | None = None,
+    frames: int | None = None,
+) -> None:
+    """List all files of a finished folder, the options that they were written with, the visibility above which they keep
+    annotations (None: all), the digest of the credits that they name (None: of none), and how many frames they are of.
+    """
+    seal = xxhash.xxh3_128()
+    with (folder / CHECKSUMS).open("wb") as file:
+        for line in _to_write(folder, options or {}, least, credited, frames):
+            seal.update(line)
+            file.write(line)
+        file.write(f"# {seal.hexdigest()}\n".encode())
+
+
+def _to_write(
+    folder: Path, options: Mapping[str, Any], least: float | None, credited: str | None, frames: int | None
+) -> Iterator[bytes]:
+    if options:
+        yield f"{OPTIONS}{json.dumps(options, separators=(',', ':'))}\n".encode()
+    if least is not None:
+        yield f"{KEPT}{json.dumps(least)}\n".encode()
+    if credited is not None:
+        yield f"{CREDITED}{json.dumps(credited)}\n".encode()
+    if frames is not None:
+        yield f"{FRAMES}{frames}\n".encode()
+    yield from (f"{seal_of(folder / path)[1]}  {path}\n".encode() for path in _files(folder))
+
+
+def written_options(folder: Path) -> dict[str, Any]:
+    """The options that a folder's files were written with; none where there is no list, or none that can be read."""
+    return _said(folder, OPTIONS) or {}
+
+
+def written_least(folder: Path) -> float | None:
+    """The visibility above which a folder's files were written with annotations; None: they have all."""
+    return _said(folder, KEPT)
+
+
+def written_credits(folder: Path) -> str | None:
+    """The digest of the credits that a folder's files were written with; None: they name none."""
+    return _said(folder, CREDITED)
+
+
+def written_frames(folder: Path) -> int | None:
+    """How many frames a folder's files were written of; None where that is not known."""
+    return _said(folder, FRAMES)
+
+
+def _said(folder: Path, mark: str) -> Any:
+    """What a line at the list's head says; None where there is no such line, or no list that can be read."""
+    with suppress(OSError, ValueError), open_text(folder / CHECKSUMS) as file:
+        head = takewhile(lambda line: line.startswith("# "), file)
+        return next((parsed(line.removeprefix(mark)) for line in head if line.startswith(mark)), None)
+    return None
+
+
+def damaged_files(folder: Path) -> Iterator[str]:
+    """What of a folder is not as it was listed: files that are missing, changed, or too many."""
+    try:
+        listed = sum(1 for _ in _lines(folder))  # the list itself is proved first
+        for digest, path, found in _compared(folder):
+            if found != digest:
+                yield f"{path}: expected digest {digest[:12]}, found {(found and found[:12]) or 'no such file'}: {AGAIN}"
+    except (OSError, ValueError, StoreError) as error:
+        yield f"{CHECKSUMS}: expected the digests of all files, found {error}: {AGAIN}"
+        return
+    there = sum(1 for _ in _files(folder))
+    if there > listed:
+        known = {path for _, path in _lines(folder)}
+        yield from (f"{path}: expected no such file: {AGAIN}" for path in _files(folder) if path not in known)
+
+
+def _compared(folder: Path) -> Iterator[tuple[str, str, str | None]]:
+    """Digest and path of every file that is listed, and the digest that it has; several are read at once."""
+    lines = _lines(folder)
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        while some := list(islice(lines, AT_ONCE * 16)):
+            found = pool.map(_digest, (file_inside(folder, path) for _, path in some))
+            yield from ((*line, has) for line, has in zip(some, found, strict=True))
+
+
+def _lines(folder: Path) -> Iterator[tuple[str, str]]:
+    """Digest and path of every file that is listed; raises ValueError at the end where the list was changed."""
+    seal, last = xxhash.xxh3_128(), b""
+    with open_file(folder / CHECKSUMS) as file:
+        for line in file:
+            if last:
+                seal.update(last)
+                digest, _, path = last.decode().removesuffix("\n").partition("  ")
+                if not digest.startswith("#"):
+                    yield digest, path
+            last = line
+    if last != f"# {seal.hexdigest()}\n".encode():
+        raise ValueError("a list that was changed since it was written")
+
+
+def _digest(file: Path) -> str | None:
+    return seal_of(file)[1] if file.is_file() else None
+
+
+def _files(folder: Path) -> Iterator[str]:
+    """All files but the list, by their paths, in an order that does not depend on the disk."""
+    return (path for path in files_below(folder) if path != CHECKSUMS)

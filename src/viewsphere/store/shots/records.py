@@ -1,0 +1,420 @@
+"""Records of the store as a whole: its plan, the plan's parts, its categories and models."""
+
+from __future__ import annotations
+
+from base64 import b64decode
+from binascii import Error as NoBase64
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from itertools import accumulate, chain
+from pathlib import PurePosixPath
+from typing import Annotated, Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
+
+from viewsphere.model.classes import SemanticClass, classes_of
+from viewsphere.model.credit import Credit
+from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.looks import Looks
+from viewsphere.model.mistakes import first_of
+from viewsphere.model.model_spec import Size, step_key
+from viewsphere.model.symmetries import Symmetries
+from viewsphere.model.thing import TimeStep
+from viewsphere.store.index import Block, Index, Row, without
+from viewsphere.store.paths import names
+from viewsphere.store.shots.manifest import sealed, unsealed
+from viewsphere.store.texts import parsed
+
+STORE_VERSION = 2
+
+MOST_FRAMES = 2**53
+"""Frames of a data set: larger numbers would not be exact in everybody's JSON."""
+
+PRODUCT = "product"
+"""The sampler of models x poses."""
+
+IMPORT = "import"
+"""What stands for a sampler where somebody else made the pictures."""
+
+KEEP = "keep_annotations_above"
+"""The field of recipes that says which annotations exports leave out."""
+
+
+_STRICTLY = ConfigDict(extra="forbid", allow_inf_nan=False)
+"""How what was read is compared with the types of a record's fields."""
+
+
+def _box(value: Any) -> NDArray[np.float64]:
+    found = np.array(value, np.float64)
+    if found.shape != (8, 3) or not np.isfinite(found).all():
+        raise ValueError(f"expected 8 vertices; found {found.shape}")
+    return found
+
+
+Box3d = Annotated[NDArray[np.float64], PlainValidator(_box)]
+"""Vertices (8, 3)."""
+
+
+@dataclass(frozen=True)
+class Category:
+    """A category of the data set; ids count from 1 in order of appearance in the recipe."""
+
+    __pydantic_config__ = _STRICTLY
+
+    id: int
+    name: str
+    supercategory: str
+
+
+@dataclass(frozen=True, eq=False)
+class ModelInfo:
+    """A normalised model of the data set; paths are relative to its root.
+
+    `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres; `diameter` is the largest
+    distance between two vertices, metres, None where older versions made the record; `symmetries` and `keypoints` are those
+    that it says of itself, or that were found (`Traits`), and `looks`, None where no label needs them, what it looks like. A
+    model that deforms has the same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its
+    file's first frame.
+
+    `parts`, `materials` and `body_parts` are names: those of the numbers 1, 2, ... in maps of these names.
+    """
+
+    __pydantic_config__ = _STRICTLY
+
+    key: str
+    category: str
+    supercategory: str
+    category_id: int
+    obj: str
+    glb: str
+    box3d_object: Box3d
+    size: Size
+    real_size: Size | None
+    parts: tuple[str, ...]
+    triangles: int
+    digest: str
+    warnings: tuple[str, ...] = ()
+    step: TimeStep | None = None  # that the files show
+    track: str = ""
+    steps: tuple[ModelInfo, ...] = ()
+    credit: Credit | None = None
+    materials: tuple[str, ...] = ()
+    diameter: float | None = None
+    symmetries: Symmetries | None = None
+    keypoints: Keypoints | None = None
+    body_parts: tuple[str, ...] = ()
+    looks: Looks | None = None
+    faces: Literal["as_file"] | None = None  # see `ModelSpec.faces`
+
+    @property
+    def node(self) -> str | None:
+        """The name of the GLB's node that shows its time step, None where all of it is meant."""
+        return None if self.step is None else PurePosixPath(self.obj).stem
+
+    def at(self, frame: int | None) -> ModelInfo:
+        """What is known of a time step, by the frame of the model's file (None: at rest); raises ValueError for another."""
+        found = self if frame is None else next((one for one in self.steps if one.step and one.step.frame == frame), None)
+        if found is None:
+            raise ValueError(f"model {self.key}: expected time step {frame}, found none")
+        return found
+
+    def moved(self, key: str, prefix: str, **changed: Any) -> ModelInfo:
+        """The same model of another key, whose files lie in the folder `prefix`; `changed` are other fields of it."""
+        obj, glb = (f"{prefix}/{PurePosixPath(file).name}" for file in (self.obj, self.glb))
+        keys = (step_key(key, one.step and one.step.frame) for one in self.steps)
+        steps = (replace(one.moved(own, prefix, **changed), track=key) for one, own in zip(self.steps, keys, strict=True))
+        return replace(self, key=key, obj=obj, glb=glb, steps=tuple(steps), **changed)
+
+    def to_plain(self) -> dict[str, Any]:
+        """The record as JSON has it."""
+        value: dict[str, Any] = {**self.__dict__, "box3d_object": self.box3d_object.tolist()}
+        if self.step is None:
+            del value["step"], value["steps"], value["track"]
+        else:
+            value |= {"step": self.step.model_dump(mode="json"), "steps": [one.to_plain() for one in self.steps]}
+        if self.credit is not None:
+            value["credit"] = self.credit.model_dump(exclude_none=True)
+        if not self.materials:  # of models that were exported elsewhere, or before they had names here
+            del value["materials"]
+        if not self.body_parts:
+            del value["body_parts"]
+        for name in ("symmetries", "keypoints", "looks"):
+            value[name] = value[name] and value[name].model_dump(mode="json")
+        for name in ("credit", "diameter", "symmetries", "keypoints", "looks", "faces"):
+            if value[name] is None:
+                del value[name]
+        return value
+
+    @staticmethod
+    def from_plain(value: Mapping[str, Any]) -> ModelInfo:
+        """The record that `to_plain` was asked of; raises LookupError, TypeError or ValueError for anything else."""
+        found = typed(_MODEL, value)
+        for one in (found, *found.steps):
+            names([one.key, *([one.track] if one.track else [])], "the key")
+        return found
+
+
+@dataclass(frozen=True)
+class Part:
+    """The samples [first, first + frames) that one recipe, or one source of a merge, has added to the data set.
+
+    `blocks` say what each of its samples shows, in order: the subjects of its sampler (models, or scenes) and the numbers of
+    their poses.
+    `supplies`: (number of an earlier part, channels) that this one added to all frames of that part; they lie in shots
+    of their own. `shot_frames`: most positions of a shot. `settings`: digests of what frames that are appended have to share.
+    `new_poses`: how many poses no earlier part had; `pose_names`: their digests (see `sampling.extension`), None where they
+    follow from the recipe. `dealt_splits`: where splits are by model or by scene, the split of each that no earlier part had.
+    `merged`: the part came from another data set, where its shots and models may have had other names and numbers.
+    """
+
+    digest: str
+    version: str
+    name: str
+    recipe: dict[str, Any]
+    channels: tuple[str, ...]
+    first: int
+    frames: int
+    max_objects: int
+    blocks: tuple[Block, ...] = ()
+    sampler: str = PRODUCT
+    supplies: tuple[tuple[int, tuple[str, ...]], ...] = ()
+    shot_frames: int = 1
+    settings: dict[str, str] = field(default_factory=dict[str, str])
+    new_poses: int = 0
+    pose_names: str | None = None
+    dealt_splits: dict[str, str] = field(default_factory=dict[str, str])
+    merged: bool = False
+    __pydantic_config__ = _STRICTLY
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """What its samples are about, each once: keys of models, or names of scenes."""
+        return tuple(dict.fromkeys(name for block in self.blocks for name in block.subjects))
+
+    def world(self, subject: str) -> str:
+        """One of its subjects without its variation: the key of a model, or the name of a scene."""
+        return without(subject)[0] if self.recipe.get("variations") else subject
+
+    @property
+    def is_product(self) -> bool:
+        """Whether the part's samples show known models at known poses."""
+        return self.sampler == PRODUCT and bool(self.blocks)
+
+    @property
+    def is_rendered(self) -> bool:
+        """Return whether the part's recipe rendered its shots into this data set, frames of its own or channels of others."""
+        return self.sampler != IMPORT and not self.merged
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether a recipe made it: its subjects, models or scenes, are taken from known poses."""
+        return self.sampler != IMPORT and bool(self.blocks)
+
+    def checked(self) -> Part:
+        """Itself; raises ValueError for numbers and names that no part has."""
+        for block in self.blocks:
+            names(block.subjects, "the name")
+        if any(b.each < 1 or any(not 0 <= a < z for a, z in b.positions) for b in self.blocks):
+            raise ValueError("blocks of other than ascending ranges of poses")
+        if min(self.first, self.frames, self.max_objects, self.new_poses) < 0:
+            raise ValueError("numbers below 0")
+        if not 0 < sum(b.samples for b in self.blocks) + self.first + self.frames + 1 <= MOST_FRAMES:
+            raise ValueError(f"more than {MOST_FRAMES:,} frames")
+        if self.shot_frames < 1:
+            raise ValueError("shots without frames")
+        try:
+            named = len(b64decode(self.pose_names or "", validate=True))
+        except NoBase64 as error:
+            raise ValueError(f"names of poses that are no base64: {error}") from None
+        if self.pose_names is not None and named != NAME_BYTES * self.new_poses:
+            raise ValueError(f"{named:,} bytes of names of {self.new_poses:,} poses")
+        return self
+
+
+CLASSED = frozenset({"semantic", "panoptic"})
+"""Channels whose numbers mean classes, which the text of the plan then lists."""
+
+NAME_BYTES = 8
+"""Of a pose's name in `Part.pose_names`; zeros are that of no pose a recipe can mean."""
+
+
+@dataclass(frozen=True)
+class PlanRecord:
+    """The content of `plan.json`: all that readers of the data set need to know of the plan.
+
+    `parts` were rendered or imported one after another; a data set rendered once has one. Version, digest, name and recipe are
+    the last part's; all other fields hold for all parts together.
+    """
+
+    version: str
+    digest: str
+    name: str
+    recipe: dict[str, Any]
+    categories: tuple[Category, ...]
+    splits: tuple[str, ...]
+    channels: tuple[str, ...]
+    models: tuple[str, ...]
+    poses: int
+    frames: int
+    max_objects: int
+    parts: tuple[Part, ...] = ()
+    __pydantic_config__ = _STRICTLY
+
+    @property
+    def classes(self) -> tuple[SemanticClass, ...]:
+        """What the numbers of semantic and panoptic maps mean: names, colours, things and stuff."""
+        return classes_of((category.id, category.name) for category in self.categories)
+
+    @property
+    def keep_annotations_above(self) -> float | None:
+        """The visibility above which exports keep annotations; None: they keep all."""
+        return self.recipe.get(KEEP)
+
+    def keeping_above(self, least: float | None) -> PlanRecord:
+        """The same frames, with exports that keep annotations of what is seen more than this; None: they keep all."""
+        parts = tuple(replace(p, recipe=_keeping(p.recipe, least)) if p.is_sampled else p for p in self.parts)
+        return replace(self, recipe=_keeping(self.recipe, least), parts=parts)
+
+    def part_of(self, frame: int) -> int:
+        """Number of the part that a frame belongs to."""
+        return max(bisect_right(self._firsts, frame) - 1, 0)
+
+    def most_objects(self, frame: int) -> int:
+        """Most objects in one frame of the part that a frame belongs to."""
+        return self.parts[self.part_of(frame)].max_objects if self.parts else self.max_objects
+
+    def annotation_id(self, frame: int, object_id: int) -> int:
+        """Number of an object's annotation, unique and counted from 1: later parts do not change it."""
+        number, first = self.part_of(frame), 0
+        if self.parts:
+            first = self.parts[number].first
+        return self._annotations[number] + (frame - first) * self.most_objects(frame) + object_id
+
+    def folder_of(self, frame: int, size: int) -> int | None:
+        """Number of a frame's sub-folder, where no folder may hold more than `size` objects; None if the frame needs no
+        sub-folder.
+
+        Later parts do not change it: files once laid without sub-folders stay so.
+        """
+        spans = [(p.first, p.frames, p.max_objects) for p in self.parts] or [(0, self.frames, self.max_objects)]
+        number, begun, fit = 0, 0, 1  # begun: where the part begins, in frames of which `fit` go into a folder
+        for first, frames, most in spans[: self.part_of(frame) + 1]:
+            begun, fit = -(-begun * max(1, size // most) // fit), max(1, size // most)
+            number = (begun + frame - first) // fit
+            begun += frames
+        small = spans[0][1] <= max(1, size // spans[0][2])
+        return None if small and not number else number
+
+    def part_with(self, digest: str) -> int | None:
+        """Number of the last part that a recipe of this digest brought, None if there is none."""
+        return next((i for i in reversed(range(len(self.parts))) if self.parts[i].digest == digest), None)
+
+    def channels_of(self, part: int) -> tuple[str, ...]:
+        """Channels of a part's frames, with the ones added by later parts."""
+        added = (channels for later in self.parts for number, channels in later.supplies if number == part)
+        return tuple(dict.fromkeys(chain(self.parts[part].channels, *added)))
+
+    @cached_property
+    def indices(self) -> tuple[Index, ...]:
+        """The index of each part's own shots, without shots that add channels to an earlier part's frames."""
+        return tuple(Index(p.blocks, p.first, p.shot_frames, number) for number, p in enumerate(self.parts))
+
+    @cached_property
+    def supplements(self) -> tuple[tuple[Index, tuple[str, ...]], ...]:
+        """Indices of the shots that add channels to an earlier part's frames, each with these channels.
+
+        Only keys of such shots contain a plus.
+        """
+        return tuple(
+            (Index(self.parts[number].blocks, self.parts[number].first, part.shot_frames, later, f"+{later}"), channels)
+            for later, part in enumerate(self.parts)
+            for number, channels in part.supplies
+        )
+
+    @property
+    def all_indices(self) -> tuple[Index, ...]:
+        """The indices of all shots: of parts' own ones, then of those that add channels."""
+        return (*self.indices, *(index for index, _ in self.supplements))
+
+    @property
+    def rows(self) -> Iterator[Row]:
+        """Rows of all shots in the order of their samples, without shots that add channels later."""
+        return chain.from_iterable(self.indices)
+
+    def indices_of(self, part: int) -> tuple[Index, ...]:
+        """The indices of all shots that a part renders: of its own ones, then of those that add channels to older frames."""
+        return self.indices[part], *(index for index, _ in self.supplements if index.part == part)
+
+    def rows_of(self, part: int) -> Iterator[Row]:
+        """Rows of all shots that a part renders, in the order of these indices."""
+        return chain.from_iterable(self.indices_of(part))
+
+    def find(self, key: str) -> Row | None:
+        """The row of this key, None if there is none."""
+        return next((row for row in (index.find(key) for index in self.all_indices) if row is not None), None)
+
+    def row_at(self, sample: int) -> Row:
+        """The row that holds a sample; raises IndexError for a sample beyond all rows."""
+        return self.indices[self.part_of(sample)].at(sample)
+
+    @cached_property
+    def _firsts(self) -> list[int]:
+        return [part.first for part in self.parts]
+
+    @cached_property
+    def _annotations(self) -> list[int]:
+        """For each part the number of annotation ids taken by the parts before it."""
+        counts = (part.frames * part.max_objects for part in self.parts)
+        return list(accumulate(counts, initial=0))
+
+    def to_json(self) -> str:
+        """The text of plan.json, which carries its own digest."""
+        value = {f.name: getattr(self, f.name) for f in fields(self)}
+        value |= {
+            "store": STORE_VERSION,
+            "categories": [c.__dict__ for c in self.categories],
+            "parts": [vars(part) | {"blocks": [vars(block) for block in part.blocks]} for part in self.parts],
+        }
+        if CLASSED & set(self.channels):
+            value["classes"] = [vars(one) for one in self.classes]
+        return sealed(value)
+
+    @staticmethod
+    def from_json(text: str) -> PlanRecord:
+        """The record in plan.json's text; raises KeyError, TypeError or ValueError for any other text."""
+        found = parsed(text)["store"]
+        if found != STORE_VERSION:
+            raise ValueError(f"a store of version {found}, where this viewsphere reads {STORE_VERSION}: render the recipe anew")
+        value = unsealed(text)
+        del value["store"]
+        value.pop("classes", None)  # for other readers: they follow from the categories
+        record = typed(_PLAN, value)
+        for number, part in enumerate(map(Part.checked, record.parts)):
+            if any(not 0 <= other < number for other, _ in part.supplies):
+                raise ValueError("channels that were added to a part that was not there")
+        names((*record.splits, *record.models), "the name")
+        if min(record.frames, record.poses, record.max_objects) < 0:
+            raise ValueError("numbers below 0")
+        return record
+
+
+def _keeping(recipe: dict[str, Any], least: float | None) -> dict[str, Any]:
+    return recipe if recipe.get(KEEP) == least else recipe | {KEEP: least}
+
+
+_MODEL, _PLAN = TypeAdapter(ModelInfo), TypeAdapter(PlanRecord)
+
+Record = TypeVar("Record")
+
+
+def typed(kind: TypeAdapter[Record], value: Any) -> Record:
+    """The record whose fields are these, as JSON gives them back; raises ValueError, in one line, for fields of other types."""
+    try:
+        return kind.validate_python(value)
+    except ValidationError as error:
+        place = ".".join(map(str, error.errors()[0]["loc"]))
+        raise ValueError(f"{place}: {first_of(error)}") from None

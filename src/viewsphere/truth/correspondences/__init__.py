@@ -1,0 +1,1 @@
+"""Where what a pixel shows is in another picture."""

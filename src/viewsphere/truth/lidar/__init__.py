@@ -1,0 +1,1 @@
+"""What a turning LiDAR measures."""

@@ -1,0 +1,1 @@
+"""Which triangle every pixel shows, and how far away."""

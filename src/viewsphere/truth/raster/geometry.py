@@ -1,0 +1,503 @@
+"""Geometry: the world-space triangles of a stage, the one source of every label."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.deforming import Load
+from viewsphere.assets.mesh import Mesh
+from viewsphere.model.classes import GROUND, stuff_of, thing_class
+from viewsphere.model.scene import Floor
+from viewsphere.model.thing import Thing
+from viewsphere.truth.raster.alpha_masks import ENDLESS, NEVER, NO_CUTOUTS, Cutouts, cutouts_of, stack_cutouts
+from viewsphere.truth.raster.sparse import Spare
+
+BACKGROUND = 0
+"""Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
+
+UP = np.array([0, 0, 1], np.float32)
+"""The ground's normal."""
+
+GROUND_REACH = 1000.0
+"""Scene sizes from the middle to the ground's corners: as far as a renderer without endless planes has to draw it."""
+
+OF_VERTICES = ("coordinates", "is_used")
+OF_TRIANGLES = (
+    "triangle_object",
+    "triangle_part",
+    "triangle_category",
+    "triangle_class",
+    "triangle_material",
+    "triangle_body_part",
+)
+STACKED = (*OF_VERTICES, *OF_TRIANGLES, "poses", "bounds", "ground")
+"""Arrays of a geometry that are those of its parts, one after another."""
+
+Corner = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Triangles in the world: objects in id order, then scenery, the ground (if any) last.
+
+    Where things are is held once a thing, not for each vertex: instants and instances share all else. poses (N, 4, 4) float64:
+    world from each thing; meshes: theirs; coordinates (V, 3) float32: each vertex in its thing's axes (zero for the ground);
+    ground (4, 3) float64: its corners in the world, (0, 3) without one.
+
+    triangles (T, 3) int32; triangle_object (T,) int32: 0 for scenery and ground; triangle_part, triangle_category,
+    triangle_material, triangle_body_part int32: of the objects' triangles alone, which come first, all others have 0;
+    single_sided (n,) int32: the triangles that a camera sees from their fronts alone, see `seen_from`;
+    triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32: -1 all surface, -2 never
+    seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
+
+    is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
+    the highest of its used vertices, infinite where it has none.
+
+    The ground is the whole plane z = ground_z, its two triangles are halves of it. They stand for no place: under what moves
+    their corners move along, so a point of the ground is kept as its place in the world.
+
+    Thing i owns vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]);
+    both have one entry more than there are things. The first `object_count` of them are the objects 1, 2, ...
+    """
+
+    poses: Corner
+    meshes: tuple[Mesh, ...]
+    coordinates: NDArray[np.float32]
+    ground: Corner
+    triangles: NDArray[np.int32]
+    triangle_object: NDArray[np.int32]
+    triangle_part: NDArray[np.int32]
+    triangle_category: NDArray[np.int32]
+    triangle_class: NDArray[np.int32]
+    triangle_material: NDArray[np.int32]
+    triangle_body_part: NDArray[np.int32]
+    triangle_cutout: NDArray[np.int32]
+    cutouts: Cutouts
+    single_sided: NDArray[np.int32]
+    is_used: NDArray[np.bool_]
+    bounds: NDArray[np.float64]
+    vertex_start: tuple[int, ...]
+    triangle_start: tuple[int, ...]
+    object_count: int
+    ground_z: float | None
+    facing: Facing
+    spare: Spare
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """World metres (V, 3), made anew: of a part of them use `places` or `corners`."""
+        return np.concatenate([*(self.places(i) for i in range(len(self.poses))), self.ground])
+
+    @property
+    def normals(self) -> NDArray[np.float32]:
+        """Of the vertices (V, 3), world, unit. As the next two it is written to where another instant's are asked for."""
+        return self.facing.of_vertices(self)[: len(self.coordinates)]
+
+    @property
+    def triangle_normals(self) -> NDArray[np.float32]:
+        """Of the triangles (T, 3), world, unit, by winding; zero for a degenerate triangle."""
+        return self.facing.of_triangles(self)[0][: len(self.triangle_object)]
+
+    def triangle_normals_of(self, things: Iterable[int]) -> NDArray[np.float32]:
+        """`triangle_normals`, of which only those of these things and of the ground are sure to be as they are now."""
+        return self.facing.of_triangles(self, things)[0][: len(self.triangle_object)]
+
+    @property
+    def triangle_side(self) -> NDArray[np.int8]:
+        """Of each triangle (T,): 1 where the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or
+        -2 likewise where all three equal the triangle's own.
+        """
+        return self.facing.of_triangles(self)[1][: len(self.triangle_object)]
+
+    @property
+    def triangle_tops(self) -> NDArray[np.float64]:
+        """World z (T,) of each triangle's highest corner, metres; written to as `normals` is."""
+        return self.facing.tops(self)[: len(self.triangle_object)]
+
+    def places(self, i: int) -> NDArray[np.float64]:
+        """World vertices of thing i (n, 3); the ground's come after those of the last thing."""
+        from viewsphere.truth.raster import kernels_place as kernels
+
+        if i == len(self.poses):
+            return self.ground
+        own = self.coordinates[self.vertex_start[i] : self.vertex_start[i + 1]]
+        placed = np.empty(own.shape)
+        kernels.place(self.poses[i], own, placed)
+        return placed
+
+    def corners(self, chosen: NDArray[np.integer]) -> NDArray[np.float64]:
+        """World corners (n, 3, 3) of triangles (n,); arbitrary for triangle -1."""
+        from viewsphere.truth.raster import kernels_place as kernels
+
+        found = np.empty((len(chosen), 3, 3))
+        starts = np.array([*self.vertex_start, len(self.coordinates)])
+        kernels.corners(chosen.astype(np.int64), self.triangles, self.coordinates, starts, self.poses, self.ground, found)
+        return found
+
+    @property
+    def has_scenery(self) -> bool:
+        """Whether anything but objects and the ground is there."""
+        return self.object_count < len(self.vertex_start) - 1
+
+    def extent(self, things: int | None = None) -> tuple[Corner, Corner]:
+        """Lowest and highest corner (3,) of the first so many things, of all without a number; the origin if they have none."""
+        return _extent(self.bounds[:things])
+
+
+@dataclass(eq=False)
+class Facing:
+    """Which way the vertices and triangles of a scene face in the world: arrays that are written to where they are asked for at
+    another instant, so that there is one of each for all instants.
+    """
+
+    _vertices: NDArray[np.float32] | None = None
+    _triangles: tuple[NDArray[np.float32], NDArray[np.int8]] | None = None
+    _tops: NDArray[np.float64] | None = None
+    _shown: dict[str, _Shown] = field(default_factory=dict[str, "_Shown"])
+
+    def of_vertices(self, geometry: Geometry) -> NDArray[np.float32]:
+        """Their normals."""
+        if self._vertices is None or len(self._vertices) < len(geometry.coordinates):  # asked for before without the ground
+            self._vertices = np.tile(UP, (len(geometry.coordinates), 1))
+            self._shown.pop("vertices", None)
+        for i in self._elsewhere("vertices", geometry):
+            own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+            _turn(geometry, i, self._vertices[own])
+        return self._vertices
+
+    def of_triangles(
+        self, geometry: Geometry, things: Iterable[int] | None = None
+    ) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
+        """Their normals and sides; only those of these things are sure to be written, where any are given."""
+        from viewsphere.truth.raster import kernels_place as kernels
+
+        if self._triangles is None or len(self._triangles[1]) < len(geometry.triangles):
+            count = len(geometry.triangles)
+            self._triangles = np.empty((count, 3), np.float32), np.empty(count, np.int8)
+            self._shown.pop("triangles", None)
+            if geometry.ground_z is not None:
+                start, base = geometry.triangle_start[-1], geometry.vertex_start[-1]
+                normals, side = (array[start:] for array in self._triangles)
+                kernels.face(geometry.ground, np.tile(UP, (4, 1)), geometry.triangles[start:], base, normals, side)
+        for i in self._elsewhere("triangles", geometry, things):
+            first, stop, base = *geometry.triangle_start[i : i + 2], geometry.vertex_start[i]
+            normals, side = (array[first:stop] for array in self._triangles)
+            turned = np.empty((geometry.vertex_start[i + 1] - base, 3), np.float32)
+            _turn(geometry, i, turned)
+            kernels.face(geometry.places(i), turned, geometry.triangles[first:stop], base, normals, side)
+        return self._triangles
+
+    def tops(self, geometry: Geometry) -> NDArray[np.float64]:
+        """The height of each triangle's highest corner."""
+        if self._tops is None or len(self._tops) < len(geometry.triangles):
+            self._tops = np.empty(len(geometry.triangles))
+            self._shown.pop("tops", None)
+        for i in self._elsewhere("tops", geometry):
+            first, stop, base = *geometry.triangle_start[i : i + 2], geometry.vertex_start[i]
+            heights = geometry.places(i)[:, 2]
+            np.max(heights[geometry.triangles[first:stop].T - base], axis=0, out=self._tops[first:stop])
+        if geometry.ground_z is not None:
+            self._tops[geometry.triangle_start[-1] :] = geometry.ground_z
+        return self._tops
+
+    def _elsewhere(self, name: str, geometry: Geometry, things: Iterable[int] | None = None) -> list[int]:
+        """Which things, of these if any are given, have moved, or deformed, since these arrays were written."""
+        if name not in self._shown:
+            self._shown[name] = _Shown(np.full_like(geometry.poses, np.nan), list(geometry.meshes))
+        shown = self._shown[name]
+        if shown.all_of is geometry.poses:
+            return []
+        moved = (shown.poses != geometry.poses).any(axis=(1, 2)).tolist()
+        every = range(len(moved)) if things is None else things
+        found = [i for i in every if moved[i] or shown.meshes[i] is not geometry.meshes[i]]
+        shown.poses[found] = geometry.poses[found]
+        for i in found:
+            shown.meshes[i] = geometry.meshes[i]
+        shown.all_of = geometry.poses if things is None else None
+        return found
+
+
+@dataclass(eq=False)
+class _Shown:
+    """The poses (N, 4, 4) and meshes that were written of each thing; all_of: the poses of a geometry, if they are these."""
+
+    poses: Corner
+    meshes: list[Mesh]
+    all_of: Corner | None = None
+
+
+def _turn(geometry: Geometry, i: int, turned: NDArray[np.float32]) -> None:
+    """Write the world normals of thing i's vertices."""
+    from viewsphere.truth.raster import kernels_place as kernels
+
+    kernels.turn(geometry.poses[i], read_only(geometry.meshes[i].normals), turned)
+
+
+def placed_meshes(things: Sequence[Thing], load: Load) -> list[Mesh]:
+    """The model of each thing as it rests; each is loaded once."""
+    loaded = {spec: load(spec) for spec in dict.fromkeys(p.model for p in things)}
+    return [loaded[p.model] for p in things]
+
+
+def present(things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[Mesh]:
+    """The meshes of things that stand still; of those that are not there one without triangles, but with all materials."""
+    return [mesh if thing.is_there else mesh.emptied() for thing, mesh in zip(things, meshes, strict=True)]
+
+
+def build_geometry(
+    things: Sequence[Thing],
+    meshes: Sequence[Mesh],
+    ground: bool,
+    label_alpha: float,
+    floor: Floor | None = None,
+    keeps_scenery: bool = True,
+) -> Geometry:
+    """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none), or where
+    `floor` says: something that jumps leaves it.
+
+    `meshes[i]` is the normalised model of `things[i]`; ids are 1..N in order, then 0 for scenery. A BLEND material is surface
+    where alpha >= label_alpha, a MASK material where alpha >= its cutoff; transmission always counts as surface. Fully
+    transparent triangles (no texel is surface) are kept but never seen. Raises ValueError for other ids.
+
+    The last scenery is kept, unless it is of no use to others: where only objects change, it is not placed again.
+    """
+    count = sum(p.id > 0 for p in things)
+    if [p.id for p in things] != [*range(1, count + 1), *[BACKGROUND] * (len(meshes) - count)]:
+        raise ValueError(f"things: expected ids 1..N in order, then 0, got {[p.id for p in things]}")
+    parts = [_placed(tuple(things[:count]), tuple(meshes[:count]), label_alpha)]
+    if count < len(meshes):
+        placed = _scenery if keeps_scenery else _placed
+        parts.append(placed(tuple(things[count:]), tuple(meshes[count:]), label_alpha))
+    return _stacked([*parts, _ground(np.concatenate([part.bounds for part in parts]), floor)] if ground else parts)
+
+
+def moved(geometry: Geometry, where: Mapping[int, tuple[Thing, Mesh]]) -> Geometry:
+    """The same with these things elsewhere, or deformed: by their numbers, as they are, and their meshes, which have the same
+    triangles. Coordinates of what is deformed are written in place.
+    """
+    poses, bounds, meshes = geometry.poses.copy(), geometry.bounds.copy(), list(geometry.meshes)
+    for i, (thing, mesh) in where.items():
+        if mesh is not meshes[i]:
+            own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+            geometry.coordinates[own], meshes[i] = mesh.vertices, mesh
+        poses[i] = thing.world_from_object
+    placed = replace(geometry, poses=poses, bounds=bounds, meshes=tuple(meshes))
+    for i in where:
+        _bound(placed, i)
+    return placed
+
+
+def lay_ground(geometry: Geometry, floor: Floor | None) -> Geometry:
+    """The same with its ground, if any, where `build_geometry` lays it."""
+    if geometry.ground_z is None:
+        return replace(geometry)
+    corners = _ground_corners(geometry.bounds, floor)
+    return replace(geometry, ground=corners, ground_z=float(corners[0, 2]))
+
+
+def without_ground(geometry: Geometry) -> Geometry:
+    """The same, but there is no ground."""
+    if geometry.ground_z is None:
+        return geometry
+    vertices, triangles = geometry.vertex_start[-1], geometry.triangle_start[-1]
+    kept = {name: getattr(geometry, name)[:vertices] for name in OF_VERTICES}
+    kept |= {name: getattr(geometry, name)[:triangles] for name in (*OF_TRIANGLES, "triangles", "triangle_cutout")}
+    kept["ground"] = geometry.ground[:0]
+    return replace(geometry, **kept, ground_z=None)
+
+
+def seen_from(geometry: Geometry, q: NDArray[np.float64], base: int = 0) -> Geometry:
+    """The same, but the single-sided triangles that turn their backs to the camera are never seen, and no others are looked at
+    again; q: vertices from `base` on as `truth.visibility.homogeneous` gives them for the camera.
+
+    By the sign that the rasteriser computes, so nothing changes where no triangle is single-sided.
+    """
+    corners = geometry.triangles[geometry.single_sided] - base
+    chosen = ((corners >= 0) & (corners < len(q))).all(axis=1)
+    if not chosen.any():
+        return geometry
+    a, b, c = (q[corners[chosen, i], :3] for i in range(3))
+    with np.errstate(invalid="ignore", over="ignore"):  # of things outside of the picture, which are left out of q
+        is_turned = (np.cross(b - a, c - a) * a).sum(axis=1) > 0
+    cutout = geometry.triangle_cutout.copy()
+    cutout[geometry.single_sided[chosen][is_turned]] = NEVER
+    return replace(geometry, triangle_cutout=cutout, single_sided=geometry.single_sided[:0])
+
+
+def with_both_sides(geometry: Geometry) -> Geometry:
+    """The same, but all triangles are seen from both sides, as by rays that are not a camera's."""
+    return replace(geometry, single_sided=geometry.single_sided[:0]) if len(geometry.single_sided) else geometry
+
+
+def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
+    """The same, but BLEND materials are surface wherever they have a colour, which labels leave out where it is faint."""
+    if not any(material.alpha_mode == "BLEND" for mesh in meshes for material in mesh.materials):
+        return geometry
+    ground = geometry.triangle_cutout[geometry.triangle_start[-1] :]
+    cutouts, rows = stack_cutouts([*cutouts_of(meshes, None), (NO_CUTOUTS, ground)])
+    return replace(geometry, cutouts=cutouts, triangle_cutout=rows)
+
+
+def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
+    vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
+    triangle_start = (0, *accumulate(len(m.triangles) for m in meshes))
+    triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], np.int32)
+    objects = sum(p.id > 0 for p in things)
+    held = list(zip(things, meshes, strict=True))
+    labels = _joined([_labels(p, m) for p, m in held[:objects]], np.int32, 6)
+    around = [labels[:, 3], *(_classes(p, m) for p, m in held[objects:])]
+    cutouts, rows = stack_cutouts(cutouts_of(meshes, label_alpha))
+    is_used = np.zeros(vertex_start[-1], np.bool_)
+    is_used[triangles] = True
+    part = Geometry(
+        poses=np.array([thing.world_from_object for thing in things]).reshape(-1, 4, 4),
+        meshes=meshes,
+        coordinates=_joined([mesh.vertices for mesh in meshes], np.float32),
+        ground=np.empty((0, 3)),
+        triangles=triangles,
+        triangle_object=np.concatenate([labels[:, 0], np.full(len(triangles) - len(labels), BACKGROUND, np.int32)]),
+        triangle_part=labels[:, 1],
+        triangle_category=labels[:, 2],
+        triangle_class=np.concatenate(around),
+        triangle_material=labels[:, 4],
+        triangle_body_part=labels[:, 5],
+        triangle_cutout=rows,
+        cutouts=cutouts,
+        single_sided=_offset([_single_sided(*pair) for pair in held], triangle_start),
+        is_used=is_used,
+        bounds=np.empty((len(things), 2, 3)),
+        vertex_start=vertex_start,
+        triangle_start=triangle_start,
+        object_count=objects,
+        ground_z=None,
+        facing=Facing(),
+        spare=Spare(),
+    )
+    for i in range(len(things)):
+        _bound(part, i)
+    return part
+
+
+_scenery = lru_cache(maxsize=1)(_placed)
+
+
+def _stacked(parts: Sequence[Geometry]) -> Geometry:
+    """One after another; where the last is the ground, it stays that."""
+    firsts = (0, *accumulate(len(part.coordinates) for part in parts))
+    first_triangles = (0, *accumulate(len(part.triangles) for part in parts))
+    cutouts, rows = stack_cutouts([(part.cutouts, part.triangle_cutout) for part in parts])
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in STACKED}
+    return Geometry(
+        **arrays,
+        triangles=np.concatenate([part.triangles + np.int32(first) for part, first in zip(parts, firsts, strict=False)]),
+        triangle_cutout=rows,
+        cutouts=cutouts,
+        single_sided=_offset([part.single_sided for part in parts], first_triangles),
+        vertex_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.vertex_start))),
+        triangle_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.triangle_start))),
+        object_count=sum(part.object_count for part in parts),
+        ground_z=parts[-1].ground_z,
+        meshes=tuple(mesh for part in parts for mesh in part.meshes),
+        facing=Facing(),
+        spare=Spare(),
+    )
+
+
+def _single_sided(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
+    """The triangles of a thing that a camera sees from their fronts alone: none, unless its entry has `faces: as_file`."""
+    if thing.model.faces is None:
+        return np.empty(0, np.int32)
+    is_single = np.array([not material.double_sided for material in mesh.materials])
+    return np.flatnonzero(is_single[mesh.triangle_material]).astype(np.int32)
+
+
+def _offset(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int]) -> NDArray[np.int32]:
+    """Numbers of triangles, counted in each part, as those of the whole."""
+    moved = (part + np.int32(first) for part, first in zip(parts, firsts, strict=False))
+    return np.concatenate([np.empty(0, np.int32), *moved])
+
+
+def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
+    """Object, part, category, class, material and part of a body of each triangle of an object, (T, 6)."""
+    labels = np.full((len(mesh.triangles), 6), BACKGROUND, np.int32)
+    labels[:, 0], labels[:, 1], labels[:, 2] = thing.id, mesh.triangle_part + 1, thing.model.category_id
+    labels[:, 3], labels[:, 4] = thing_class(thing.model.category_id), mesh.triangle_material + 1
+    if mesh.triangle_body_part is not None:
+        labels[:, 5] = mesh.triangle_body_part
+    return labels
+
+
+def _classes(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
+    """Class of each triangle of scenery, (T,)."""
+    return np.array([stuff_of(thing.model.category, part) for part in mesh.parts], np.int32)[mesh.triangle_part]
+
+
+def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
+    """A plane in two halves, below all that is placed, or where `floor` says, counter-clockwise seen from above."""
+    corners = _ground_corners(bounds, floor)
+    background, none = np.full(2, BACKGROUND, np.int32), np.empty(0, np.int32)
+    return Geometry(
+        poses=np.empty((0, 4, 4)),
+        meshes=(),
+        coordinates=np.zeros((4, 3), np.float32),
+        ground=corners,
+        triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        triangle_object=background,
+        triangle_part=none,
+        triangle_category=none,
+        triangle_class=np.full(2, GROUND, np.int32),
+        triangle_material=none,
+        triangle_body_part=none,
+        triangle_cutout=np.array(ENDLESS, np.int32),
+        cutouts=NO_CUTOUTS,
+        single_sided=none,
+        is_used=np.ones(4, np.bool_),
+        bounds=np.empty((0, 2, 3)),
+        vertex_start=(0,),
+        triangle_start=(0,),
+        object_count=0,
+        ground_z=float(corners[0, 2]),
+        facing=Facing(),
+        spare=Spare(),
+    )
+
+
+def _ground_corners(bounds: NDArray[np.float64], floor: Floor | None) -> Corner:
+    """Corners (4, 3) of the ground below things of these bounds (N, 2, 3)."""
+    low, high = _extent(bounds)
+    x, y = (low[:2] + high[:2]) / 2
+    z = low[2] if floor is None else floor.under(low[2])
+    r = GROUND_REACH * (float(np.max(high - low)) or 1.0)
+    return np.array([[x - r, y - r, z], [x + r, y - r, z], [x + r, y + r, z], [x - r, y + r, z]])
+
+
+def _extent(bounds: NDArray[np.float64]) -> tuple[Corner, Corner]:
+    low, high = bounds[:, 0].min(axis=0, initial=np.inf), bounds[:, 1].max(axis=0, initial=-np.inf)
+    return (low, high) if low[0] <= high[0] else (np.zeros(3), np.zeros(3))
+
+
+def _bound(geometry: Geometry, i: int) -> None:
+    """Write the bounds of thing i."""
+    from viewsphere.truth.raster import kernels_place as kernels
+
+    own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+    kernels.bound(geometry.poses[i], geometry.coordinates[own], geometry.is_used[own], geometry.bounds[i])
+
+
+def _joined(arrays: Sequence[NDArray[Any]], dtype: type, width: int = 3) -> NDArray[Any]:
+    """Rows of so many numbers, one after another."""
+    return np.ascontiguousarray(np.concatenate([np.zeros((0, width), dtype), *arrays]), dtype)
+
+
+def read_only(array: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A view that cannot be written to, whatever the array is: kernels are compiled once for both."""
+    view = np.ascontiguousarray(array).view()
+    view.setflags(write=False)
+    return view

@@ -1,0 +1,348 @@
+"""The exact rasteriser's result: which triangle each pixel's ray meets first, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import Window, has_unit_rays, pixel_rays
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.truth.raster.geometry import Geometry, seen_from
+
+LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
+
+SCAN_CELLS = 128
+"""Cells along a side of the cube around a scan: smaller ones are slower, as rows of rays are sparse."""
+
+EDGE_ON = 1e-9
+"""A camera's height above the ground, as a share of its distance from the origin and a metre, that is nothing but rounding."""
+
+
+OUTSIDE = (-1e9, 0.0, 1.0, 1.0)
+"""`homogeneous` of a vertex that is far from the picture."""
+
+_CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
+"""For each corner of a box, along each axis: 0 for the lowest, 1 for the highest."""
+
+Runs = NDArray[np.int64]
+"""Ranges [first, stop), (n, 2)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instances:
+    """ids (H, W) int32: the object seen, 0 where none is. By id: area (N + 1,), the number of visible pixels, and box (N + 1,
+    4), the tight half-open box (x0, y0, x1, y1) of the visible pixels; meaningless where the area is 0, and for id 0.
+    """
+
+    ids: NDArray[np.int32]
+    area: NDArray[np.int64]
+    box: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Visibility:
+    """triangle (H, W) int32: the one seen, -1 where none is; inverse_depth (H, W) float32: 1/s, 0 where no triangle is seen.
+
+    The seen point is `center + R.T @ (s * ray)`, ray from `geometry.camera.pixel_rays`: its z is 1 (so s is z-depth) for a
+    pinhole and for Brown-Conrady, and its length is 1 for a fisheye and a scan, whose rays may look sideways or back.
+    """
+
+    triangle: NDArray[np.int32]
+    inverse_depth: NDArray[np.float32]
+    corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, which labels and the raster engine use again
+    exact: NDArray[np.float64] | None = None  # 1/s before it was rounded, where it was asked for
+    _instances: dict[Geometry, Instances] = field(default_factory=dict[Geometry, Instances], repr=False)
+
+    def instances(self, geometry: Geometry) -> Instances:
+        """The visible pixels of each object; `geometry` must be the one drawn. The arrays are kept: do not write to them."""
+        if geometry not in self._instances:
+            self._instances[geometry] = _count_instances(geometry, self.triangle)
+        return self._instances[geometry]
+
+
+def _count_instances(geometry: Geometry, triangle: NDArray[np.int32]) -> Instances:
+    from viewsphere.truth.raster import kernels_channels as kernels
+
+    height, width = triangle.shape
+    ids, area = np.empty((height, width), np.int32), np.zeros(geometry.object_count + 1, np.int64)
+    box = np.tile(np.array([width, height, 0, 0]), (geometry.object_count + 1, 1))
+    kernels.instances(triangle, geometry.triangle_object, ids, area, box)
+    ids.setflags(write=False)
+    return Instances(ids, area, box)
+
+
+def rasterize(
+    geometry: Geometry,
+    camera: Camera,
+    subdivision: int = 1,
+    object_id: int | None = None,
+    window: Window | None = None,
+    corners: NDArray[np.float64] | None = None,
+    keeps_exact: bool = False,
+) -> Visibility:
+    """Cast one ray through the centre of each pixel, exactly.
+
+    A later triangle is seen instead of an earlier one only if it is nearer by more than 2^-22 (2.4e-7) of its depth: of
+    surfaces in one place the first one is seen everywhere, so an object before the ground in which it lies.
+
+    A camera in the ground's plane sees none of it (see `is_edge_on`).
+
+    `subdivision` 2 gives the (2H, 2W) buffer of the centres of a pixel's 2 x 2 quarters (edge anti-aliasing). With an
+    `object_id` only that object is drawn, without scenery and ground. `window` replaces the image by another rectangle of
+    pixels, which may lie outside the image; nothing is seen where the lens has no ray for a pixel. `corners`: `homogeneous` of
+    all vertices, where it is known. `keeps_exact`: keep 1/s before it was rounded, too, which labels that compare pictures
+    need; still pictures are spared its memory.
+    """
+    is_whole = not object_id and window is None
+    if object_id:
+        part = _range(geometry, object_id)
+        q = None if corners is None else _known(corners, part)
+    else:
+        part, q = (0, _last_drawn(geometry, camera), 0, len(geometry.coordinates)), corners
+    if q is None:
+        q = homogeneous(geometry, camera) if is_whole else homogeneous(geometry, camera, *part[2:])
+    nearest, seen = _draw(geometry, camera, subdivision, part, window, q)
+    known = q if is_whole else None
+    return Visibility(seen, nearest.astype(np.float32), known, nearest if keeps_exact else None)
+
+
+def _known(corners: NDArray[np.float64], part: tuple[int, int, int, int]) -> NDArray[np.float64] | None:
+    """A part's vertices among all `homogeneous` ones; None for a thing that is left out there."""
+    q = corners[part[2] : part[3]]
+    return None if len(q) and (q[0] == OUTSIDE).all() else q
+
+
+def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:
+    """A new buffer: `visibility`, which shows everything else, with the ground of this geometry drawn into it."""
+    ground = geometry.triangle_start[-1], _last_drawn(geometry, camera), geometry.vertex_start[-1], len(geometry.coordinates)
+    shown = visibility.inverse_depth.astype(np.float64), visibility.triangle.copy()
+    nearest, seen = _draw(geometry, camera, 1, ground, None, homogeneous(geometry, camera, *ground[2:]), shown)
+    return Visibility(seen, nearest.astype(np.float32))
+
+
+def is_edge_on(geometry: Geometry, camera: Camera) -> bool:
+    """Whether the camera stands in the plane of the ground, as far as rounding can tell: what rays meet of the ground, if
+    anything, is then the camera's own centre.
+    """
+    center = camera.center
+    if geometry.ground_z is None:
+        return False
+    return abs(float(center[2]) - geometry.ground_z) <= EDGE_ON * (1.0 + float(np.linalg.norm(center)))
+
+
+def _last_drawn(geometry: Geometry, camera: Camera) -> int:
+    """The end of the triangles that are drawn: the ground, which comes last, is not where it is seen edge-on."""
+    return geometry.triangle_start[-1] if is_edge_on(geometry, camera) else len(geometry.triangles)
+
+
+def _range(geometry: Geometry, object_id: int) -> tuple[int, int, int, int]:
+    """Triangles [a, b) and vertices [c, d) of an object."""
+    if not 1 <= object_id <= geometry.object_count:
+        raise ValueError(f"object_id: expected 1..{geometry.object_count}, got {object_id}")
+    t, v = geometry.triangle_start, geometry.vertex_start
+    return t[object_id - 1], t[object_id], v[object_id - 1], v[object_id]
+
+
+def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
+    """Vertices [base, stop) before the perspective division, and the inverse of their third coordinate, (n, 4).
+
+    K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens. The inverse is infinite unless positive. Of all
+    vertices, those of things that lie outside of a pinhole's picture are left out: the first of them is `OUTSIDE`, the others
+    are arbitrary. `in_picture` gives those that are not.
+    """
+    k = camera.K if camera.distortion is None else np.eye(3)
+    moved = np.empty((3, 4))
+    moved[:, :3], moved[:, 3] = camera.R, camera.t
+    m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
+    if base or stop is not None or camera.distortion is not None:
+        return projected(geometry, m, base, stop)
+    end, without = len(geometry.coordinates), outside(geometry, camera, m)
+    q = geometry.spare.array((end, 4), np.float64)
+    starts = zip(geometry.vertex_start, without.tolist(), strict=False)
+    q[[start for start, is_left_out in starts if is_left_out and start < end]] = OUTSIDE
+    for first, last in _shown(without, geometry.vertex_start, end).tolist():
+        _project(geometry, m, first, last, q[first:last])
+    return q
+
+
+def in_picture(geometry: Geometry, q: NDArray[np.float64], end: int | None = None) -> tuple[Runs, Runs]:
+    """The vertices and the triangles, up to `end` of these, that are not left out of `homogeneous` vertices q of all things:
+    as many runs of both, which belong together.
+    """
+    without, last = left_out(geometry, q), len(geometry.triangles) if end is None else end
+    return _shown(without, geometry.vertex_start, len(q)), _shown(without, geometry.triangle_start, last)
+
+
+def left_out(geometry: Geometry, q: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which things are left out of `homogeneous` vertices q of all of them."""
+    start = np.array(geometry.vertex_start[:-1], np.intp)
+    return (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1) if len(q) else start < 0
+
+
+def _shown(without: NDArray[np.bool_], starts: tuple[int, ...], end: int) -> Runs:
+    """Runs, up to the end, of what things own that are not left out, from these starts on, and the ground. Do not write to it:
+    several frames ask for the same.
+    """
+    return _known_runs(without.tobytes(), starts, end)
+
+
+@lru_cache(maxsize=16)
+def _known_runs(without: bytes, starts: tuple[int, ...], end: int) -> Runs:
+    """`_shown`, of the bytes of its flags."""
+    is_shown = np.array([False, *~np.frombuffer(without, np.bool_), True, False])
+    borders = np.flatnonzero(is_shown[1:] != is_shown[:-1])
+    return np.array([*starts, end], np.int64)[borders].reshape(-1, 2)
+
+
+def projected(geometry: Geometry, m: NDArray[np.float64], base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
+    """(n, 4): m (x, y, z, 1) of the vertices [base, stop), and the inverse of its third coordinate, as `homogeneous`."""
+    end = len(geometry.coordinates) if stop is None else stop
+    q = np.empty((end - base, 4))
+    _project(geometry, m, base, end, q)
+    return q
+
+
+def _project(geometry: Geometry, m: NDArray[np.float64], base: int, stop: int, q: NDArray[np.float64]) -> None:
+    """Write `projected`."""
+    from viewsphere.truth.raster import kernels_draw, kernels_place
+
+    starts = np.array(geometry.vertex_start, np.int64)
+    kernels_place.project(geometry.coordinates, starts, geometry.poses, m, base, stop, q)
+    first = max(geometry.vertex_start[-1], base)
+    if first < stop:
+        low, high = first - geometry.vertex_start[-1], stop - geometry.vertex_start[-1]
+        kernels_draw.transform(geometry.ground, low, high, m, q[first - base :])
+
+
+def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which things of a geometry lie wholly outside of a pinhole's picture, a pixel away from it, or behind the camera: all
+    corners of their boxes do.
+    """
+    corners = geometry.bounds[:, _CORNERS, np.arange(3)]  # (N, 8, 3)
+    with np.errstate(invalid="ignore"):  # of things without triangles
+        u, v, w = (corners[..., 0] * m[0] + corners[..., 1] * m[1] + corners[..., 2] * m[2] + m[3] for m in pixels_from_world)
+        sides = u < -w, u > (camera.width + 1) * w, v < -w, v > (camera.height + 1) * w, w < 0
+        return np.logical_or.reduce([side.all(axis=1) for side in sides])
+
+
+def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int32]:
+    """The range of pixels that each vertex may touch in a pinhole's picture of this (width, height), (n, 4), as
+    `kernels_points.boxes` has it; corners: `homogeneous` vertices.
+    """
+    from viewsphere.truth.surface_points import kernels_points as kernels
+
+    box, nowhere = np.empty((len(corners), 4), np.int32), np.empty((1, 4), np.int32)
+    kernels.boxes(np.array([OUTSIDE]), 1, *size, nowhere)
+    done = 0
+    for first, stop in in_picture(geometry, corners)[0].tolist():
+        box[done:first] = nowhere
+        kernels.boxes(corners[first:stop], geometry.vertex_start[-1] - first, *size, box[first:stop])
+        done = stop
+    box[done:] = nowhere
+    return box
+
+
+def lens_rays(camera: Camera) -> NDArray[np.float64] | None:
+    """The image's ray table, (H, W, 3), None for a pinhole; kept for the next frame, so it must not be written to."""
+    image = (0, 0, camera.width, camera.height)
+    return None if camera.distortion is None else _ray_table(camera.intrinsics.model_dump_json(), 1, image).rays
+
+
+def lens_table(camera: Camera) -> RayTable:
+    """`lens_rays` of a distorted lens, with the indices over them."""
+    return _ray_table(camera.intrinsics.model_dump_json(), 1, (0, 0, camera.width, camera.height))
+
+
+@dataclass(frozen=True, eq=False)
+class RayTable:
+    """Rays of a lens, and the indices over them that `kernels_rays` builds."""
+
+    rays: NDArray[np.float64]
+    levels: NDArray[np.int64]
+    boxes: NDArray[np.float64]
+    cells: NDArray[np.int32]
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """(rays, levels, boxes, cells), as the kernels take them."""
+        return self.rays, self.levels, self.boxes, self.cells
+
+
+def _canvas(camera: Camera, window: Window) -> Window:
+    """The rectangle of pixels to tabulate for this window: one of few, so that a table serves many windows and frames."""
+    w, h = camera.width, camera.height
+    image, around = (0, 0, w, h), (-w, -h, 2 * w, 2 * h)
+    if _within(window, image):
+        return image
+    return around if _within(window, around) and 9 * w * h <= LARGEST_AROUND else window
+
+
+def _within(a: Window, b: Window) -> bool:
+    return a[0] >= b[0] and a[1] >= b[1] and a[2] <= b[2] and a[3] <= b[3]
+
+
+@lru_cache(maxsize=4)
+def _ray_table(lens: str, samples: int, canvas: Window) -> RayTable:
+    """The table for the intrinsics with this JSON, `samples` x `samples` rays for each pixel of the canvas."""
+    intrinsics = Intrinsics.model_validate_json(lens)
+    return index_rays(intrinsics, pixel_rays(intrinsics, samples, canvas), samples)
+
+
+def index_rays(intrinsics: Intrinsics, rays: NDArray[np.float64], samples: int) -> RayTable:
+    """The ray table of a distorted lens with its indices: rays (H, W, 3), `samples` x `samples` of them a pixel."""
+    from viewsphere.truth.raster import kernels_rays as kernels
+
+    rays.setflags(write=False)
+    levels = kernels.tree_levels(rays.shape[0], rays.shape[1])
+    lens = intrinsics.distortion
+    size = min(max(int(intrinsics.fx * samples), 16), 512)  # cells of about two pixels
+    if lens is not None and lens.model == "scan":
+        size = SCAN_CELLS
+    cells = kernels.build_faces(rays, 6 if has_unit_rays(lens) else 1, size)
+    return RayTable(rays, levels, kernels.build_tree(rays, levels), cells)
+
+
+def _draw(
+    geometry: Geometry,
+    camera: Camera,
+    samples: int,
+    part: tuple[int, int, int, int],
+    window: Window | None,
+    q: NDArray[np.float64],
+    shown: tuple[NDArray[np.float64], NDArray[np.int32]] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Draw a part's triangles, whose vertices are `homogeneous` in q, over the window: 1/s (0 where none) and triangle (-1
+    where none).
+
+    The triangles are drawn into the arrays `shown` already, if these are given.
+    """
+    from viewsphere.truth.raster import kernels_draw as kernels
+    from viewsphere.truth.raster import kernels_rays
+
+    window = window or (0, 0, camera.width, camera.height)
+    x0, y0, x1, y1 = (samples * edge for edge in window)
+    nearest, seen = shown or (np.zeros((y1 - y0, x1 - x0)), np.full((y1 - y0, x1 - x0), -1, np.int32))
+    first, last, base, stop = part
+    span = (first, last, base)
+    cut = (seen_from(geometry, q, base).triangle_cutout, geometry.cutouts.arrays)
+    if camera.distortion is not None:
+        canvas = _canvas(camera, window)
+        t = _ray_table(camera.intrinsics.model_dump_json(), samples, canvas)
+        origin = (x0 - samples * canvas[0], y0 - samples * canvas[1])
+        table, unit = t.arrays, has_unit_rays(camera.distortion)
+        kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
+        return nearest, seen
+    canvas, parts = (x0, y0, x1 - x0, y1 - y0), [(base, stop, first, last)]
+    if 0 < len(q) == len(geometry.coordinates):  # things may be left out
+        vertices, triangles = in_picture(geometry, q, last)
+        parts = np.column_stack((vertices, triangles)).tolist()
+    for begin, end, first, last in parts:
+        own, cell = q[begin - base : end - base], np.empty((end - begin, 4), np.int32)
+        kernels.cells(own, samples, *canvas, cell)
+        cell[max(geometry.vertex_start[-1] - begin, 0) :] = kernels.BEHIND
+        kernels.draw(own, cell, geometry.triangles, (first, last, begin), (samples, x0, y0), *cut, nearest, seen)
+    return nearest, seen

@@ -1,0 +1,1 @@
+"""Points that stay on surfaces: where pictures show them."""

@@ -1,0 +1,53 @@
+"""Points on triangles by their barycentrics, and the rays of a lens through any positions of its picture."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import coefficients, lens_limit
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.view import View
+
+Float = NDArray[np.float64]
+Whole = NDArray[np.int32]
+
+
+def rays_through(view: View, xy: Float) -> Float:
+    """Rays (N, 3) through positions (N, 2): (x, y, 1) for a pinhole, else as `geometry.camera.pixel_rays`."""
+    from viewsphere.truth.surface_points import kernels_attached as kernels
+
+    lens = view.camera.distortion
+    if lens is None:
+        return np.column_stack((xy, np.ones(len(xy))))
+    rays = np.empty((len(xy), 3))
+    cast = {"fisheye": kernels.rays_fisheye, "scan": kernels.rays_scan, "brown_conrady": kernels.rays_brown}[lens.model]
+    cast(coefficients(lens), lens_limit(lens), view.camera.K, np.ascontiguousarray(xy), rays)
+    return rays
+
+
+def weights_of(view: View, triangle: Whole, rays: Float) -> Float:
+    """Barycentrics (N, 3) of rays (N, 3), as `rays_through` gives them, in triangles (N,) of the view."""
+    from viewsphere.truth.surface_points import kernels_attached as kernels
+
+    out = np.empty((len(triangle), 3))
+    kernels.weights(view.geometry.triangles, triangle, view.corners, rays, out)
+    return out
+
+
+def stick(geometry: Geometry, triangle: Whole, weights: Float, out: Float) -> Float:
+    """Write where points (N, 3) of these triangles (N,) are in the world, leaving those of triangle -1; returns `out`."""
+    from viewsphere.truth.surface_points import kernels_attached as kernels
+
+    kernels.stick(geometry.corners(triangle), triangle, weights, out)
+    return out
+
+
+def shifts(own: View, other: View) -> Whole:
+    """What is added to the number of a triangle of each thing of a view, and of the ground, to get its number in another."""
+    here, there = own.geometry.triangle_start, other.geometry.triangle_start
+    count = min(len(here), len(there)) - 1
+    out = np.zeros(len(here), np.int32)
+    out[:count] = np.subtract(there[:count], here[:count])
+    out[-1] = there[-1] - here[-1]
+    return out

@@ -1,0 +1,203 @@
+"""Points that keep their place on what they lie on, wherever it goes: for tracks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from viewsphere.geometry.camera import project
+from viewsphere.geometry.rotation import transform
+from viewsphere.truth.surface_points.attached import rays_through, stick, weights_of
+from viewsphere.truth.surface_points.raster import Placed, first_met, in_lens, placed_at, states
+from viewsphere.truth.view import Body, View
+
+Float = NDArray[np.float64]
+Whole = NDArray[np.int32]
+
+GROUND, SKY, FREE, NOWHERE = -1, -2, -3, -4
+"""What a point lies on that lies on no thing: the ground, the sky, nothing that is there, a flat picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoints:
+    """N points, each on a triangle of a thing, or else fixed in the world.
+
+    body (N,) int32: position in `bodies`, else GROUND, SKY, FREE or NOWHERE. triangle (N,) int32 within the body, -1 without
+    one; weights (N, 3) float64: barycentrics. place (N, 3) float64, without a triangle: a point of the world, of the sky a unit
+    vector towards it. bodies: the things as they were when points were put on them, one more than once where its triangles had
+    changed; ground_z: the ground's height then.
+    """
+
+    body: Whole
+    triangle: Whole
+    weights: Float
+    place: Float
+    bodies: Sequence[Body]
+    ground_z: float | None
+
+    @staticmethod
+    def of(view: View, thing: Whole, triangle: Whole, weights: Float, place: Float) -> SurfacePoints:
+        """Points on things as a view has them: thing (N,) int32 is the position in its `things`, or as `body` where on none."""
+        bodies = view.bodies(thing)
+        number = np.searchsorted([body.position for body in bodies], thing)
+        body = np.where(thing >= 0, number, thing).astype(np.int32)
+        return SurfacePoints(body, triangle, weights, place, bodies, view.geometry.ground_z)
+
+    def __len__(self) -> int:
+        return len(self.body)
+
+    @property
+    def thing(self) -> Whole:
+        """The things that they lie on, (N,) int32: positions in the view's `things`, else as `body`."""
+        position = np.array([*(body.position for body in self.bodies), -1], np.int32)
+        return np.where(self.body >= 0, position[np.maximum(self.body, -1)], self.body)
+
+    def in_view(self, view: View) -> Tracked:
+        """Where they are in a view of the same things, at any instant."""
+        return Tracked(self, view)
+
+    def chosen(self, index: NDArray[np.intp]) -> SurfacePoints:
+        """Some of the points, by their numbers."""
+        parts = (self.body[index], self.triangle[index], self.weights[index], self.place[index])
+        return SurfacePoints(*parts, self.bodies, self.ground_z)
+
+    @staticmethod
+    def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
+        """All points of several, on the same things; of bodies that have the same triangles the first is kept."""
+        bodies, numbers = list[Body](), list[Whole]()
+        for part in parts:
+            at = np.array([*(_number(body, bodies) for body in part.bodies), -1], np.int32)
+            numbers.append(np.where(part.body >= 0, at[np.maximum(part.body, -1)], part.body))
+        triangle, weights, place = (
+            np.concatenate([getattr(p, name) for p in parts]) for name in ("triangle", "weights", "place")
+        )
+        heights = [part.ground_z for part in parts if part.ground_z is not None]
+        return SurfacePoints(np.concatenate(numbers), triangle, weights, place, bodies, heights[0] if heights else None)
+
+
+def _number(body: Body, known: list[Body]) -> int:
+    """The position of a body of the same triangles among those that are known, to which it is added if there is none."""
+    for number, other in enumerate(known):
+        if other.position == body.position and other.has_triangles_of(body):
+            return number
+    known.append(body)
+    return len(known) - 1
+
+
+def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
+    """The points that a view shows at positions (N, 2) of its picture, in pixels: what the ray through each meets first.
+
+    NOWHERE outside of the picture, and where the lens has no ray or a flat picture is seen.
+    """
+    xy = np.ascontiguousarray(xy, np.float64).reshape(-1, 2)
+    inside = ((xy >= 0.0) & (xy < (view.camera.width, view.camera.height))).all(axis=1)
+    rays = rays_through(view, xy)
+    has_ray = np.logical_and(inside, ~np.isnan(rays).any(axis=1))
+    nowhere = np.full(len(xy), -1, np.int32)
+    met = first_met(view, xy, np.zeros(len(xy)), nowhere, None if view.is_pinhole else rays, has_ray)
+    thing = np.where(has_ray & view.is_sky_endless, SKY, NOWHERE).astype(np.int32)
+    first = np.array(view.geometry.triangle_start)
+    hit = met >= 0
+    thing[hit] = view.owners[met[hit]]
+    thing[thing == len(view.things)] = GROUND
+    on = thing >= 0
+    weights = np.zeros((len(xy), 3))
+    weights[on] = weights_of(view, met[on], rays[on])
+    triangle = np.where(on, met - first[np.maximum(thing, 0)], -1).astype(np.int32)
+    directions = transform(view.world_from_camera, transform(view.camera_from_ray, rays))
+    return SurfacePoints.of(view, thing, triangle, weights, _fixed(view, thing, directions))
+
+
+def _fixed(view: View, thing: Whole, directions: Float) -> Float:
+    """Where the rays in these directions (N, 3) meet the ground, and directions of the sky; 0 for all else."""
+    place = np.zeros(directions.shape)
+    sky, ground = thing == SKY, thing == GROUND
+    place[sky] = directions[sky] / np.sqrt((directions[sky] ** 2).sum(axis=1, keepdims=True))
+    height = view.geometry.ground_z
+    if height is not None:
+        d = directions[ground]
+        place[ground] = view.center + d * ((height - view.center[2]) / d[:, 2])[:, None]
+        place[ground, 2] = height
+    return place
+
+
+def points_in_world(places: ArrayLike) -> SurfacePoints:
+    """Points (N, 3) of the world, metres, that stick to nothing."""
+    place = np.ascontiguousarray(places, np.float64).reshape(-1, 3)
+    nothing = np.full(len(place), -1, np.int32)
+    return SurfacePoints(np.full(len(place), FREE, np.int32), nothing, np.zeros((len(place), 3)), place, (), None)
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """Points in one view."""
+
+    points: SurfacePoints
+    view: View
+
+    @property
+    def xy(self) -> Float:
+        """Pixels, (N, 2), NaN where there are none."""
+        return self.placed.xy
+
+    @cached_property
+    def world(self) -> Float:
+        """Where the points are, (N, 3) metres; NaN of the sky, and of what is nowhere."""
+        points = self.points
+        fixed = (points.body == FREE) | ((points.body == GROUND) & self._has_ground)
+        out = np.where(fixed[:, None], points.place, np.nan)
+        return stick(self.view.geometry, self._own, points.weights, out)
+
+    @cached_property
+    def xyz(self) -> Float:
+        """The same in the camera's axes, (N, 3); of the sky (NaN, NaN, inf)."""
+        out = transform(self.view.camera.R, self.world) + self.view.camera.t
+        out[self._is_sky & in_lens(self.xy), 2] = np.inf
+        return out
+
+    @cached_property
+    def state(self) -> NDArray[np.uint8]:
+        """Whether they are seen, (N,) uint8, see `truth.point_raster`; `states` does several at once."""
+        return states([self.placed])[0]
+
+    @cached_property
+    def placed(self) -> Placed:
+        """The points as `truth.point_raster.states` takes them."""
+        own = self._own
+        ground = self.view.geometry.triangle_start[-1]
+        on = np.where(self.points.body == GROUND, np.int32(ground), own) if self._has_ground else own
+        placed = placed_at(self.view, transform(self.view.camera.R, self.world) + self.view.camera.t, lambda: on)
+        sky = np.flatnonzero(self._is_sky)
+        if len(sky):
+            directions = transform(self.view.camera.R, self.points.place[sky])
+            self._write_sky(placed, sky, directions)
+        return placed
+
+    def _write_sky(self, placed: Placed, sky: NDArray[np.intp], directions: Float) -> None:
+        xy, _ = project(self.view.camera.intrinsics, directions)
+        placed.xy[sky], placed.near[sky] = xy, 0.0
+        if placed.rays is not None:
+            placed.rays[sky] = directions if self.view.has_unit_rays else directions / directions[:, 2:]
+
+    @property
+    def _is_sky(self) -> NDArray[np.bool_]:
+        return (self.points.body == SKY) & self.view.is_sky_endless
+
+    @property
+    def _has_ground(self) -> bool:
+        """Whether the ground is where the points found it."""
+        return self.points.ground_z is not None and self.points.ground_z == self.view.geometry.ground_z
+
+    @cached_property
+    def _own(self) -> Whole:
+        """The view's triangle of each point, -1 where it has none."""
+        view, start = self.view, np.full(len(self.points.bodies) + 1, -1, np.int32)
+        for number, body in enumerate(self.points.bodies):
+            if body.position < len(view.things) and body.has_triangles_of(view.body(body.position)):
+                start[number] = view.geometry.triangle_start[body.position]
+        first = start[np.maximum(self.points.body, -1)]
+        return np.where(first >= 0, first + self.points.triangle, np.int32(-1))

@@ -1,0 +1,210 @@
+"""Which triangle of a view each of any points meets first, and so which points are hidden: exact, for any lens.
+
+A distorted lens' points are sorted by pinholes that stand where it stands: one that sees all, or the six sides of a cube.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import project
+from viewsphere.geometry.rotation import product
+from viewsphere.truth.kernel_constants import FOUR, NEARER
+from viewsphere.truth.raster.visibility import pixels_of, projected
+from viewsphere.truth.view import View
+
+Float = NDArray[np.float64]
+Whole = NDArray[np.int32]
+VISIBLE, OCCLUDED, OUTSIDE, BEHIND, INVALID = range(5)
+"""Whether a point is seen in a view, in the order in which this is decided from behind.
+
+INVALID: it is nowhere (its thing is not there or has other triangles, a flat picture). BEHIND: behind the camera, or the lens
+has no pixel for its direction. OUTSIDE: not in [0, W) x [0, H). OCCLUDED: the segment from the camera's centre to the point
+meets surface other than its own triangle, nearer by more than `GAP` of its depth; or its own triangle is single-sided and
+turns its back to the camera.
+"""
+
+GAP = 1e-6
+FACES = ((0, 1, 2, 1.0), (0, 1, 2, -1.0), (1, 2, 0, 1.0), (1, 2, 0, -1.0), (2, 0, 1, 1.0), (2, 0, 1, -1.0))
+"""Sides of the cube around a fisheye or a scan: the axes that are right and down in it, the axis it faces, and which way."""
+
+LARGEST_SIDE = 1024  # pixels of a side of the cube
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Points in a view, in arrays of any one shape.
+
+    xy (..., 2) float64 pixels, NaN where the lens has none; near (...) float64: 1/s, s as `truth.visibility.Visibility` has
+    it, 0 of what is infinitely far and of what has no pixel, NaN of what is nowhere. rays (..., 3) in camera axes, so that the
+    point is ray / near: None for a pinhole, which needs none. `own` gives (...) int32: the view's triangle that the point is
+    on, -1 for none; the ground's are one.
+    """
+
+    view: View
+    xy: Float
+    near: Float
+    rays: Float | None
+    own: Callable[[], Whole]
+
+
+def in_lens(xy: Float) -> NDArray[np.bool_]:
+    """Whether the lens has pixels for points: their pixels (..., 2) as `Placed` has them."""
+    return ~np.isnan(xy[..., 0])
+
+
+def placed_at(view: View, points: Float, own: Callable[[], Whole]) -> Placed:
+    """Points (N, 3) in a view's camera axes, none of which is at infinity."""
+    return Placed(view, *pixels_at(view, points), own)
+
+
+def pixels_at(view: View, points: Float) -> tuple[Float, Float, Float | None]:
+    """Where the same points are in the view's picture: xy, near and rays as `Placed` has them."""
+    xy, _ = project(view.camera.intrinsics, points)
+    if view.has_unit_rays:
+        x, y, z = points.T
+        s = np.sqrt(x * x + y * y + z * z)
+    else:
+        s = points[:, 2]
+    near = np.divide(1.0, s, out=np.where(np.isnan(s), np.nan, 0.0), where=in_lens(xy))
+    return xy, near, None if view.is_pinhole else points * near[:, None]
+
+
+def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
+    """The state of each of the points, (...) uint8 each, all of which are in one view, whose triangles are drawn once."""
+    from viewsphere.truth.surface_points import kernels_points as kernels
+
+    view = placed[0].view
+    if any(points.view is not view for points in placed):
+        raise ValueError("states: expected points of one view, got several views")
+    xy = _joined([points.xy.reshape(-1, 2) for points in placed])
+    near = _joined([points.near.reshape(-1) for points in placed])
+    own = _joined([points.own().reshape(-1) for points in placed])
+    rays = None if view.is_pinhole else _joined([p.rays.reshape(-1, 3) for p in placed if p.rays is not None])
+    state, cell = _classified(xy, near, (view.camera.width, view.camera.height))
+    for index, met in _meetings(view, xy, near, own, cell, rays):
+        kernels.hide(met, index, np.uint8(OCCLUDED), state)
+    if view.shown is not view.geometry:
+        state[(state == VISIBLE) & view.is_turned_away(own)] = OCCLUDED
+    stops = np.cumsum([points.near.size for points in placed])[:-1]
+    return [part.reshape(points.near.shape) for part, points in zip(np.split(state, stops), placed, strict=True)]
+
+
+def _classified(xy: Float, near: Float, size: tuple[int, int]) -> tuple[NDArray[np.uint8], Whole]:
+    """The states of points by their places alone, and the pixels that they are in, see `kernels_points.classify`."""
+    from viewsphere.truth.surface_points import kernels_points as kernels
+
+    state, cell = np.empty(len(near), np.uint8), np.empty(len(near), np.int32)
+    kernels.classify(np.ascontiguousarray(xy).reshape(-1), near, *size, state, cell)
+    return state, cell
+
+
+def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def first_met(
+    view: View,
+    xy: Float,
+    near: Float,
+    own: Whole,
+    rays: Float | None = None,
+    chosen: NDArray[np.bool_] | None = None,
+) -> Whole:
+    """The triangle that the ray to each point meets first before the point, (N,) int32, -1 where it meets none.
+
+    Points are as in `Placed`. Of those at `near` 0 whatever is in front counts. Those that are not `chosen`, by default all, or
+    do not lie in the picture, meet nothing.
+    """
+    from viewsphere.truth.surface_points import kernels_points as kernels
+
+    triangle = np.full(len(near), -1, np.int32)
+    _, cell = _classified(xy, near, (view.camera.width, view.camera.height))
+    if chosen is not None:
+        cell[~chosen] = -1
+    for index, met in _meetings(view, xy, near, own, cell, rays):
+        kernels.mark(met, index, triangle)
+    return triangle
+
+
+def _meetings(view: View, xy: Float, near: Float, own: Whole, cell: Whole, rays: Float | None) -> Iterator[tuple[Whole, Whole]]:
+    """Points, by their numbers (n,), and the triangle that each of them meets first (n,), -1 for none; see `first_met`.
+
+    The points are those whose pixel `cell` is not -1.
+    """
+    if rays is None:
+        yield _meet(view, view.corners, view.boxes, (view.camera.width, view.camera.height), xy, near, own, cell)
+        return
+    index = np.flatnonzero(cell >= 0).astype(np.int32)
+    for q, size, at, own_xy, own_near in _pinholes(view, rays[index], near[index]):
+        _, own_cell = _classified(own_xy, own_near, size)
+        order, met = _meet(view, q, pixels_of(view.geometry, q, size), size, own_xy, own_near, own[index[at]], own_cell)
+        yield index[at][order], met
+
+
+def _meet(
+    view: View, q: Float, box: Whole, size: tuple[int, int], xy: Float, near: Float, own: Whole, cell: Whole
+) -> tuple[Whole, Whole]:
+    """The same for a pinhole of this size; q: `homogeneous` vertices of that pinhole, box: their pixels (`pixels_of`)."""
+    from viewsphere.truth.surface_points import kernels_points as kernels
+
+    geometry, (width, height) = view.geometry, size
+    ground, cut = np.int32(geometry.triangle_start[-1]), (view.shown.triangle_cutout, geometry.cutouts.arrays)
+    clear = ground if ground < len(geometry.triangles) else np.int32(-1)
+    start, far, covered = np.empty(width * height + 2, np.int32), np.empty((height, width)), np.empty(width * height, np.bool_)
+    order, number = np.empty(len(near), np.int32), np.empty(len(near) + FOUR, np.int32)
+    points, nearest = np.empty((2, len(near) + FOUR)), np.empty(len(near) + FOUR)
+    kernels.cover(box, np.array(geometry.vertex_start), width, height, covered)
+    sorted_by = (start, order, points, nearest, number, far.reshape(-1))
+    inside = kernels.sort(xy, near, (1.0 + GAP) / NEARER, own, cell, covered, ground, clear, *sorted_by)
+    met = np.full(inside + FOUR, -1, np.int32)
+    if inside:
+        kernels.meet(q, box, geometry.triangles, ground, *cut, size, start, points, nearest, met, number, far)
+    return order[:inside], met[:inside]
+
+
+def _pinholes(view: View, rays: Float, near: Float) -> Iterator[tuple[Float, tuple[int, int], NDArray[np.intp], Float, Float]]:
+    """Pinholes that together show all points of a distorted lens: the vertices as each one projects them, its size, the points
+    that it shows, their pixels and their 1/z there.
+    """
+    side = 1.0
+    if view.has_unit_rays:
+        axis = np.argmax(np.abs(rays), axis=1)
+        count = min(max(math.ceil(math.sqrt(len(near))), 16), LARGEST_SIDE)
+        for right, down, ahead, sign in FACES:
+            at = np.flatnonzero((axis == ahead) & (rays[:, ahead] * sign > 0.0))
+            if len(at):
+                turned = np.zeros((3, 3))
+                turned[0, right], turned[1, down], turned[2, ahead] = 1.0, sign, sign
+                yield _pinhole(view, turned, rays[at], near[at], at, (count, count), (-side, -side, side, side))
+        return
+    if len(near):
+        low, high = rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)
+        bounds = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+        size = (view.camera.width, view.camera.height)
+        yield _pinhole(view, np.eye(3), rays, near, np.arange(len(near)), size, bounds)
+
+
+def _pinhole(
+    view: View,
+    turned: Float,
+    rays: Float,
+    near: Float,
+    at: NDArray[np.intp],
+    size: tuple[int, int],
+    bounds: tuple[float, float, float, float],
+) -> tuple[Float, tuple[int, int], NDArray[np.intp], Float, Float]:
+    """The pinhole of this size whose picture shows x/z and y/z within `bounds`, turned from the view's camera axes."""
+    u0, v0, u1, v1 = bounds
+    du, dv = size[0] / ((u1 - u0) * (1 + 1e-9) or 1.0), size[1] / ((v1 - v0) * (1 + 1e-9) or 1.0)
+    k = np.array([[du, 0.0, -du * u0], [0.0, dv, -dv * v0], [0.0, 0.0, 1.0]])
+    q = projected(view.geometry, product(k, product(turned, np.column_stack((view.camera.R, view.camera.t)))))
+    x, y, z = product(turned, rays.T)
+    xy = np.column_stack((du * (x / z) - du * u0, dv * (y / z) - dv * v0))
+    return q, size, at, np.clip(xy, 0.0, np.nextafter(np.array(size, np.float64), 0.0)), near / z
