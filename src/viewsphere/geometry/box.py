@@ -121,11 +121,9 @@ def projected_bounds(
         room = np.empty((stop - base, 6))
         box, whole = kernels_bent.bent_bounds(vertices, used, base, triangles, *faces, camera.R, camera.t, lens, rim, room)
         return (box if box[0] <= box[2] else None), whole
-    seen = np.empty((3, stop - base))
-    kernels.project(vertices, base, camera.K, camera.R, camera.t, seen)
-    u, v, w = seen if used.all() else seen[:, used]
-    if w.min() >= NEAR:
-        return (float(u.min()), float(v.min()), float(u.max()), float(v.max())), True
+    x0, y0, x1, y1, front = kernels.whole_bounds(vertices, used, base, camera.K, camera.R, camera.t, NEAR)
+    if front:
+        return (x0, y0, x1, y1), True
     x0, y0, x1, y1, whole = kernels.cut_bounds(vertices, triangles, *faces, *points, camera.K, camera.R, camera.t, NEAR)
     return ((x0, y0, x1, y1) if x0 <= x1 else None), bool(whole)
 

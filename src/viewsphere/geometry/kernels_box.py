@@ -55,14 +55,19 @@ def cut_bounds(vertices, triangles, first, last, base, stop, k, r, t, near):
 
 
 @njit
-def project(vertices, base, k, r, t, uvw):
-    """Pixels and distance along the axis of vertices from `base` on, (3, n)."""
-    for j in range(U(uvw.shape[1])):
-        i = U(base) + j
-        x, y, z = vertices[i, U(0)], vertices[i, U(1)], vertices[i, U(2)]
-        a = r[0, 0] * x + r[0, 1] * y + r[0, 2] * z + t[0]
-        b = r[1, 0] * x + r[1, 1] * y + r[1, 2] * z + t[1]
-        w = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z + t[2]
-        uvw[U(0), j] = (k[0, 0] * a + k[0, 1] * b + k[0, 2] * w) / w
-        uvw[U(1), j] = (k[1, 1] * b + k[1, 2] * w) / w
-        uvw[U(2), j] = w
+def whole_bounds(vertices, used, base, k, r, t, near):
+    """Bounds (u0, v0, u1, v1) in pixels of the `used` (n,) vertices from `base` on, and whether all of these have w >= near:
+    else the bounds are arbitrary.
+    """
+    u0, v0, u1, v1, front = np.inf, np.inf, -np.inf, -np.inf, True
+    for j in range(U(used.shape[0])):
+        if used[j]:
+            i = U(base) + j
+            x, y, z = vertices[i, U(0)], vertices[i, U(1)], vertices[i, U(2)]
+            a = r[0, 0] * x + r[0, 1] * y + r[0, 2] * z + t[0]
+            b = r[1, 0] * x + r[1, 1] * y + r[1, 2] * z + t[1]
+            w = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z + t[2]
+            front &= w >= near
+            u, v = (k[0, 0] * a + k[0, 1] * b + k[0, 2] * w) / w, (k[1, 1] * b + k[1, 2] * w) / w
+            u0, v0, u1, v1 = min(u0, u), min(v0, v), max(u1, u), max(v1, v)
+    return u0, v0, u1, v1, front

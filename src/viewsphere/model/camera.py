@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
@@ -104,9 +105,9 @@ class Camera:
         motion = np.column_stack([self.R, self.t])
         return transform(self.K, motion.T).T
 
-    @property
+    @cached_property
     def center(self) -> NDArray[np.float64]:
-        """Camera centre in the world, (3,) metres."""
+        """Camera centre in the world, (3,) metres; do not write to it."""
         return -transform(self.R.T, self.t)
 
     @property

@@ -96,7 +96,8 @@ class RasterStage:
                 and not self.shot.scene.weather
                 and Blur(self.arrangements, instant, sensor).count(self.at(instant), visibility) == 1
             ):
-                painted[picture] = self._finished(instant, sensor, visibility, picture)  # of the light that was parted
+                camera = self.shot.camera(instant, sensor)
+                painted[picture] = self._finished(instant, camera, visibility, picture)  # of the light that was parted
         if not set(names).isdisjoint(MATERIAL_PASSES):
             made = materials(self.baked(instant), self.shot.camera(instant, sensor), visibility)
             painted |= dict(zip(MATERIAL_PASSES, made.T.reshape(2, *visibility.triangle.shape).copy(), strict=True))
@@ -133,14 +134,14 @@ class RasterStage:
             self.shot.finish(instant).with_background(name == "rgba").background,
         )
         radiance = self._canvas(camera.width * camera.height)
-        self._paint(instant, sensor, visibility, shows_sky(background), radiance)
+        self._paint(instant, sensor, camera, visibility, shows_sky(background), radiance)
         picture, seconds = radiance.reshape(camera.height, camera.width, 4), self.shot.instants[instant].seconds
         fall_in(self.shot.scene, picture, camera, seconds, visibility.inverse_depth)
-        return self._finished(instant, sensor, visibility, name)
+        return self._finished(instant, camera, visibility, name)
 
-    def _finished(self, instant: int, sensor: int, visibility: Visibility, name: str) -> NDArray[np.uint8]:
+    def _finished(self, instant: int, camera: Camera, visibility: Visibility, name: str) -> NDArray[np.uint8]:
         """`rgb` or `rgba`, of the light that was painted last."""
-        camera, finish = self.shot.camera(instant, sensor), self.shot.finish(instant).with_background(name == "rgba")
+        finish = self.shot.finish(instant).with_background(name == "rgba")
         background = display_background(finish.background, camera.width, camera.height)
         radiance = self._canvas(camera.width * camera.height)
         shape, focus = (camera.height, camera.width, 4), np.array(self.shot.instants[instant].focus)
@@ -148,7 +149,9 @@ class RasterStage:
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
         return finished(radiance.reshape(shape), background, finish, seen)
 
-    def _paint(self, instant: int, sensor: int, visibility: Visibility, has_sky: bool, radiance: Float32) -> None:
+    def _paint(
+        self, instant: int, sensor: int, camera: Camera, visibility: Visibility, has_sky: bool, radiance: Float32
+    ) -> None:
         """Fill `radiance` with the light of a picture, blurred where anything moves while the shutter is open."""
         blur = Blur(self.arrangements, instant, sensor)
 
@@ -161,8 +164,7 @@ class RasterStage:
             self._baked.clear()  # what is packed is written over
             blur.paint(count, paint_moment, radiance)
         else:
-            now, camera = self.baked(instant), self.shot.camera(instant, sensor)
-            self._paint_one(now, camera, visibility, has_sky, radiance)
+            self._paint_one(self.baked(instant), camera, visibility, has_sky, radiance)
 
     def _paint_one(self, baked: Baked, camera: Camera, seen: Visibility, has_sky: bool, radiance: Float32) -> None:
         scene = self.shot.scene

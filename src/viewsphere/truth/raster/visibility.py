@@ -25,6 +25,8 @@ EDGE_ON = 1e-9
 OUTSIDE = (-1e9, 0.0, 1.0, 1.0)
 """`homogeneous` of a vertex that is far from the picture."""
 
+_OUTSIDE = np.array(OUTSIDE)
+
 _CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 """For each corner of a box, along each axis: 0 for the lowest, 1 for the highest."""
 
@@ -179,8 +181,14 @@ def in_picture(geometry: Geometry, q: NDArray[np.float64], end: int | None = Non
 
 def left_out(geometry: Geometry, q: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which things are left out of `homogeneous` vertices q of all of them."""
-    start = np.array(geometry.vertex_start[:-1], np.intp)
-    return (q[np.minimum(start, len(q) - 1)] == OUTSIDE).all(axis=1) if len(q) else start < 0
+    first = _first_vertices(geometry.vertex_start, len(q))
+    return (q[first] == _OUTSIDE).all(axis=1) if len(q) else first < 0
+
+
+@lru_cache(maxsize=4)
+def _first_vertices(starts: tuple[int, ...], end: int) -> NDArray[np.intp]:
+    """Of each thing the first of so many vertices, or the last of all if there are fewer."""
+    return np.minimum(np.array(starts[:-1], np.intp), max(end - 1, 0))
 
 
 def _shown(without: NDArray[np.bool_], starts: tuple[int, ...], end: int) -> Runs:
