@@ -37,9 +37,9 @@ from viewsphere.labels import annotated, observe, sight_of
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
+from viewsphere.planning.plan import SHOT_FRAMES
 from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.plan import SHOT_FRAMES
 from viewsphere.store import Store
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility, rasterize

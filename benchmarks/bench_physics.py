@@ -16,11 +16,11 @@ import numpy as np
 
 from viewsphere import Recipe, plan
 from viewsphere.assets.cache import load_normalised
+from viewsphere.composing.physics import STEP_S, World
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.sampling.physics import STEP_S, World
-from viewsphere.sampling.samplers._random import scene_laid
+from viewsphere.planning.samplers._random import scene_laid
 from viewsphere.zoo import build_zoo_model
 
 MODELS = [

@@ -14,6 +14,7 @@ from bench_scene import texture_set
 
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.engines import Engine
 from viewsphere.labels import observe
 from viewsphere.model.camera import Intrinsics
@@ -23,7 +24,6 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Ground, Scene, Sun
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.sampling.camera import looking
 from viewsphere.truth.raster.visibility import rasterize
 
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000, 5_000_000)

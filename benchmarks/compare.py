@@ -28,6 +28,7 @@ from viewsphere import plugins
 from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.blender.interpreter import find_blender
+from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.engines import Engine
 from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.box import box_vertices
@@ -41,7 +42,6 @@ from viewsphere.model.thing import Motion, Thing
 from viewsphere.rendering.ground.material import SLABS, ground_material
 from viewsphere.rendering.ground.slab_picture import laid_with_slabs
 from viewsphere.rendering.view import develop
-from viewsphere.sampling.camera import looking
 from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.zoo import build
 from viewsphere.zoo.household.vessels import vessel

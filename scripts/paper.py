@@ -16,6 +16,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from viewsphere import Recipe, plugins, render
+from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.labels._paint import PALETTE
 from viewsphere.model.camera import Camera, Intrinsics
@@ -25,11 +26,10 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Background, Finish, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
+from viewsphere.planning.distances import Distances
 from viewsphere.preview import INK, PAPER, draw_sample
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.camera import looking
-from viewsphere.sampling.distances import Distances
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"

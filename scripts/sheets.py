@@ -18,6 +18,7 @@ from PIL import Image, ImageDraw
 from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.mesh import Mesh
+from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.engines import Engine
 from viewsphere.errors import ViewsphereError
 from viewsphere.model.camera import Intrinsics
@@ -39,7 +40,6 @@ from viewsphere.model.scene import (
 )
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.sampling.camera import looking
 from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.zoo import build, build_zoo_model
 

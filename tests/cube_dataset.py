@@ -9,6 +9,7 @@ from small import still_channels
 from viewsphere.assets.appearance.looks import looks_of
 from viewsphere.assets.exporting.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
+from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.diameter import diameter
 from viewsphere.geometry.pose_category import pose_category
@@ -24,7 +25,6 @@ from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.model.traits import Traits
-from viewsphere.sampling.camera import looking
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Store
 from viewsphere.store.shots.records import PRODUCT
 from viewsphere.truth.raster.geometry import build_geometry

@@ -7,11 +7,11 @@ import itertools
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from viewsphere.composing.physics import World, body_of
+from viewsphere.composing.placing import Shape
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.sampling.physics import World, body_of
-from viewsphere.sampling.placing import Shape
 
 
 def spec(key):

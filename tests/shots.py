@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY, Finish, Scene
 from viewsphere.model.shot import Shot
-from viewsphere.sampling.camera import looking
 from viewsphere.truth.raster.visibility import rasterize
 
 SMALL = Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4)

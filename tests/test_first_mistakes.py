@@ -9,11 +9,11 @@ import viewsphere as vs
 from command_line import viewsphere
 from small import small_recipe
 from viewsphere.errors import MOST_TOLD, RecipeError, StoreError, UserError
+from viewsphere.planning.plan import plan
 from viewsphere.preview.sides import facing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.generate import generate
 from viewsphere.run.inspection import inspect_model, model_spec
-from viewsphere.sampling.plan import plan
 
 
 def one_line(*words):

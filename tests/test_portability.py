@@ -14,9 +14,9 @@ from small import ROOT, small_recipe
 from viewsphere import Dataset, generate, plan
 from viewsphere.assets import cache
 from viewsphere.errors import RecipeError
+from viewsphere.planning import models
 from viewsphere.recipe import extends
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling import models
 from viewsphere.store.shots import moving
 
 SOURCE = sorted(

@@ -3,10 +3,10 @@
 import viewsphere as vs
 from command_line import viewsphere
 from small import small_recipe
+from viewsphere.planning.checks.warnings import SMALLEST
+from viewsphere.planning.plan import plan
 from viewsphere.preview import preview_samples, small_objects
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.plan import plan
-from viewsphere.sampling.recipe_warnings import SMALLEST
 
 
 def warnings_of(distance, **changes):

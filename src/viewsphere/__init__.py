@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from viewsphere.model.notebook import Shown
 
 if TYPE_CHECKING:
+    from viewsphere.planning.plan import plan
     from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.converting import convert
     from viewsphere.run.exporting import export
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from viewsphere.run.matching import matches
     from viewsphere.run.memory import render
     from viewsphere.run.status import status
-    from viewsphere.sampling.plan import plan
     from viewsphere.store import Dataset
     from viewsphere.store import Dataset as open
 
@@ -41,7 +41,7 @@ _HOMES = {
     "generate": "run.generate.generate",
     "matches": "run.matching.matches",
     "open": "store.Dataset",
-    "plan": "sampling.plan.plan",
+    "plan": "planning.plan.plan",
     "render": "run.memory.render",
     "status": "run.status.status",
 }

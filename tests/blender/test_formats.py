@@ -24,7 +24,7 @@ from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.sampling.models import model_specs
+from viewsphere.planning.models import model_specs
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("blenders")]
 

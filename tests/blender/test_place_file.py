@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from viewsphere.composing.scene.scenery import free_floor, is_indoors, place_lanes, place_surfaces
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.scenery import free_floor, is_indoors, place_lanes, place_surfaces
 
 pytestmark = [pytest.mark.slow]
 

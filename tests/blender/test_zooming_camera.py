@@ -9,10 +9,10 @@ import pytest
 import viewsphere as vs
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
+from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.generate import generate
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.plan import plan
 
 SCRIPT = """
 import sys, bpy

@@ -19,9 +19,9 @@ from viewsphere.engines._blender.options import EEVEE_PRESETS, WORKBENCH_PRESETS
 from viewsphere.engines._blender.requests import scene_request, settings_request
 from viewsphere.engines._blender.staging import SPARE, clip_of
 from viewsphere.errors import RecipeError
+from viewsphere.planning.engine_digest import engine_digest
 from viewsphere.rendering.finish import finished
 from viewsphere.rendering.sky.sun import sun_light
-from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize
 

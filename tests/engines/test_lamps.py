@@ -16,7 +16,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Ground, Scene, Sky
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.model.weather import Lamps
-from viewsphere.sampling.plan import plan
+from viewsphere.planning.plan import plan
 
 DARK = Sky(strength=0.0)
 MIDDLE = np.array([0.0, 0.0, 0.5])

@@ -12,8 +12,8 @@ from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.model.thing import Repaint
+from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.plan import plan
 
 COLORS = {"blue": (20, 20, 230), "green": (20, 230, 20), "red": (230, 20, 20)}
 

@@ -16,11 +16,11 @@ from command_line import viewsphere
 from proven import close
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.errors import StoreError
+from viewsphere.planning.plan import plan
 from viewsphere.run.again import make_again
 from viewsphere.run.again_recipe import _free
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.stand_in import stand_in
-from viewsphere.sampling.plan import plan
 
 SIZES = ((64, 48), (64, 48))
 LENSES = (("PINHOLE", (60, 61, 30.5, 25)), ("OPENCV", (60, 61, 33, 23, 0.1, -0.02, 1e-3, 2e-3)))

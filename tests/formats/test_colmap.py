@@ -15,11 +15,11 @@ from quick import quick
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
+from viewsphere.composing.viewpoints.pose_files.colmap import read_colmap
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import project
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
-from viewsphere.sampling.pose_files.colmap import read_colmap
 from viewsphere.store.samples.choice import Choice
 
 KINDS = ("binary", "text")

@@ -18,11 +18,11 @@ from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
 from viewsphere.check import check
+from viewsphere.composing.viewpoints.pose_files.nerfstudio import read_nerfstudio
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import project
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
-from viewsphere.sampling.pose_files.nerfstudio import read_nerfstudio
 
 
 def written(dataset, place, **options):

@@ -13,8 +13,8 @@ from truth_scenes import LENSES
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import project
+from viewsphere.planning.rig_files import read_rig
 from viewsphere.run.exporting import export
-from viewsphere.sampling.rig_files import read_rig
 
 
 def written(dataset, place):

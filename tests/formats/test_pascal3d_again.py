@@ -16,9 +16,9 @@ from viewsphere import Dataset
 from viewsphere.errors import RecipeError, StoreError
 from viewsphere.formats import pascal3d
 from viewsphere.formats._viewpoint_mat import off_bytes
+from viewsphere.planning.plan import plan
 from viewsphere.run.again import make_again
 from viewsphere.run.importing import import_dataset
-from viewsphere.sampling.plan import plan
 from viewsphere.store.again import AgainModel, Drafted
 
 

@@ -23,8 +23,8 @@ from mutation import glb, mutated
 from cube_dataset import LENS, MESHES, POSES, make
 from pictures import photograph, sunny, write, write_hdr
 from sealing import seal_again
+from viewsphere.composing.tables import table_rows
 from viewsphere.errors import ViewsphereError
-from viewsphere.sampling.tables import table_rows
 
 Pack = tuple["Sample", ...]
 
@@ -381,7 +381,7 @@ def others() -> Pack:
 
 
 def _poses(path: Path) -> None:
-    from viewsphere.sampling.pose_files import read_poses
+    from viewsphere.composing.viewpoints.pose_files import read_poses
 
     kind = {"view.txt": "view", "tum.txt": "tum", "kitti.txt": "kitti"}.get(path.name, "auto")
     read_poses(path.parent if path.name == "images.txt" else path, kind)
@@ -417,7 +417,7 @@ def poses() -> Pack:
 
 
 def _table(path: Path) -> None:
-    from viewsphere.sampling import credits, models, tracks
+    from viewsphere.planning import credits, models, tracks
 
     if path.name == "credits.csv":
         for name in credits._read(path.parent, True):
@@ -439,7 +439,7 @@ def tables() -> Pack:
 
 
 def _rig(path: Path) -> None:
-    from viewsphere.sampling.rig_files import read_rig
+    from viewsphere.planning.rig_files import read_rig
 
     for rectified in (False, True):
         with suppress(ViewsphereError):

@@ -11,11 +11,11 @@ from sealing import seal_again
 from viewsphere.check import check
 from viewsphere.errors import ViewsphereError
 from viewsphere.formats._paper import json_bytes
+from viewsphere.planning.rig_files import read_rig
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.merging import merge
 from viewsphere.run.status import status
-from viewsphere.sampling.rig_files import read_rig
 from viewsphere.store import Dataset
 from viewsphere.store.index import Block, Index
 from viewsphere.store.shots.manifest import MANIFEST, Manifest, digest, sealed, unsealed

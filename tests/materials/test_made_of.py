@@ -24,10 +24,10 @@ from viewsphere.model.scene import Ground
 from viewsphere.model.shot import Shot
 from viewsphere.model.substance import Substance
 from viewsphere.model.thing import Repaint
+from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scene import EngineEntry
 from viewsphere.rendering.ground.material import ground_albedo, ground_material, only_scatters
-from viewsphere.sampling.plan import plan
 from viewsphere.zoo import build
 
 WOOD = Substance(name="wood", seed=4, size=128)

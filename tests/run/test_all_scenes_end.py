@@ -4,10 +4,10 @@ import os
 
 import pytest
 
+from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.plan import plan
 
 COUNT = int(os.environ.get("SCENES", "20"))
 """Scenes of each kind."""

@@ -25,13 +25,13 @@ from shots import unit_box
 from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
+from viewsphere.composing.viewpoints.pose_numbers import kept, names_of
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
 from viewsphere.model.sample import ObjectAnnotation
-from viewsphere.sampling import fitting
-from viewsphere.sampling.extension import extend, whole
-from viewsphere.sampling.fitting import settings
-from viewsphere.sampling.plan import plan
-from viewsphere.sampling.pose_numbers import kept, names_of
+from viewsphere.planning import fitting
+from viewsphere.planning.extension import extend, whole
+from viewsphere.planning.fitting import settings
+from viewsphere.planning.plan import plan
 from viewsphere.store import PlanRecord, Store
 from viewsphere.store.shots.manifest import sealed, unsealed
 

@@ -12,9 +12,9 @@ from command_line import viewsphere
 from small import ROOT, small_recipe
 from viewsphere.cli.terminal import print_estimate
 from viewsphere.errors import ModelError
+from viewsphere.planning.plan import plan
 from viewsphere.run.estimate import Estimate, Rates, disk_bytes, estimate, extrapolate, measure
 from viewsphere.run.generate import generate
-from viewsphere.sampling.plan import plan
 
 RATES = Rates(model=2.0, scene=3.0, frame=0.5, export=0.25, model_bytes=1e6, frame_bytes=1e5)
 

@@ -12,9 +12,9 @@ from viewsphere.check import check
 from viewsphere.check.repair import repair
 from viewsphere.cli.arguments import asked_formats
 from viewsphere.errors import RecipeError, UserError
+from viewsphere.planning.plan import plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exporting import export
-from viewsphere.sampling.plan import plan
 
 COCOS_OWN = {"coco": {"category_ids": "coco"}}
 POST_BOX = {"contiguous": 1, "coco": 91}

@@ -11,15 +11,15 @@ from built_once import built_once
 from quick import quick
 from small import tree_hash
 from viewsphere.check import check
+from viewsphere.composing.scene.draws import Scenes
 from viewsphere.errors import RecipeError
 from viewsphere.limits import limits
+from viewsphere.planning.plan import plan
+from viewsphere.planning.samplers import _stock
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.merging import merge
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.plan import plan
-from viewsphere.sampling.samplers import _stock
-from viewsphere.sampling.scenes import Scenes
 from viewsphere.store import Exported
 from viewsphere.store.shots.checksums import write_checksums, written_least, written_options
 

@@ -10,11 +10,11 @@ from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
+from viewsphere.planning.extension import extend
+from viewsphere.planning.plan import plan
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.merging import merge
-from viewsphere.sampling.extension import extend
-from viewsphere.sampling.plan import plan
 
 SIZE = (40, 30)
 

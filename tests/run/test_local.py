@@ -14,11 +14,11 @@ from faults import workers_of
 from small import small_recipe
 from viewsphere.errors import UserError, ViewsphereError, WorkerDied
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.planning.extension import whole
 from viewsphere.run.executors import Job, Listed, Queue
 from viewsphere.run.executors._jobs import MOST_DEATHS
 from viewsphere.run.executors.local import LocalCrew
 from viewsphere.run.tasks import ModelTask
-from viewsphere.sampling.extension import whole
 
 PORTION = whole(vs.plan(small_recipe()))
 

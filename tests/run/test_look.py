@@ -6,9 +6,9 @@ import pytest
 
 from small import small_recipe, tree_hash
 from viewsphere.errors import RecipeError, StoreError
+from viewsphere.planning.engine_digest import engine_digest
+from viewsphere.planning.fitting import LOOK
 from viewsphere.run.generate import generate
-from viewsphere.sampling.engine_digest import engine_digest
-from viewsphere.sampling.fitting import LOOK
 from viewsphere.store import Store
 from viewsphere.store.shots.manifest import sealed, unsealed
 

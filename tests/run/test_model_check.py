@@ -7,10 +7,10 @@ import pytest
 import viewsphere as vs
 from command_line import viewsphere
 from small import small_recipe, tree_hash
+from viewsphere.composing.physics import packages
 from viewsphere.errors import MissingExtraError, ModelError, RecipeError, StoreError
 from viewsphere.run import converting
 from viewsphere.run.model_check import check_models
-from viewsphere.sampling import packages
 
 HOUSE = "v 0 0 0\nv 103 0 0\nv 103 50 0\nv 0 50 60\nf 1 2 3\nf 1 3 4\nf 1 2 4\n"
 RECIPE = """name: houses
@@ -183,7 +183,7 @@ def test_usd_models_need_blender_only_without_usd_core(folder, monkeypatch):
         raise MissingExtraError("no Blender here")
 
     (folder / "house.usda").write_text("#usda 1.0\n")
-    monkeypatch.setattr("viewsphere.sampling.models.find_blender", none)
+    monkeypatch.setattr("viewsphere.planning.models.find_blender", none)
     monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: True)
     assert planned(folder, '"*.obj"', "house.usda").frames == 2
     monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: False)

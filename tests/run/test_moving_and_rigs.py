@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
@@ -17,7 +18,6 @@ from viewsphere.model.scene import IDENTITY, Ground, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.camera import looking
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("embreex")

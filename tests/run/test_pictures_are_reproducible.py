@@ -104,8 +104,8 @@ def test_workers_make_the_same_pictures_as_one_process(pictures, whole, tmp_path
 @pytest.mark.slow
 def test_frames_come_out_alike_in_any_order(pictures):
     """Each frame, made after others and first of all in a fresh stage."""
+    from viewsphere.planning.plan import plan
     from viewsphere.run.stages import Stages
-    from viewsphere.sampling.plan import plan
 
     forwards, backwards = Stages(), Stages()
     shots = list(plan(recipe(pictures)).shots(forwards.box))
@@ -119,8 +119,8 @@ def test_frames_come_out_alike_in_any_order(pictures):
 @pytest.mark.slow
 def test_labels_know_nothing_of_what_is_done_to_pictures(pictures):
     """Light, materials, background, view, smoother and effects change the pictures; no label changes by a bit."""
+    from viewsphere.planning.plan import plan
     from viewsphere.run.stages import Stages
-    from viewsphere.sampling.plan import plan
 
     plain = {"jitter": scene(pictures)["jitter"], "ground": True}
     made = {}

@@ -113,7 +113,7 @@ from small import ROOT, small_recipe
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.executors import Job, Listed, hired
 from viewsphere.run.tasks import ModelTask
-from viewsphere.sampling.extension import whole
+from viewsphere.planning.extension import whole
 from viewsphere.store import Store
 
 class Deadly:

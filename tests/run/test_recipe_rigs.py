@@ -11,12 +11,12 @@ from viewsphere.errors import UserError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.rig import Rig
 from viewsphere.model.shot import Shot
+from viewsphere.planning.plan import plan
 from viewsphere.preview import contact_sheet, dataset_samples, preview_samples
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import export
 from viewsphere.run.generate import generate
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.plan import plan
 
 BASE = {
     "models": [{"source": "zoo:chair"}],

@@ -22,11 +22,11 @@ from small import small_recipe, tree_hash
 from viewsphere.check import check
 from viewsphere.errors import ModelError, StoreError, UserError
 from viewsphere.model.share import Share
+from viewsphere.planning.extension import whole
 from viewsphere.run.generate import Missing, generate
 from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.share import shard_named
 from viewsphere.run.status import status
-from viewsphere.sampling.extension import whole
 from viewsphere.store import Dataset, Store
 from viewsphere.store.index import Block, Index
 from viewsphere.store.places import local

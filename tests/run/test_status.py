@@ -15,10 +15,10 @@ from deadline import until
 from small import small_recipe
 from viewsphere.aside import LOCK
 from viewsphere.errors import StoreError
+from viewsphere.planning.extension import whole
 from viewsphere.run.exporting import export
 from viewsphere.run.generate import generate
 from viewsphere.run.status import status
-from viewsphere.sampling.extension import whole
 from viewsphere.store import Store
 from viewsphere.store.index import Index
 from viewsphere.store.shots.folder import RUN

@@ -14,7 +14,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.channel import PICTURES
 from viewsphere.model.sample import Sample
-from viewsphere.sampling.plan import plan
+from viewsphere.planning.plan import plan
 
 BOX = box_vertices((-0.1, -0.1, 0), (0.1, 0.1, 0.3))
 DARK = {"sun": {"elevation_deg": 12, "strength": 1.0}, "effects": {"read_noise": 0.3}}

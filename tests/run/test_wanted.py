@@ -7,8 +7,8 @@ import viewsphere as vs
 from small import small_recipe
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
+from viewsphere.planning.plan import plan
 from viewsphere.run.generate import generate
-from viewsphere.sampling.plan import plan
 
 BOX = [{"source": "zoo:post_box", "count": 3, "scale": {"length": 0.18}}]
 

@@ -12,8 +12,8 @@ from small import small_recipe
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.check.models import differing
 from viewsphere.errors import ModelError, RecipeError, StoreError
+from viewsphere.planning.models import model_specs
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.models import model_specs
 
 SAID = """\
 axes: file  # millimetres, z up

@@ -43,9 +43,9 @@ from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_model
 from viewsphere.run.crew_size import cores
 
 if TYPE_CHECKING:
+    from viewsphere.planning.plan import Plan
     from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.estimate import Estimate
-    from viewsphere.sampling.plan import Plan
 
 
 def new(
@@ -122,7 +122,7 @@ def _models_in(folder: Path) -> tuple[FoundFiles, ...]:
     """The model files that lie in a folder, if it is there."""
     if not folder.is_dir():
         return ()
-    from viewsphere.sampling.models import files_below
+    from viewsphere.planning.models import files_below
 
     return tuple(FoundFiles(*found) for found in files_below(folder))
 
@@ -233,8 +233,8 @@ def plan(
 ) -> None:
     """Report what a recipe would make: models, poses, frames, splits. No mesh is read without --models or --estimate."""
     with pause_collection():
+        from viewsphere.planning.plan import check_sidecars
         from viewsphere.run.opening import check_formats, prepare
-        from viewsphere.sampling.plan import check_sidecars
 
         loaded = load_recipe(recipe, changes)
         planned = prepare(loaded)
@@ -382,10 +382,10 @@ def render(
     if recipe is None or output is None:
         raise UserError(for_render(recipe, output))
     with waiting(f"planning {recipe}", quiet=json_), pause_collection():
+        from viewsphere.planning.plan import plan as make_plan
         from viewsphere.run.generate import generate
         from viewsphere.run.opening import to_append
         from viewsphere.run.share import shard_named
-        from viewsphere.sampling.plan import plan as make_plan
         from viewsphere.store import Store
 
         share = None if shard is None else shard_named(shard)

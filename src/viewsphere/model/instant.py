@@ -30,7 +30,7 @@ class Moment(Frozen):
 class Viewpoint(Brief):
     """Where a camera stands on a sphere around `target` (world metres; None: the box centre of object 1), and when.
 
-    `fill`, where the distance follows from it: the share of the picture that a model fills, see `sampling.filling`.
+    `fill`, where the distance follows from it: the share of the picture that a model fills, see `composing.filling`.
     """
 
     UNSAID = ("fill",)

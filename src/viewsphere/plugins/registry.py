@@ -43,9 +43,9 @@ SEAMS: dict[Kind, Seam] = {
     "formats": Seam("viewsphere.formats", "FORMAT"),
     "labels": Seam("viewsphere.labels", "LABEL"),
     "materials": Seam("viewsphere.materials", "MATERIAL"),
-    "motions": Seam("viewsphere.sampling.motion", "MOTION"),
-    "placers": Seam("viewsphere.sampling.placing", "PLACER"),
-    "samplers": Seam("viewsphere.sampling.samplers", "SAMPLER"),
+    "motions": Seam("viewsphere.composing.motion", "MOTION"),
+    "placers": Seam("viewsphere.composing.placing", "PLACER"),
+    "samplers": Seam("viewsphere.planning.samplers", "SAMPLER"),
 }
 
 

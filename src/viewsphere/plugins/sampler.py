@@ -16,15 +16,15 @@ Recipe = Any
 """`viewsphere.recipe.Recipe`: what a plug-in gets from higher layers has no type here."""
 
 Stock = Any
-"""`viewsphere.sampling.samplers.Stock`."""
+"""`viewsphere.planning.samplers.Stock`."""
 
 BoxOf = Callable[..., Any]
-"""`viewsphere.sampling.composition.BoxOf`."""
+"""`viewsphere.composing.composition.BoxOf`."""
 
 
 class SamplerSpec(SpecWithOptions):
     """Functions that make shots of a recipe. All randomness follows from the recipe's seed and from names
-    (`viewsphere.sampling.seeds`).
+    (`viewsphere.composing.seeds`).
     """
 
     KIND: ClassVar[Kind] = "samplers"
@@ -45,7 +45,7 @@ class SamplerSpec(SpecWithOptions):
     split: Callable[[Stock, str, int], str] = Field(description="the split of a frame")
     standing: Callable[[Stock, str, BoxOf], Iterator[Any]] = Field(
         description="the positions of a subject's objects as far as they are known before rendering, as "
-        "`viewsphere.sampling.samplers.Standing`: all poses once, unless positions are drawn for each pose. Raises RecipeError "
+        "`viewsphere.planning.samplers.Standing`: all poses once, unless positions are drawn for each pose. Raises RecipeError "
         "where there is no room"
     )
     shot: Callable[[Stock, str, Sequence[int], BoxOf, str, int], Shot] = Field(

@@ -11,12 +11,12 @@ from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.model.channel import picture_of
 from viewsphere.model.mistakes import shown
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.planning.plan import Plan
 from viewsphere.preview.frame import Picture, draw_sample
 from viewsphere.preview.shown import dataset_samples
 from viewsphere.preview.tiles import contact_sheet
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.memory import Frames
-from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
 
 WIDTH = 480

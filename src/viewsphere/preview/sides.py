@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 
 from viewsphere.assets.normalise import rotation
+from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import Axis, ModelSpec
@@ -18,7 +19,6 @@ from viewsphere.model.thing import Thing
 from viewsphere.preview.frame import Picture
 from viewsphere.preview.tiles import tiled
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.camera import looking
 
 SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0), ("right side", 270.0))
 

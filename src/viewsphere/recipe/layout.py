@@ -1,4 +1,4 @@
-"""How a recipe says where models that share a frame stand. Placers and their options, `viewsphere.sampling.placing` knows."""
+"""How a recipe says where models that share a frame stand. Placers and their options, `viewsphere.composing.placing` knows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a recipe says that things move. What the kinds of motion are, and their options, `viewsphere.sampling.motion` knows."""
+"""How a recipe says that things move. What the kinds of motion are, and their options, `viewsphere.composing.motion` knows."""
 
 from __future__ import annotations
 

@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 
 from viewsphere import plugins
+from viewsphere.composing.viewpoints.pose_files import PoseFile
+from viewsphere.composing.viewpoints.poses import world_turn
 from viewsphere.geometry.rotation import rigid
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.model.scene import IDENTITY
+from viewsphere.planning.models import numbered_specs
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.file import dump
 from viewsphere.recipe.formats import Formats, read_formats
@@ -24,9 +27,6 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.viewpoints import PoseList
 from viewsphere.run.scope import needs_of
 from viewsphere.run.stand_in import CATEGORY, SOURCE, StandIn, stand_in
-from viewsphere.sampling.models import numbered_specs
-from viewsphere.sampling.pose_files import PoseFile
-from viewsphere.sampling.viewpoints import world_turn
 from viewsphere.store.again import Again, AgainModel, Drafted
 
 RECIPE, SHOTS, MODELS, SIDECARS = "recipe.yaml", "shots.jsonl", "models", "symmetries"

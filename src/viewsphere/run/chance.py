@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 
+from viewsphere.composing.redraws import fewer, redraws_frames
 from viewsphere.limits import limits
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
+from viewsphere.planning.extension import Portion
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.extension import Portion
-from viewsphere.sampling.redraws import fewer, redraws_frames
 from viewsphere.store import Dataset
 
 MOST_READ = 5_000

@@ -8,10 +8,10 @@ from functools import cached_property
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
+from viewsphere.planning.extension import Portion
 from viewsphere.run.framing import Framing
 from viewsphere.run.models import mesh_digest
 from viewsphere.run.stages import Stages, StoredBoxes
-from viewsphere.sampling.extension import Portion
 from viewsphere.store import Row
 
 

@@ -18,6 +18,8 @@ from pathlib import Path
 from viewsphere.aside import temporary
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
+from viewsphere.planning.extension import Portion
+from viewsphere.planning.plan import Plan
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import write
@@ -25,8 +27,6 @@ from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.tasks import Worker
 from viewsphere.run.unused import Unused, unused
 from viewsphere.run.warm import load_kernels
-from viewsphere.sampling.extension import Portion
-from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, Row, Store
 
 SUBJECTS = 3

@@ -14,6 +14,8 @@ from operator import itemgetter
 from typing import Protocol
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.composing.composition import BoxOf
+from viewsphere.composing.redraws import redraws_frames
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels import Sight
@@ -22,10 +24,8 @@ from viewsphere.limits import limits
 from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
+from viewsphere.planning.plan import Plan
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.composition import BoxOf
-from viewsphere.sampling.plan import Plan
-from viewsphere.sampling.redraws import redraws_frames
 from viewsphere.store import Row
 from viewsphere.truth.moving import Ring, shot_floor
 from viewsphere.truth.raster.geometry import Geometry

@@ -16,6 +16,9 @@ from pathlib import Path
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError, WorkerDied, joined
 from viewsphere.model.share import ALL
+from viewsphere.planning.distances import Distances
+from viewsphere.planning.extension import Portion
+from viewsphere.planning.plan import Plan
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.chance import left_by_chance
@@ -33,9 +36,6 @@ from viewsphere.run.tasks import KernelTask, Kind, ModelTask
 from viewsphere.run.unpainted import unpainted
 from viewsphere.run.unused import unused
 from viewsphere.run.warm import is_compiled, precompile, told_to
-from viewsphere.sampling.distances import Distances
-from viewsphere.sampling.extension import Portion
-from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, Row, Store, located
 from viewsphere.store.credits import write_credits
 from viewsphere.store.shots.checksums import damaged_files

@@ -7,20 +7,20 @@ from itertools import count
 from os import PathLike
 from typing import Any
 
+from viewsphere.composing.seeds import generator
 from viewsphere.errors import UserError
 from viewsphere.model.mistakes import shown
 from viewsphere.model.notebook import Shown
 from viewsphere.model.quantity import quantity
 from viewsphere.model.sample import Sample
 from viewsphere.model.share import Share
+from viewsphere.planning.plan import Plan, plan
+from viewsphere.planning.turns import Turns
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
 from viewsphere.run.share import known_to_loaders, share_of, share_of_rank, share_of_worker
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.plan import Plan, plan
-from viewsphere.sampling.seeds import generator
-from viewsphere.sampling.turns import Turns
 
 
 class Frames(Shown, Iterable[Sample]):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from viewsphere.errors import StoreError, UserError, ViewsphereError
+from viewsphere.planning.extension import Portion
 from viewsphere.run.executors import Job, Listed, hired
 from viewsphere.run.opening import check_whether_same
 from viewsphere.run.progress import Listener, Progress
@@ -15,7 +16,6 @@ from viewsphere.run.replanning import AnotherPlan, Replanned
 from viewsphere.run.stages import StoredBoxes
 from viewsphere.run.tasks import Damaged, ModelTask
 from viewsphere.run.warm import compile_kernels
-from viewsphere.sampling.extension import Portion
 from viewsphere.store import PlanRecord, Row, Store
 
 Errors = dict[str, ViewsphereError]

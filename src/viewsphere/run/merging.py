@@ -12,6 +12,7 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
+from viewsphere.composing.viewpoints.pose_numbers import kept, names_of
 from viewsphere.errors import StoreError, UserError
 from viewsphere.labels import (
     IdKind,
@@ -28,7 +29,6 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.quantity import quantity
 from viewsphere.model.sample import MERGED, ObjectAnnotation, Sample
 from viewsphere.run.progress import Listener, Progress
-from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode, located
 from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignFrame, Loaded

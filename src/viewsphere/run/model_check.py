@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from viewsphere.errors import each
+from viewsphere.planning.distances import Distances
+from viewsphere.planning.plan import Plan
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.distances import Distances
-from viewsphere.sampling.plan import Plan
 
 
 def check_models(planned: Plan, tell: Listener = unheard) -> tuple[str, ...]:

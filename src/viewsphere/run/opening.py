@@ -11,16 +11,16 @@ from viewsphere.labels import on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Sensor
+from viewsphere.planning.checks.models import check_needs
+from viewsphere.planning.engine_digest import engine_digest
+from viewsphere.planning.extension import Portion, extend, resumed, whole
+from viewsphere.planning.fitting import LOOK
+from viewsphere.planning.plan import Plan, check_engine, check_images, plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import writable
 from viewsphere.run.scope import is_computed, needs_of, not_held, scope_of_plan
-from viewsphere.sampling.checks import check_needs
-from viewsphere.sampling.engine_digest import engine_digest
-from viewsphere.sampling.extension import Portion, extend, resumed, whole
-from viewsphere.sampling.fitting import LOOK
-from viewsphere.sampling.plan import Plan, check_engine, check_images, plan
 from viewsphere.store import Part, PlanRecord, Store, check_codecs
 
 

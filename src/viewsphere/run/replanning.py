@@ -10,9 +10,9 @@ from pathlib import Path
 from viewsphere.errors import StoreError, UserError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
+from viewsphere.planning.extension import Portion, resumed
+from viewsphere.planning.plan import Plan, plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.extension import Portion, resumed
-from viewsphere.sampling.plan import Plan, plan
 from viewsphere.store import PlanRecord, Simulated, Store
 
 MOST_FOLDERS = 8

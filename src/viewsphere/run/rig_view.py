@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.composing.viewpoints.sequence_poses import poses_of
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics, Scan
 from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Rig, Sensor
+from viewsphere.planning.rigs import rig_of
+from viewsphere.planning.samplers import lens
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.rigs import rig_of
-from viewsphere.sampling.samplers import lens
-from viewsphere.sampling.sequence_poses import poses_of
 
 Float = NDArray[np.float64]
 

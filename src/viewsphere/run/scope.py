@@ -13,9 +13,9 @@ from viewsphere.formats._refusals import lacking_labels
 from viewsphere.labels import Needs, channel_labels, labels, on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
+from viewsphere.planning.plan import Plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
 from viewsphere.store.foreign import ForeignDataset
 

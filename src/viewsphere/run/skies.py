@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from viewsphere.sampling.plan import Plan
+from viewsphere.planning.plan import Plan
 
 MOST_SKIES = 64
 """Files that are decoded before rendering, half a second each of 4,096 x 2,048 texels; the others are when their turn comes."""

@@ -21,6 +21,8 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.metadata.traits import traits_of, with_body_parts
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts
+from viewsphere.composing.redraws import is_redrawn
+from viewsphere.composing.viewpoints.camera import inside_box
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
@@ -33,8 +35,6 @@ from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.traits import Traits
 from viewsphere.rendering.ground.material import ground_stamps
 from viewsphere.run.walls import Step, check_rooms, check_way
-from viewsphere.sampling.camera import inside_box
-from viewsphere.sampling.redraws import is_redrawn
 from viewsphere.store import ModelInfo, Store
 from viewsphere.truth.raster.visibility import with_ground
 from viewsphere.truth.shot_views import ShotViews
@@ -43,7 +43,7 @@ from viewsphere.zoo import build_zoo_model, rooms_of
 
 if TYPE_CHECKING:
     from viewsphere.engines import Engine, Stage  # which takes a third of a worker's start
-    from viewsphere.sampling.plan import Plan
+    from viewsphere.planning.plan import Plan
 
 WARM_BYTES = 400_000_000
 """Of models that are kept, the last ones used."""
@@ -163,7 +163,7 @@ class Stages:
 
     def check_distances(self, planned: Plan, subject: str) -> None:
         """Raise RecipeError if a pose's camera would stand inside what stands in a subject's frames."""
-        from viewsphere.sampling.distances import Distances
+        from viewsphere.planning.distances import Distances
 
         problem = Distances(planned, self.box).problem(subject)
         with planned.recipe.located():
@@ -175,7 +175,7 @@ class Stages:
 
         Scenery that is drawn for each model or frame is looked at when its shot is rendered.
         """
-        from viewsphere.sampling.distances import Distances
+        from viewsphere.planning.distances import Distances
 
         scene = planned.recipe.scene
         if planned.composition is None or not scene.has_fixed_scenery or is_redrawn(planned.recipe):

@@ -15,11 +15,11 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
+from viewsphere.planning.extension import Portion
 from viewsphere.run.composing import Composer
 from viewsphere.run.models import Models
 from viewsphere.run.stages import Stages, StoredBoxes
 from viewsphere.run.warm import compile_kernels
-from viewsphere.sampling.extension import Portion
 from viewsphere.store import Row, Store
 
 Kind = Literal["model", "same model", "damaged model"]

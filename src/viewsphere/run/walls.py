@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.composing.viewpoints.camera import inside_box
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.classes import STUFF_IDS, stuff_of
 from viewsphere.model.thing import Thing
-from viewsphere.sampling.camera import inside_box
 
 Float = NDArray[np.float64]
 

@@ -18,6 +18,7 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.errors import UserError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.kernels import entries
@@ -36,12 +37,11 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.model.tracks import Tracks
 from viewsphere.model.traits import Traits
+from viewsphere.planning.engine_digest import engine_digest
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.run.stages import render_sample
-from viewsphere.sampling.camera import looking
-from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.store import encode
 from viewsphere.truth.shot_views import ShotViews
 

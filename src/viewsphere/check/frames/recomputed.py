@@ -18,12 +18,12 @@ from viewsphere.check.frames.differences import Difference, differences, in_word
 from viewsphere.check.report import in_short
 from viewsphere.errors import UserError
 from viewsphere.files import read_bytes, read_text
+from viewsphere.planning.engine_digest import script_digest
+from viewsphere.planning.extension import NOTHING, Portion, extend
+from viewsphere.planning.plan import Plan
 from viewsphere.run.composing import Composer
 from viewsphere.run.replanning import AnotherPlan, Replanned
 from viewsphere.run.stages import Stages, StoredBoxes
-from viewsphere.sampling.engine_digest import script_digest
-from viewsphere.sampling.extension import NOTHING, Portion, extend
-from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, PlanRecord, Row, kept_shot
 from viewsphere.store.texts import parsed
 

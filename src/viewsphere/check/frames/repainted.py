@@ -19,8 +19,8 @@ from viewsphere.model.channel import PASSES
 from viewsphere.model.files import LOSSY, Files
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
-from viewsphere.sampling.engine_digest import engine_digest
-from viewsphere.sampling.fitting import LOOK
+from viewsphere.planning.engine_digest import engine_digest
+from viewsphere.planning.fitting import LOOK
 from viewsphere.store import Dataset, Row, decode, encode
 from viewsphere.store.shots.manifest import Manifest
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 from viewsphere.run.executors._jobs import LIVES, Job, Listed, Outcome, Queue, Work, ignored
 
 if TYPE_CHECKING:
-    from viewsphere.sampling.extension import Portion
+    from viewsphere.planning.extension import Portion
 
 __all__ = ["LIVES", "Crew", "Job", "Listed", "Outcome", "Queue", "Work", "hired"]
 

@@ -20,8 +20,8 @@ from viewsphere.run.executors._hands import OUT_OF_MEMORY, Hand, belong_to_paren
 from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored
 
 if TYPE_CHECKING:
+    from viewsphere.planning.extension import Portion
     from viewsphere.run.tasks import Worker
-    from viewsphere.sampling.extension import Portion
 
 ADVICE = ", the last time while it was alone: give it more memory, or ask for smaller pictures or models"
 

@@ -30,8 +30,8 @@ except ImportError:
     raise MissingExtraError("--ray: expected the package ray, found none: pip install 'viewsphere[ray]'") from None
 
 if TYPE_CHECKING:
+    from viewsphere.planning.extension import Portion
     from viewsphere.run.tasks import Worker
-    from viewsphere.sampling.extension import Portion
 
 TICK = 1.0
 """Seconds between two looks at which machines there are, and how far workers are with their jobs."""

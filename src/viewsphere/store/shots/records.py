@@ -166,7 +166,7 @@ class Part:
     their poses.
     `supplies`: (number of an earlier part, channels) that this one added to all frames of that part; they lie in shots
     of their own. `shot_frames`: most positions of a shot. `settings`: digests of what frames that are appended have to share.
-    `new_poses`: how many poses no earlier part had; `pose_names`: their digests (see `sampling.extension`), None where they
+    `new_poses`: how many poses no earlier part had; `pose_names`: their digests (see `planning.extension`), None where they
     follow from the recipe. `dealt_splits`: where splits are by model or by scene, the split of each that no earlier part had.
     `merged`: the part came from another data set, where its shots and models may have had other names and numbers.
     """

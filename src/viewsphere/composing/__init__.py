@@ -1,0 +1,1 @@
+"""From a row to a shot: who stands where, moves how and is seen from where, in which light."""

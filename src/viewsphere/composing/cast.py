@@ -1,0 +1,59 @@
+"""Who stands beside whom: the models that share a frame."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from heapq import nsmallest
+
+from viewsphere.composing.seeds import Names, share
+from viewsphere.model.model_spec import ModelSpec
+
+
+def companions(seed: int, spec: ModelSpec, others: Iterable[ModelSpec], count: int, names: Names) -> tuple[ModelSpec, ...]:
+    """`count` of `others` to stand beside a model, which is none of them.
+
+    Each place goes to the one whose number for it is lowest (rendezvous hashing): one model more in the recipe changes
+    only the places that it takes.
+    """
+    left = {other.key: other for other in others if other.key != spec.key}
+    chosen: list[ModelSpec] = []
+    for slot in range(count):
+        key = min(left, key=lambda k: (share(seed, "company", *names, str(slot), k), k))
+        chosen.append(left.pop(key))
+    return tuple(chosen)
+
+
+def mixed(seed: int, models: Sequence[ModelSpec], count: int, names: Names, repeat: bool) -> tuple[ModelSpec, ...]:
+    """`count` of the models to stand together, each once at most unless they may `repeat`.
+
+    They are those whose numbers are lowest: one model more in the recipe takes only places of its own, one at most
+    where none repeats.
+    """
+    if not repeat:
+        return tuple(nsmallest(count, models, key=lambda spec: (share(seed, "cast", *names, spec.key), spec.key)))
+    return tuple(
+        min(models, key=lambda spec: (share(seed, "cast", *names, str(slot), spec.key), spec.key)) for slot in range(count)
+    )
+
+
+def balanced(
+    seed: int, sizes: Mapping[str, int], models: Mapping[str, int], repeat: bool
+) -> dict[str, tuple[tuple[str, int], ...]]:
+    """How many objects of which categories stand in each scene: all categories have as many over the scenes up to any one, to
+    one, as far as they have enough models.
+
+    `sizes`: of each scene, in their order, how many objects it has; `models`: of each category how many models there are, which
+    stand in a scene once at most unless they may `repeat`. A scene minds those before it, and none behind it.
+    """
+    had = dict.fromkeys(models, 0)
+    found: dict[str, tuple[tuple[str, int], ...]] = {}
+    for scene, size in sizes.items():
+        own, order = Counter[str](), sorted(models, key=lambda name: share(seed, "category", scene, name))
+        for _ in range(size):
+            free = [name for name in order if repeat or own[name] < models[name]]
+            least = min(free, key=lambda name: (had[name], own[name]))
+            had[least] += 1
+            own[least] += 1
+        found[scene] = tuple(own.items())
+    return found

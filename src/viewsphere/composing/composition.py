@@ -1,0 +1,427 @@
+"""A recipe's scenes made concrete: targets on the floor, and what stands around them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.composing.cast import companions
+from viewsphere.composing.filling import shape_of
+from viewsphere.composing.layouts import BoxOf, Laid, Remembering, laid, remembered_as, shape, unremembered
+from viewsphere.composing.placing import Footprint, Obstacles, Room, footprint, obstacles, standing
+from viewsphere.composing.redraws import SAME_MODELS, fewer, least_objects, redraw_names, redraws_place
+from viewsphere.composing.scene.blend_scene import BlendScenery
+from viewsphere.composing.scene.scenery import (
+    SceneryPiece,
+    composed,
+    draw_names,
+    draw_place,
+    free_floor,
+    place_bays,
+    place_lanes,
+    place_pavements,
+    place_pieces,
+    place_surfaces,
+    plane_images,
+    plane_pieces,
+    plane_spec,
+)
+from viewsphere.composing.seeds import Names, generator, scene_generators
+from viewsphere.composing.sendable import Sendable
+from viewsphere.composing.time_steps import Schedule, TimedPoses
+from viewsphere.composing.viewpoints.poses import Poses
+from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import IDENTITY, Matrix4, Vector
+from viewsphere.model.thing import Motion, Thing
+from viewsphere.recipe.draws import drawn
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scenery import Labels
+from viewsphere.store import Category
+from viewsphere.zoo.places import Bay, Lane, Surface
+
+__all__ = ["BoxOf", "Composition", "Moved", "Numbering", "center", "center_of_all", "compose", "still"]
+
+Built = Callable[[float, float], Obstacles | None]
+"""Gives the parts of a place that stand up to a height, and up to a distance from the middle, metres."""
+
+ABOVE_KERBS = 0.2
+"""Metres above a zoo's road up to which its pieces are ground: kerbs, pavements and driveways are 0.14 m high at most."""
+
+Moved = Callable[[Thing, SceneryPiece], Thing]
+"""A piece of scenery with its motion."""
+
+
+def _as_it_stands(thing: Thing, piece: SceneryPiece) -> Thing:
+    return thing
+
+
+@dataclass(frozen=True, eq=False)
+class Composition(Sendable):
+    """What a recipe with a place, company or planes puts into its frames; no mesh is touched before `things`.
+
+    `subjects`: what the frames are about. `groups` are the models that may meet: those of one split where splits are by model.
+    """
+
+    recipe: Recipe
+    subjects: tuple[str, ...]
+    groups: dict[str, tuple[ModelSpec, ...]]  # model key -> those of its split
+    images: tuple[tuple[str, ...], ...]
+    recipe_categories: tuple[Category, ...]
+    blend: BlendScenery | None = None
+
+    @cached_property
+    def categories(self) -> tuple[Category, ...]:
+        """The recipe's categories, then those of labelled scenery in order of appearance."""
+        known = {c.name: c for c in self.recipe_categories}
+        for name in self._labelled_categories():
+            known.setdefault(name, Category(len(known) + 1, name, ""))
+        return tuple(known.values())
+
+    def _labelled_categories(self) -> Iterator[str]:
+        place = self.recipe.scene.place
+        if place is not None and place.labels == "own":
+            for names in self._place_draws:
+                laid = draw_place(self.recipe, place, names).pieces if place.name else ()
+                yield from (piece.category for piece in laid)
+            if not place.name:
+                yield place.category
+        if self.blend is not None:
+            yield from (one.category for one in self.blend.labelled)
+        yield from (entry.category for entry in self.recipe.scene.planes if entry.labels == "own")
+
+    @cached_property
+    def _place_draws(self) -> tuple[tuple[str, ...], ...]:
+        place = self.recipe.scene.place
+        return tuple(dict.fromkeys(draw_names(place.draw, subject, None) for subject in self.subjects)) if place else ()
+
+    def _category_id(self, category: str, labels: Labels, /) -> int:
+        return self._ids[category] if labels == "own" else 0
+
+    @cached_property
+    def _ids(self) -> dict[str, int]:
+        return {c.name: c.id for c in self.categories}
+
+    @cached_property
+    def models(self) -> tuple[ModelSpec, ...]:
+        """The labelled scenery's models, each once: they are kept in the data set as the recipe's own are."""
+        return tuple({spec.key: spec for spec in self._labelled_models()}.values())
+
+    def _labelled_models(self) -> Iterator[ModelSpec]:
+        place = self.recipe.scene.place
+        if place is not None and place.labels == "own":
+            for names in self._place_draws:
+                yield from (piece.model for piece in self._place(names))
+        if self.blend is not None:
+            yield from self.blend.models(self._category_id)
+        for entry, files in zip(self.recipe.scene.planes, self.images, strict=True):
+            if entry.labels == "own":
+                yield from (plane_spec(self.recipe, entry, file, self._category_id) for file in files)
+
+    @cached_property
+    def most_scenery(self) -> int:
+        """Most pieces of labelled scenery in one frame."""
+        scene = self.recipe.scene
+        count = sum(entry.most for entry in scene.planes if entry.labels == "own")
+        count += 0 if self.blend is None else len(self.blend.labelled)
+        if scene.place is not None and scene.place.labels == "own":
+            place = scene.place
+            count += max(len(draw_place(self.recipe, place, n).pieces) if place.name else 1 for n in self._place_draws)
+        return count
+
+    def cast(self, spec: ModelSpec, pose: str | None, redraw: int = 0) -> tuple[ModelSpec, ...]:
+        """The targets of a frame: its model, and those drawn to stand beside it.
+
+        `pose` is the pose's name; None where nothing is drawn for each frame. `redraw` is the scene's.
+        """
+        entry = self.recipe.scene.company
+        if entry is None:
+            return (spec,)
+        names = draw_names(entry.draw, spec.key, pose)
+        count = entry.number
+        if entry.count is not None:
+            count = drawn(entry.count, scene_generators(self.recipe.seed, names), ("company", "count"))
+            count = max(least_objects(self.recipe, count), count - fewer(self.recipe, redraw))
+        names += redraw_names(redraw, SAME_MODELS)
+        return (spec, *companions(self.recipe.seed, spec, self.groups[spec.key], count, names))
+
+    def targets(
+        self,
+        spec: ModelSpec,
+        pose: str | None,
+        box_of: BoxOf,
+        again: Names = (),
+        memory: Remembering = unremembered,
+        seen_from: tuple[float, float] | None = None,
+        redraw: int = 0,
+    ) -> tuple[Thing, ...]:
+        """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room. `again`
+        names another draw of where company stands; `seen_from`: azimuth and elevation, degrees, of the frame's camera.
+        """
+        own = standing(box_of(spec))
+        company = self.company(spec, pose, box_of, own, again, memory, seen_from, redraw)
+        return still((spec,), [own]) if company is None else still((spec, *company.members), [own, *company.poses])
+
+    def company(
+        self,
+        spec: ModelSpec,
+        pose: str | None,
+        box_of: BoxOf,
+        own: Matrix4,
+        again: Names,
+        memory: Remembering,
+        seen_from: tuple[float, float] | None = None,
+        redraw: int = 0,
+    ) -> Laid | None:
+        """What is placed beside a frame's model that stands there; None where nothing is."""
+        entry = self.recipe.scene.company
+        if entry is None:
+            return None
+        cast, names = self.cast(spec, pose, redraw)[1:], (*draw_names(entry.draw, spec.key, pose), *again)
+        taken = ((shape(spec, box_of), own),)
+        keep = partial(memory, remembered_as(entry, cast, ("company", spec.key, *names)))
+        free, moves = self.free_floor(spec.key, pose, redraw), self.recipe.time is not None
+        built = self.built(spec.key, pose, redraw, IDENTITY)
+        room = Room(free, entry.gap, entry.spots, taken, seen_from=seen_from, memory=keep, moves=moves, built=built)
+        rng = partial(generator, self.recipe.seed, "layout", *names)
+        return laid(entry.layout, entry.orientation, cast, room, box_of, rng)
+
+    def place_names(self, subject: str, pose: str | None, redraw: int = 0) -> Names:
+        """The names that a scene's place is drawn by."""
+        place = self.recipe.scene.place
+        names = draw_names(place.draw, subject, pose) if place else ()
+        return names + redraw_names(redraw) if redraw and redraws_place(self.recipe) else names
+
+    def free_floor(self, subject: str, pose: str | None, redraw: int = 0) -> Footprint | None:
+        """The floor that the place leaves free, None for all of it."""
+        place = self.recipe.scene.place
+        return free_floor(self.recipe, place, self.place_names(subject, pose, redraw)) if place else None
+
+    def built(self, subject: str, pose: str | None, redraw: int, world_from_room: Matrix4) -> Built | None:
+        """Gives what of the mesh of a place's file stands up to a height above a floor; None for a zoo's place, whose free
+        floor and surfaces are clear.
+        """
+        place = self.recipe.scene.place
+        if place is None or place.name:
+            return None
+        piece = self._place(self.place_names(subject, pose, redraw))[0]
+        room_from_piece = composed(_inverse(world_from_room), piece.world_from_piece)
+        return lambda height, reach: built_of((piece.model, None), room_from_piece, height, reach)
+
+    def furniture(self, subject: str, pose: str | None, redraw: int) -> Built | None:
+        """Gives the parts of a zoo place's pieces that stand on its roads, bays and pavements, such as lamp posts and parked
+        cars, up to a height above the floor; None where the place is none of the zoo's.
+        """
+        place = self.recipe.scene.place
+        if place is None or not place.name:
+            return None
+        pieces = self._place(self.place_names(subject, pose, redraw))
+        placed = tuple(sorted(((p.model, p.world_from_piece) for p in pieces), key=lambda one: one[0].key))
+        return lambda height, reach: furniture_of(placed, height, reach)
+
+    def lanes(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
+        """The lanes of the place where it stands, world axes; none where it has none."""
+        place = self.recipe.scene.place
+        return place_lanes(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
+
+    def bays(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Bay, ...]:
+        """The parking bays of the place where it stands, in world axes; empty for places without."""
+        place = self.recipe.scene.place
+        return place_bays(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
+
+    def pavements(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Lane, ...]:
+        """The pavements of the place where it stands, in world axes; empty for places without."""
+        place = self.recipe.scene.place
+        return place_pavements(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
+
+    def surfaces(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Surface, ...]:
+        """Where things may stand above the floor of the place, world axes; none where it has none."""
+        place = self.recipe.scene.place
+        return place_surfaces(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
+
+    def things(
+        self,
+        subject: str,
+        targets: Sequence[Thing],
+        pose: str | None,
+        box_of: BoxOf,
+        moved: Moved = _as_it_stands,
+        redraw: int = 0,
+    ) -> tuple[Thing, ...]:
+        """All that is placed: targets, labelled scenery, then the scenery that is background.
+
+        `moved` gives pieces of scenery that the recipe moves (`piece.motion`) their motion.
+        """
+        pieces = self._pieces(subject, targets, pose, box_of, redraw)
+        labelled = [p for p in pieces if p.labels == "own"]
+        rest = [p for p in pieces if p.labels != "own"]
+        ids = [*range(len(targets) + 1, len(targets) + len(labelled) + 1), *[0] * len(rest)]
+        return tuple(targets) + tuple(
+            moved(Thing(id=i, model=p.model, motion=Motion.still(p.world_from_piece), scenery=True), p)
+            for i, p in zip(ids, labelled + rest, strict=True)
+        )
+
+    def _pieces(
+        self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf, redraw: int
+    ) -> list[SceneryPiece]:
+        place = self.recipe.scene.place
+        pieces: list[SceneryPiece] = []
+        if place is not None:
+            pieces += self._place(self.place_names(subject, pose, redraw))
+        if self.blend is not None:
+            pieces += self.blend.pieces(subject, pose, self._category_id)
+        prints = [footprint(box_of(t.model), t.world_from_object) for t in targets]
+        return pieces + list(
+            plane_pieces(self.recipe, self.images, subject, pose, prints, self._category_id, redraw_names(redraw))
+        )
+
+    @cached_property
+    def _place(self) -> Callable[[Names], tuple[SceneryPiece, ...]]:
+        """The place's pieces for a draw; the last draws are kept, because many shots share one."""
+        entry = self.recipe.scene.place
+        assert entry is not None
+
+        @lru_cache(maxsize=4)
+        def pieces(names: Names) -> tuple[SceneryPiece, ...]:
+            return place_pieces(self.recipe, entry, names, self._category_id)
+
+        return pieces
+
+    def center(self, targets: Sequence[Thing], box_of: BoxOf) -> Vector | None:
+        """What the camera looks at: the centre of the box around all targets; None, which says the same, for one."""
+        return None if len(targets) == 1 else center_of_all(targets, box_of)
+
+
+@dataclass(frozen=True, eq=False)
+class Numbering:
+    """The number of what a draw is for, in the data set's order: of a subject, of a frame, or of a sequence. `schedules` are
+    the subjects' own, none where every subject is taken from all poses.
+    """
+
+    subjects: tuple[str, ...]
+    views: Poses
+    schedules: tuple[Schedule, ...] = ()
+
+    def __call__(self, names: Names) -> int:
+        """The number of a subject's name, or of a subject's and a frame's, or a sequence's."""
+        subject = self._subjects[names[0]]
+        if len(names) == 1:
+            return subject
+        pose = self._poses[names[1]]
+        if isinstance(self.views, SequencePoses):  # whose subjects are the inner loop
+            return pose * len(self.subjects) + subject
+        if not self.schedules:
+            return subject * len(self.views) + pose
+        return sum(schedule.count for schedule in self.schedules[:subject]) + self.schedules[subject].position(pose)
+
+    @cached_property
+    def _subjects(self) -> dict[str, int]:
+        return {subject: i for i, subject in enumerate(self.subjects)}
+
+    @cached_property
+    def _poses(self) -> dict[str, int]:
+        drawn = self.views.base if isinstance(self.views, SequencePoses) else self.views
+        return {drawn.name(i): i for i in range(len(drawn))}
+
+
+def compose(
+    recipe: Recipe,
+    subjects: tuple[str, ...],
+    specs: tuple[ModelSpec, ...],
+    own: tuple[Category, ...],
+    splits: Sequence[str],
+    numbering: Numbering,
+) -> Composition:
+    """The composition of a recipe with these subjects, numbered so; `splits[i]` is what keeps `specs[i]` from the others:
+    its split, or one name for all.
+
+    Raises RecipeError for pictures and places that are not there, and where there are too few models for company.
+    """
+    members: defaultdict[str, list[ModelSpec]] = defaultdict(list)
+    for spec, split in zip(specs, splits, strict=True):
+        members[split].append(spec)
+    entry, place = recipe.scene.company, recipe.scene.place
+    for split, found in members.items() if entry else ():
+        if entry and len(found) <= entry.number:
+            of = f" of split {split!r}" if split else ""
+            raise RecipeError(
+                f"scene.company.count: expected at most {len(found) - 1}, as there are {len(found)} models{of}; "
+                f"found {entry.number}: add models, or ask for less company"
+            )
+    made = Composition(
+        recipe,
+        subjects,
+        {spec.key: tuple(members[split]) for spec, split in zip(specs, splits, strict=True)},
+        plane_images(recipe),
+        own,
+        _blend(recipe, numbering),
+    )
+    if place is not None:
+        place_pieces(recipe, place, draw_names(place.draw, subjects[0], ""), lambda category, labels: 1)
+    return made
+
+
+@lru_cache(maxsize=4)
+def built_of(shown: tuple[ModelSpec, None], room_from_piece: Matrix4, height: float, reach: float) -> Obstacles | None:
+    """The triangles of a model up to a height above a room's floor; the last results are kept."""
+    mesh = shape_of(shown)
+    return obstacles(transform(np.array(room_from_piece), mesh.vertices), mesh.triangles, height, reach)
+
+
+@lru_cache(maxsize=4)
+def furniture_of(pieces: tuple[tuple[ModelSpec, Matrix4], ...], height: float, reach: float) -> Obstacles | None:
+    """The triangles of a place's pieces between its kerbs and a height; the last results are kept. Pieces of one model follow
+    one another, so that each mesh is read once.
+    """
+    vertices, triangles, count = list[NDArray[np.float64]](), list[NDArray[np.int32]](), 0
+    for spec, world_from_piece in pieces:
+        mesh = shape_of((spec, None))
+        placed = transform(np.array(world_from_piece), mesh.vertices)
+        if (placed[:, :2].min(axis=0) <= reach).all() and (placed[:, :2].max(axis=0) >= -reach).all():
+            vertices.append(placed)
+            triangles.append(mesh.triangles + np.int32(count))
+            count += len(placed)
+    return obstacles(np.concatenate(vertices), np.concatenate(triangles), height, reach, ABOVE_KERBS) if count else None
+
+
+def _inverse(pose: Matrix4) -> Matrix4:
+    rows: list[list[float]] = np.linalg.inv(np.array(pose)).tolist()
+    return tuple(map(tuple, rows))  # type: ignore[return-value]
+
+
+def still(cast: Sequence[ModelSpec], poses: Sequence[Matrix4]) -> tuple[Thing, ...]:
+    """Objects 1, 2, ... that stand still."""
+    return tuple(Thing(id=i, model=m, motion=Motion.still(w)) for i, (m, w) in enumerate(zip(cast, poses, strict=True), 1))
+
+
+def center(thing: Thing, box_of: BoxOf) -> Vector:
+    """What a camera looks at that has no target of its own: the centre of the object's box, world metres."""
+    x, y, z = transform(thing.world_from_object, box_of(thing.model, thing.step).mean(axis=0)).tolist()
+    return x, y, z
+
+
+def center_of_all(things: Sequence[Thing], box_of: BoxOf) -> Vector:
+    """The centre of the box around all of them, world metres."""
+    corners = np.concatenate([transform(t.world_from_object, box_of(t.model, t.step)) for t in things])
+    x, y, z = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
+    return x, y, z
+
+
+def _blend(recipe: Recipe, numbering: Numbering) -> BlendScenery | None:
+    """The recipe's .blend file; frames take turns in the order of their numbers. Raises RecipeError where it does not fit."""
+    entry, views = recipe.scene.blend, numbering.views
+    if entry is None:
+        return None
+
+    moments = views.moments if isinstance(views, TimedPoses) and entry.frames is not None else ()
+    seconds = {moment.frame: moment.seconds for moment in moments if moment is not None}
+    made = BlendScenery(recipe, entry, numbering, dict(sorted(seconds.items())))
+    made.check()
+    return made

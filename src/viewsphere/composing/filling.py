@@ -1,0 +1,154 @@
+"""Cameras whose distance follows from how much of the picture is filled: the projected models decide, as their labels do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.cache import load_normalised
+from viewsphere.composing.viewpoints.camera import looking
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.box import projected_bounds
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.camera import Camera
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing, TimeStep
+from viewsphere.recipe.aim import FARTHEST
+from viewsphere.zoo import build_zoo_model
+
+Float = NDArray[np.float64]
+
+CLOSE_ENOUGH = 1e-9
+"""How far the share that is filled may be from the one that is asked for, as a part of it."""
+
+MOST_STEPS = 100
+"""Distances that are tried before a search is given up, as where a lens shows a model in part before it fills its share."""
+
+NEAREST = 1e9
+"""How many times nearer than its own length a model is looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A model: vertices (N, 3) in its axes, metres; triangles (M, 3); and which vertices (N,) are corners."""
+
+    vertices: Float
+    triangles: NDArray[np.int32]
+    is_used: NDArray[np.bool_]
+
+
+@lru_cache(maxsize=64)
+def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> Shape:
+    """The shape of a model at a time step; the last ones are kept. Raises ModelError if its file cannot be used."""
+    spec, step = shown
+    mesh = load_normalised(spec, build_zoo_model, step=step)
+    is_used = np.zeros(len(mesh.vertices), np.bool_)
+    is_used[mesh.triangles] = True
+    return Shape(mesh.vertices.astype(np.float64), mesh.triangles, is_used)
+
+
+def filled(shot: Shot, together: bool) -> Shot:
+    """The shot with cameras at the distances at which the frame's model, or all targets `together`, fill as much of the
+    pictures of the rig's first sensor as their viewpoints ask for. A viewpoint's own distance is a factor then.
+
+    Raises RecipeError where no distance is right.
+    """
+    if all(now.viewpoint is None or now.viewpoint.fill is None for now in shot.instants):
+        return shot
+    instants = tuple(_filled(shot, i, together) for i in range(len(shot.instants)))
+    return shot.model_copy(update={"instants": instants})
+
+
+def _filled(shot: Shot, i: int, together: bool) -> Instant:
+    now = shot.instants[i]
+    view = now.viewpoint
+    targets = [there for thing in shot.targets(together) if (there := thing.at(i)).is_there]
+    if view is None or view.fill is None or not targets:
+        return now
+    placed = [_placed(thing) for thing in targets]
+
+    def fill_at(distance: float) -> float:
+        at = _moved(now, view, distance)
+        return share_filled(shot.model_copy(update={"instants": (at,)}).camera(0), placed)
+
+    distance = distance_of(view.fill, fill_at, _reach(placed, now))
+    if distance is None:
+        raise RecipeError(
+            f"viewpoints.distance: expected a share of the picture that {targets[0].key} fills from some distance; found "
+            f"{view.fill:g} (pose {view.index}): look at the model (target: center), or ask for another share"
+        )
+    return _moved(now, view, distance * view.distance)
+
+
+def _moved(now: Instant, view: Viewpoint, distance: float) -> Instant:
+    """The instant with its camera at another distance."""
+    there = looking(view.model_copy(update={"distance": distance}), now.focus, index=now.index)
+    return now.model_copy(update={"world_from_rig": there.world_from_rig, "viewpoint": there.viewpoint})
+
+
+def _placed(thing: Thing) -> Shape:
+    """A thing's shape, in the world."""
+    shape = shape_of((thing.model, thing.step))
+    return Shape(transform(np.array(thing.world_from_object), shape.vertices), shape.triangles, shape.is_used)
+
+
+def _reach(placed: Sequence[Shape], now: Instant) -> float:
+    """Metres from what the camera looks at to the farthest vertex."""
+    return max(float(np.linalg.norm(shape.vertices - np.array(now.focus), axis=1).max()) for shape in placed) or 1.0
+
+
+def share_filled(camera: Camera, placed: Sequence[Shape]) -> float:
+    """The larger of box width / picture width and box height / picture height, of the box around all shapes, which stand in
+    the world, as the camera projects them: that of the label `box2d_unclipped`. Infinite where it does not show all of them.
+    """
+    boxes = [
+        projected_bounds(camera, s.vertices, s.triangles, (0, len(s.triangles)), (0, len(s.vertices)), s.is_used)
+        for s in placed
+    ]
+    if not all(whole and bounds for bounds, whole in boxes):
+        return math.inf
+    corners = np.array([bounds for bounds, _ in boxes])
+    width, height = (corners[:, 2:].max(axis=0) - corners[:, :2].min(axis=0)).tolist()
+    return max(width / camera.width, height / camera.height)
+
+
+def distance_of(fill: float, fill_at: Callable[[float], float], reach: float) -> float | None:
+    """The distance, metres, to twelve digits, at which `fill_at`, which falls with it, is `fill`; None if there is none up to
+    `FARTHEST`. `reach`: a length like the models'.
+
+    False position (the Illinois way, Dowell and Jarratt 1971) between a near and a far end, by the inverse of the distance, to
+    which shares are nearly proportional; the ends are halved while all that is known of the near one is that it is too near.
+    """
+    near = far = 1 / reach
+    above = below = fill_at(1 / near) - fill
+    while below > 0:
+        far /= 2
+        if far * FARTHEST < 1:
+            return None
+        below = fill_at(1 / far) - fill
+    while above < 0:
+        near *= 2
+        if near * reach > NEAREST:
+            return None
+        above = fill_at(1 / near) - fill
+    last = 0.0
+    for _ in range(MOST_STEPS):
+        if above == 0 or below == 0:
+            return 1 / (near if above == 0 else far)
+        middle = (near + far) / 2 if math.isinf(above) else (near * below - far * above) / (below - above)
+        error = fill_at(1 / middle) - fill
+        if abs(error) <= CLOSE_ENOUGH * fill:
+            return float(f"{1 / middle:.12g}")
+        if error > 0:
+            near, above, below = middle, error, below / 2 if last > 0 else below
+        else:
+            far, below, above = middle, error, above / 2 if last < 0 else above
+        last = error
+    return None

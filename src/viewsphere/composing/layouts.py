@@ -1,0 +1,190 @@
+"""From what a recipe says of a layout to where models stand, how they came there, and what they stand in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere import plugins
+from viewsphere.composing.filling import shape_of
+from viewsphere.composing.physics import EDITION
+from viewsphere.composing.physics.packages import check_packages
+from viewsphere.composing.physics.stable_poses import NEEDS as STABLE_NEEDS
+from viewsphere.composing.physics.stable_poses import stable_turn
+from viewsphere.composing.placing import Draws, Piece, Room, Shape, Way
+from viewsphere.composing.scene.scenery import composed
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.rotation import random_rotation, rigid
+from viewsphere.model.mistakes import one_of
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.model.thing import TimeStep
+from viewsphere.plugins.placer import PlacerSpec
+from viewsphere.recipe.layout import Layout, options_of, placer_of
+from viewsphere.recipe.scenery import CompanyEntry
+from viewsphere.recipe.scenes import ScenesEntry
+
+Float = NDArray[np.float64]
+
+
+class BoxOf(Protocol):
+    """Gives the 3D box (8, 3) of a normalised model at a time step (None: as it rests) in its own axes, metres."""
+
+    def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> NDArray[np.float64]:
+        """The box, float64."""
+        ...
+
+
+Remembering = Callable[[tuple[str, ...], Callable[[], Any]], Any]
+"""Gives the plain data that a function makes for names, or what it made when it was first asked for the same."""
+
+
+def unremembered(names: tuple[str, ...], make: Callable[[], Any]) -> Any:
+    """What the function makes now."""
+    return make()
+
+
+def remembered_as(entry: ScenesEntry | CompanyEntry, cast: Sequence[ModelSpec], names: Sequence[str]) -> tuple[str, ...]:
+    """What simulated poses are remembered by: who is placed, how, and what all draws are for."""
+    asked = entry.model_dump_json(include={"layout", "gap", "orientation", "surface"})
+    return (EDITION, asked, *names, "of", *(spec.key for spec in cast))
+
+
+@dataclass(frozen=True)
+class Carried:
+    """A way in other axes: of a model that was turned in its own before, in a room that stands somewhere in the world."""
+
+    way: Way
+    world_from_room: Matrix4
+    turned: Matrix4
+
+    def at(self, seconds: float) -> Matrix4:
+        """World from object at a time, seconds from the way's first."""
+        return composed(self.world_from_room, composed(self.way.at(seconds), self.turned))
+
+
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """Models that a placer places in a room, each turned in its own axes before (`turns`); the room stands somewhere in the
+    world. Nothing is placed before it is asked for.
+    """
+
+    layout: Layout
+    members: tuple[ModelSpec, ...]
+    shapes: tuple[Shape, ...]
+    turns: tuple[Matrix4, ...]
+    room: Room
+    rng: Draws
+    world_from_room: Matrix4 = IDENTITY
+
+    @cached_property
+    def poses(self) -> tuple[Matrix4, ...]:
+        """World from object of each; raises RecipeError where there is no room."""
+        placer, options = _placer(self.layout, self.room.field)
+        poses = placer.place(self.members, self.room, self.shapes, (), self.rng, *options)
+        return tuple(self._in_world(pose, turn) for pose, turn in zip(poses, self.turns, strict=True))
+
+    @cached_property
+    def ways(self) -> tuple[Carried, ...]:
+        """How each came there; none where the placer does not know."""
+        placer, options = _placer(self.layout, self.room.field)
+        if placer.ways is None:
+            return ()
+        ways: Sequence[Way] = placer.ways(self.members, self.room, self.shapes, self.rng, *options)
+        return tuple(Carried(way, self.world_from_room, turn) for way, turn in zip(ways, self.turns, strict=True))
+
+    @cached_property
+    def around(self) -> tuple[Piece, ...]:
+        """The pieces of scenery that they stand in, in the world."""
+        placer, options = _placer(self.layout, self.room.field)
+        if placer.around is None:
+            return ()
+        pieces: Sequence[Piece] = placer.around(self.members, self.room, self.shapes, self.rng, *options)
+        return tuple(Piece(p.family, p.size, composed(self.world_from_room, p.world_from_piece)) for p in pieces)
+
+    def _in_world(self, pose: Matrix4, turn: Matrix4) -> Matrix4:
+        pose = pose if turn == IDENTITY else composed(pose, turn)
+        return pose if self.world_from_room == IDENTITY else composed(self.world_from_room, pose)
+
+
+def laid(
+    layout: Layout,
+    orientation: str,
+    cast: Sequence[ModelSpec],
+    room: Room,
+    box_of: BoxOf,
+    rng: Draws,
+    world_from_room: Matrix4 = IDENTITY,
+) -> Laid:
+    """The models as the layout places them, upright, or turned before: to `any` side, or to one on which they may lie."""
+    shapes = [shape(spec, box_of) for spec in cast]
+    if orientation == "upright":
+        return Laid(layout, tuple(cast), tuple(shapes), (IDENTITY,) * len(shapes), room, rng, world_from_room)
+    turns: list[Float] = []
+    for slot, (spec, one) in enumerate(zip(cast, shapes, strict=True)):
+        own = rng("orientation", str(slot), spec.key)
+        turns.append(random_rotation(own) if orientation == "any" else stable_turn(one.hull, own))
+    turned = tuple(one.turned(turn) for one, turn in zip(shapes, turns, strict=True))
+    moves = tuple(composed(IDENTITY, rigid(turn, (0.0, 0.0, 0.0))) for turn in turns)
+    return Laid(layout, tuple(cast), turned, moves, room, rng, world_from_room)
+
+
+def check_layout(layout: Layout, field: str) -> None:
+    """See that a placer can place; raises RecipeError for an unknown one and for options that it does not have, which begins
+    with the field's name, and MissingExtraError for packages that it needs.
+    """
+    placer, _ = _placer(layout, field)
+    check_packages(placer.packages, "physics", f"{field}.layout: {placer_of(layout)}")
+
+
+def check_orientation(orientation: str, field: str) -> None:
+    """See that things can be turned in this way; raises MissingExtraError for packages that it needs."""
+    if orientation == "stable":
+        check_packages(STABLE_NEEDS, "physics", f"{field}.orientation: stable")
+
+
+def has_ways(layout: Layout) -> bool:
+    """Whether the placer knows how things came to where they stand."""
+    return plugins.load(PlacerSpec, placer_of(layout)).ways is not None
+
+
+def is_slow(layout: Layout) -> bool:
+    """Whether where things stand is not asked before frames are rendered."""
+    return plugins.load(PlacerSpec, placer_of(layout)).is_slow
+
+
+def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
+    """A model's shape for a placer. Boxes are known of the data set's own models; others are read for theirs."""
+    box = box_of(spec) if spec.category_id else _box(spec)
+    return Shape(box, partial(_vertices, spec), partial(_surface, spec))
+
+
+def _placer(layout: Layout, field: str) -> tuple[PlacerSpec, tuple[Any, ...]]:
+    """The placer, and its options, if it has any."""
+    name, given, where = placer_of(layout), options_of(layout), f"{field}.layout"
+    known = plugins.names("placers")
+    if name not in known:
+        raise RecipeError(f"{where}{'.kind' if given else ''}: {one_of(name, known)}")
+    spec = plugins.load(PlacerSpec, name)
+    return spec, spec.read_options(name, given, where)
+
+
+def _box(spec: ModelSpec) -> Float:
+    vertices = _vertices(spec)
+    return box_vertices(vertices.min(axis=0), vertices.max(axis=0))
+
+
+def _vertices(spec: ModelSpec) -> Float:
+    """Those of the normalised model, (N, 3); raises ModelError if its file cannot be used."""
+    return shape_of((spec, None)).vertices
+
+
+def _surface(spec: ModelSpec) -> tuple[Float, NDArray[np.int32]]:
+    found = shape_of((spec, None))
+    return found.vertices, found.triangles

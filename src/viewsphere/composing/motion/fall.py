@@ -1,0 +1,40 @@
+"""As its layout dropped it."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.composing.motion import Move, Pose, Start
+from viewsphere.errors import RecipeError
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Number, Positive
+from viewsphere.plugins.motion import MotionSpec
+from viewsphere.recipe.draws import Drawn
+
+
+class Options(Frozen):
+    """The fall by which the layout (fall or container) puts it where it comes to rest; then it lies there."""
+
+    begin: Drawn[Number] = Field(default=0.0, description="seconds: when it is let go; before, it hangs where it is let go")
+    speed: Drawn[Positive] = Field(default=1.0, description="how fast it falls: 0.25 shows it in slow motion")
+
+
+def moves(options: Options, start: Start) -> Move:
+    """The states of the simulation, straight from each to the next. All things of a scene fell together: options that differ
+    between them show them in one another.
+    """
+    way = start.way
+    if way is None:
+        raise RecipeError(
+            f"{start.field}.kind: expected a layout that drops it, such as scenes: {{layout: fall}}; found another: set "
+            "the layout, or take another kind of motion"
+        )
+
+    def moved(time: float, pose: Pose) -> Pose:
+        return Pose(np.array(way((time - options.begin) * options.speed)), pose.step)
+
+    return moved
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

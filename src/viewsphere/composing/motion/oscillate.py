@@ -1,0 +1,43 @@
+"""To and fro."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.composing.motion import Amplitude, Move, Pose, Start
+from viewsphere.geometry.rotation import rotation_about
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Positive
+from viewsphere.plugins.motion import MotionSpec
+from viewsphere.recipe.draws import Coordinate, Drawn
+
+
+class Options(Frozen):
+    """To and fro, as the sine of time: at 0 s in the middle, where it is without this motion, unless phase_deg says more."""
+
+    position: Amplitude = Field(
+        default=(0.0, 0.0, 0.0), description="[x, y, z]: metres along the world's axes that it goes to either side"
+    )
+    rotation_deg: Amplitude = Field(
+        default=(0.0, 0.0, 0.0), description="[x, y, z]: degrees it turns to either side, about this vector in its own axes"
+    )
+    period: Drawn[Positive] = Field(default=1.0, description="seconds from one side to the other and back")
+    phase_deg: Coordinate = Field(default=0.0, description="degrees: 90 begins at one side, 180 in the middle, going back")
+
+
+def moves(options: Options, start: Start) -> Move:
+    """A sine of position and angle."""
+    side, turn = np.array(options.position), np.radians(options.rotation_deg)
+    phase = math.radians(options.phase_deg)
+
+    def moved(time: float, pose: Pose) -> Pose:
+        share = math.sin(2 * math.pi * time / options.period + phase)
+        return pose.turned(rotation_about(turn * share)).moved(side * share)
+
+    return moved
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

@@ -1,0 +1,96 @@
+"""Along a lane of the place, or along points of the world, its front ahead."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from viewsphere.composing.motion import Heading, Lane, Move, Pose, Start, curve_through, headed, to_the_right
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.curve import Curve
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import one_of
+from viewsphere.model.numbers import Positive
+from viewsphere.plugins.motion import MotionSpec
+from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
+
+ANY = "any"
+
+
+class Options(Frozen):
+    """Along a lane of the place, or along points of the world, at a constant speed. It keeps its height above z = 0 above its
+    way.
+    """
+
+    lane: Drawn[Annotated[str, Field(min_length=1)]] | None = Field(
+        default=None, description="name of a lane of scene.place, or any: one of them, drawn"
+    )
+    points: Annotated[tuple[PointDrawn, ...], Field(min_length=2)] | None = Field(
+        default=None, description="or [x, y, z] each, metres: points of the world, with a smooth curve through them"
+    )
+    speed: Drawn[Positive] = Field(description="metres a second")
+    closed: bool = Field(default=False, description="of points: whether the way goes on from the last to the first")
+    offset: Coordinate = Field(
+        default=0.0, description="metres along its way at 0 s; below 0: it reaches the beginning of an open way later"
+    )
+    side: Coordinate = Field(default=0.0, description="metres to the right of its way; below 0 to the left")
+    heading: Heading = Field(
+        default="along",
+        description="along: its front ahead, uphill and downhill, too; level: its front ahead, upright; keep: turned as before",
+    )
+    end: Literal["stay", "leave"] = Field(
+        default="stay",
+        description="before the beginning and after the end of an open way: stay: it waits there; leave: it is not there",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Options:
+        if (self.lane is None) == (self.points is None):
+            raise ValueError(f"expected one of lane, points; found {'none' if self.lane is None else 'both'}")
+        if self.lane is not None and self.closed:
+            raise ValueError("expected points beside closed: true; found lane, which is closed or not by itself")
+        return self
+
+
+def moves(options: Options, start: Start) -> Move:
+    """The way by its arc length."""
+    curve = _curve(options, start)
+    if not curve.closed and options.offset > curve.length:
+        raise RecipeError(
+            f"{start.field}.offset: expected at most {curve.length:g} m, the length of the way; found {options.offset:g}"
+        )
+
+    def moved(time: float, pose: Pose) -> Pose | None:
+        length = options.offset + options.speed * time
+        if options.end == "leave" and not curve.closed and not 0 <= length <= curve.length:
+            return None
+        spot, direction = curve.along(length)
+        return headed(pose.put(spot + options.side * to_the_right(direction)), direction, options.heading)
+
+    return moved
+
+
+def _curve(options: Options, start: Start) -> Curve:
+    if options.lane is None:
+        return curve_through(options.points or (), options.closed, f"{start.field}.points")
+    lane = _lane(options.lane, start)
+    return curve_through(lane.points, lane.closed, f"{start.field}.lane")
+
+
+def _lane(name: str, start: Start) -> Lane:
+    """The lane of this name, or one of all."""
+    lanes = {lane.name: lane for lane in start.lanes}
+    if not lanes:
+        raise RecipeError(
+            f"{start.field}.lane: expected a place with lanes, such as scene.place: zoo:neighbourhood; found none: set one, or "
+            "list points"
+        )
+    if name == ANY:
+        return start.lanes[int(start.rng("lane").integers(len(lanes)))]
+    if name not in lanes:
+        raise RecipeError(f"{start.field}.lane: {one_of(name, (ANY, *lanes))}")
+    return lanes[name]
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

@@ -1,0 +1,41 @@
+"""Smoothly at random, around where it is without this motion."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.composing.motion import Amplitude, Move, Pose, Start
+from viewsphere.geometry.noise import noise
+from viewsphere.geometry.rotation import rotation_about
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Positive
+from viewsphere.plugins.motion import MotionSpec
+from viewsphere.recipe.draws import Drawn
+
+
+class Options(Frozen):
+    """Smoothly at random around where it is: no faster than the highest frequency, no farther than the amplitudes."""
+
+    position: Amplitude = Field(
+        default=(0.0, 0.0, 0.0), description="[x, y, z]: metres along the world's axes that it goes to either side at most"
+    )
+    rotation_deg: Amplitude = Field(
+        default=(0.0, 0.0, 0.0), description="[x, y, z]: degrees that the rotation vector in its own axes goes to either side"
+    )
+    highest_hz: Drawn[Positive] = Field(default=0.5, description="highest frequency, hertz: no movement is faster")
+
+
+def moves(options: Options, start: Start) -> Move:
+    """Band-limited noise (`viewsphere.geometry.noise`) of six components."""
+    sides, turns = np.array(options.position), np.radians(options.rotation_deg)
+    way = noise(start.rng("noise"), 6, options.highest_hz)
+
+    def moved(time: float, pose: Pose) -> Pose:
+        shares = way.at(time)
+        return pose.turned(rotation_about(turns * shares[3:])).moved(sides * shares[:3])
+
+    return moved
+
+
+MOTION = MotionSpec(options=Options, moves=moves)

@@ -1,0 +1,29 @@
+"""Rigid bodies that fall and come to rest, by MuJoCo (Todorov, Erez, Tassa 2012; version 3.3 or newer).
+
+The settings are measured ones: with MuJoCo's own a pile of models creeps on for ever. They are lengths and seconds, so that
+every world is simulated as if its typical body were `TYPICAL` metres long, and scaled back: free fall only changes its clock.
+Frame: metres, +Z up, the floor at z = 0.
+"""
+
+from __future__ import annotations
+
+from viewsphere.composing.physics._body import Board, Body, Touch, body_of, needed
+from viewsphere.composing.physics._world import CALM_LOOKS, DAMPED_S, LONGEST_S, STEP_S, TYPICAL, World
+
+EDITION = "physics 5"
+"""Raised when the same bodies come to rest elsewhere than before: what was simulated and kept is told apart by it."""
+
+__all__ = [
+    "CALM_LOOKS",
+    "DAMPED_S",
+    "EDITION",
+    "LONGEST_S",
+    "STEP_S",
+    "TYPICAL",
+    "Board",
+    "Body",
+    "Touch",
+    "World",
+    "body_of",
+    "needed",
+]

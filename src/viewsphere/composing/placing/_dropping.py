@@ -1,0 +1,311 @@
+"""Things that are let go and come to rest, as several placers drop them."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.composing.physics import LONGEST_S, Board, Body, Touch, World, body_of
+from viewsphere.composing.placing import Draws, Footprint, Room, Shape, Way, draws_of
+from viewsphere.composing.placing._parts import convex_parts
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.numbers import Length, Portion, Positive, Strength
+from viewsphere.model.scene import Matrix4
+from viewsphere.recipe.draws import Drawn, drawn
+
+Float = NDArray[np.float64]
+
+TRIES = 10
+"""Draws of a fall, of which the first that ends well is taken."""
+
+HASTY_S = 5.0
+"""Simulated seconds that all tries but the last have to come to rest: most need half of them, and another draw is sooner
+at rest than one in which something trembles on and on.
+"""
+
+ROUNDS = 2
+"""How often things that fell beside are let go again, for each of the cast."""
+
+SPOTS = 12
+"""Spots that are tried for each thing that is let go; the lowest is taken."""
+
+MOST_OVERLAP = 0.002
+"""Metres that two things may overlap at rest."""
+
+CLEAR = 0.001
+"""The same of things that are caught in flight, where some hit others."""
+
+FENCE, GAP = 50.0, 0.001
+"""How high fences are, in lengths of the longest thing, and how far from what is let go, metres."""
+
+RECORDED = 5
+"""Steps of the simulation between two states of a way."""
+
+
+class Matter(Frozen):
+    """What things are made of; each is drawn for itself."""
+
+    density: Drawn[Positive] = Field(default=300.0, description="kg in a cubic metre of the thing's hull")
+    mass: Drawn[Positive] | None = Field(default=None, description="kg, instead of what density says")
+    friction: Drawn[Strength] = Field(default=0.8, description="coefficient of sliding friction: 0.1 ice, 0.8 wood, 1 rubber")
+    restitution: Drawn[Portion] = Field(default=0.0, description="share of its speed that a thing has after a bounce")
+    collide: Literal["hulls", "parts"] = Field(
+        default="hulls",
+        description="hulls: things touch as their convex hulls do; parts: as convex parts of them, for chairs, mugs and what "
+        "others shall lie in; takes seconds a model once, by coacd",
+    )
+    drop: Drawn[Length] = Field(default=0.05, description="metres of air below each thing when it is let go")
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What things fall on: boards, and where they have to stay: over a rectangle of z = 0, their lowest points no higher than
+    this; None: anywhere.
+    """
+
+    boards: tuple[Board, ...] = ()
+    within: Footprint | None = None
+    height: float = math.inf
+
+
+@dataclass(eq=False)
+class Drop:
+    """A cast that falls in a room."""
+
+    cast: Sequence[ModelSpec]
+    room: Room
+    shapes: Sequence[Shape]
+    rng: Draws
+    options: Matter
+    ground: Ground
+    region: Footprint
+    _bodies: list[Body] = field(default_factory=list[Body])
+
+    def __post_init__(self) -> None:
+        self._bodies = [self._body(i) for i in range(len(self.cast))]
+
+    @property
+    def typical(self) -> float:
+        """Length of the typical thing, metres."""
+        return float(np.median([shape.length for shape in self.shapes]))
+
+    def rested(self) -> dict[str, Any]:
+        """Plain data: `poses` of all at rest, and, where the room asks how they moved, `ways`: seconds and states."""
+        return self._best("rest")
+
+    def caught(self) -> dict[str, Any]:
+        """The same of things that are caught while they fall, at a moment before the last one lands."""
+        return self._best("mid")
+
+    def _best(self, moment: str) -> dict[str, Any]:
+        problems: list[tuple[float, str]] = []
+        for number in range(TRIES):
+            made, problem = self._once(str(number), moment, LONGEST_S if number == TRIES - 1 else HASTY_S)
+            if problem is None:
+                return made
+            problems.append(problem)
+        raise RecipeError(f"{self.room.field}.layout: {min(problems)[1]} (the best of {TRIES} draws)")
+
+    def _once(self, number: str, moment: str, longest_s: float) -> tuple[dict[str, Any], tuple[float, str] | None]:
+        """What comes of one draw, and, where it is not good, how bad that is, and in words."""
+        places = [self._spheres(i) for i in range(len(self.cast))]
+        starts = self._starts(number, range(len(self.cast)), places, [])
+        high = FENCE * max(shape.length for shape in self.shapes)
+        fences = _fences(self._enclosed(self.ground.within, starts), high) if self.ground.within else ()
+        fixed = [(body_of(self._parts(shape), 1.0), pose) for shape, pose in self.room.taken]
+        world = World(self._bodies, starts, (*self.ground.boards, *fences), self.typical, -self.room.below, fixed)
+        if moment == "mid":
+            return self._flying(world, number), None
+        film = _Film(world) if self.room.moves else None
+        settle = partial(world.settle, longest_s, each=RECORDED, look=film.shoot) if film else partial(world.settle, longest_s)
+        calm = settle(rest_s=0.0) if fences else settle()
+        if fences and calm:
+            world.take_fences_away()
+            calm = settle(is_calm=True) if film else self._kept(world, number, places, longest_s)
+        made: dict[str, Any] = {"poses": world.poses}
+        return made | ({"ways": film.ways} if film else {}), self._problem(world, calm, bool(film))
+
+    def _enclosed(self, within: Footprint, starts: Sequence[Matrix4]) -> Footprint:
+        """Where things have to stay, and all that is let go: what is wider would be caught between fences."""
+        corners = [transform(np.array(pose), body.corners)[:, :2] for body, pose in zip(self._bodies, starts, strict=True)]
+        reach = np.abs((np.concatenate(corners) - within.center) @ within.axes.T).max(axis=0)
+        return replace(within, half=np.maximum(within.half, reach + GAP))
+
+    def _kept(self, world: World, number: str, places: Sequence[tuple[Float, float]], longest_s: float) -> bool:
+        """Let time go by until all are at rest where they have to stay; whether they are at rest. What leaves is let go
+        again at once, before it rolls away, and what lies too high when it is at rest.
+        """
+        again, most = 0, ROUNDS * len(self.cast)
+
+        def let_go(slots: Sequence[int]) -> None:
+            nonlocal again
+            for i in slots:
+                again += 1
+                (pose,) = self._starts(f"{number} {again}", [i], places, self._lying(world, slots))
+                world.put(i, pose)
+
+        def watch() -> None:
+            let_go(self._beside(world, math.inf) if again < most else ())
+
+        calm = world.settle(longest_s, look=watch, is_calm=True)
+        while calm and again < most and (high := self._beside(world, self.ground.height)):
+            let_go(high)
+            calm = world.settle(longest_s, look=watch)
+        return calm
+
+    def _problem(self, world: World, calm: bool, moves: bool) -> tuple[float, str] | None:
+        beside = [] if moves else self._beside(world, self.ground.height)
+        if beside:
+            inside = len(self.cast) - len(beside)
+            found = f"found {inside} inside, {self.cast[beside[0]].key} not: ask for fewer, or for more room"
+            return 2.0 + len(beside), f"expected room for {len(self.cast)} models; {found}"
+        if not calm:
+            return 1.0, f"expected models that come to rest; found one at {1000 * world.speed:.2g} mm/s: ask for more friction"
+        if world.deepest > MOST_OVERLAP:
+            found = f"found {1000 * world.deepest:.2g} mm: ask for fewer, or for models of more alike sizes"
+            return world.deepest, f"expected models at rest that overlap by {1000 * MOST_OVERLAP:g} mm at most; {found}"
+        return None
+
+    def _flying(self, world: World, number: str) -> dict[str, Any]:
+        landed, frames = set[int](), list[tuple[float, tuple[Matrix4, ...]]]()
+        while len(landed) < len(self.cast) and world.seconds < 60:
+            if world.deepest <= CLEAR:
+                frames.append((world.seconds, world.poses))
+            world.step(RECORDED)
+            landed.update(i for pair in world.touching if -1 in pair or landed.intersection(pair) for i in pair if i >= 0)
+        wanted = world.seconds * float(self.rng("moment", number).random())
+        return {"poses": min(frames, key=lambda frame: abs(frame[0] - wanted))[1]}
+
+    def _body(self, slot: int) -> Body:
+        spec, shape = self.cast[slot], self.shapes[slot]
+        own = drawn(self.options, draws_of(self.rng, str(slot), spec.key))
+        return body_of(self._parts(shape), own.density, own.mass, Touch(own.friction, own.restitution))
+
+    def _parts(self, shape: Shape) -> list[Float]:
+        return [shape.hull] if self.options.collide == "hulls" else convex_parts(shape)
+
+    def _spheres(self, slot: int) -> tuple[Float, float]:
+        """Middle (3,) and radius of a ball around a thing, its own axes."""
+        box = self.shapes[slot].box
+        return box.mean(axis=0), float(np.linalg.norm(box[0] - box.mean(axis=0)))
+
+    def _lying(self, world: World, without: Sequence[int]) -> list[tuple[Float, float]]:
+        """Balls around what lies there, world axes."""
+        found: list[tuple[Float, float]] = []
+        for i, pose in enumerate(world.poses):
+            if i not in without:
+                middle, radius = self._spheres(i)
+                found.append((transform(np.array(pose), middle), radius))
+        return found
+
+    def _starts(
+        self, number: str, slots: Sequence[int], places: Sequence[tuple[Float, float]], there: list[tuple[Float, float]]
+    ) -> list[Matrix4]:
+        """Where things are let go: over the region, turned about the vertical at random, each as low as it is clear of those
+        before.
+        """
+        balls = [*there, *(_ball(shape, pose) for shape, pose in self.room.taken)]
+        poses: list[Matrix4] = []
+        for slot in slots:
+            middle, radius = places[slot]
+            rng = self.rng("release", number, str(slot), self.cast[slot].key)
+            air = drawn(self.options.drop, draws_of(self.rng, "drop", number, str(slot), self.cast[slot].key))
+            reach = np.maximum(self.region.half - radius, 0.0)
+            spots = self.region.center + (2 * rng.random((SPOTS, 2)) - 1) * reach @ self.region.axes
+            bottom = radius if balls else float(middle[2] - self.shapes[slot].box[:, 2].min())
+            x, y, z = min(((*spot, _clear(spot, radius, balls, bottom + air, air)) for spot in spots), key=lambda p: p[2])
+            balls.append((np.array([x, y, z]), radius))
+            poses.append(_turned(middle, (x, y, z), 2 * math.pi * rng.random()))
+        return poses
+
+    def _beside(self, world: World, height: float) -> list[int]:
+        """Numbers of things whose middle is not over where they have to stay, or of which all is higher than this."""
+        within = self.ground.within
+        if within is None:
+            return []
+        found: list[int] = []
+        for i, pose in enumerate(world.poses):
+            middle = transform(np.array(pose), self._spheres(i)[0])
+            is_on = (np.abs((middle[:2] - within.center) @ within.axes.T) <= within.half).all()
+            if not is_on or middle[2] < 0 or (height < math.inf and self._lowest(i, pose) > height):
+                found.append(i)
+        return found
+
+    def _lowest(self, slot: int, pose: Matrix4) -> float:
+        return float(transform(np.array(pose), self._bodies[slot].corners)[:, 2].min())
+
+
+class _Film:
+    """The states of a world's bodies, one after another."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._seconds, self._states = [0.0], [world.states]
+
+    def shoot(self) -> None:
+        self._seconds.append(self._world.seconds)
+        self._states.append(self._world.states)
+
+    @property
+    def ways(self) -> dict[str, Any]:
+        """Until all is at rest."""
+        count = bisect_right(self._seconds, self._world.seconds)
+        states = np.round(np.array(self._states[:count]), 6) + 0.0
+        return {"seconds": np.round(self._seconds[:count], 6).tolist(), "states": states.transpose(1, 0, 2).tolist()}
+
+
+def ways_of(made: dict[str, Any]) -> list[Way]:
+    """The ways in plain data."""
+    seconds = tuple(made["ways"]["seconds"])
+    return [Way(seconds, tuple(map(tuple, states))) for states in made["ways"]["states"]]
+
+
+def poses_of(made: dict[str, Any]) -> list[Matrix4]:
+    """The poses in plain data."""
+    poses: list[Any] = [tuple(map(tuple, pose)) for pose in made["poses"]]
+    return poses
+
+
+def _ball(shape: Shape, pose: Matrix4) -> tuple[Float, float]:
+    middle = shape.box.mean(axis=0)
+    return transform(np.array(pose), middle), float(np.linalg.norm(shape.box[0] - middle))
+
+
+def _clear(spot: Float, radius: float, balls: Sequence[tuple[Float, float]], lowest: float, air: float) -> float:
+    """How high a ball at a spot is at least, clear of others with some air between."""
+    height = lowest
+    for middle, other in balls:
+        reach, off = radius + other + air, float(np.hypot(*(spot - middle[:2])))
+        if off < reach:
+            height = max(height, float(middle[2]) + math.sqrt(reach**2 - off**2))
+    return height
+
+
+def _turned(middle: Float, at: tuple[float, float, float], turn: float) -> Matrix4:
+    """A pose turned about the vertical whose middle is there."""
+    c, s = math.cos(turn), math.sin(turn)
+    x, y, z = at[0] - c * middle[0] + s * middle[1], at[1] - s * middle[0] - c * middle[1], at[2] - middle[2]
+    return ((c, -s, 0.0, float(x)), (s, c, 0.0, float(y)), (0.0, 0.0, 1.0, float(z)), (0.0, 0.0, 0.0, 1.0))
+
+
+def _fences(around: Footprint, height: float) -> list[Board]:
+    """Four boards around a rectangle."""
+    turn = math.atan2(around.axes[0, 1], around.axes[0, 0])
+    thick, found = float(around.half.max()), list[Board]()
+    for axis, side in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        half = [float(h) + 2 * thick for h in around.half]
+        half[axis] = thick
+        x, y = (around.center + side * (around.half[axis] + thick) * around.axes[axis]).tolist()
+        found.append(Board((x, y, height / 2), (half[0], half[1], height / 2), turn, is_fence=True))
+    return found

@@ -1,0 +1,105 @@
+"""What there is room in, and whether what was placed keeps to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from viewsphere.composing.placing._crowd import Crowd
+from viewsphere.composing.placing._footprint import Footprint, Outline, first_crowded, footprint
+from viewsphere.composing.placing._obstacles import Obstacles
+from viewsphere.composing.placing._shape import Shape
+from viewsphere.errors import RecipeError
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Matrix4
+from viewsphere.zoo.places import Bay, Lane
+
+Spot = tuple[float, float, float]
+"""(x, y) on the floor, metres, and the azimuth that a front faces there, degrees."""
+
+
+Memory = Callable[[Callable[[], Any]], Any]
+"""Gives the plain data that the function makes, or what it made when it was first asked for the same, on any machine."""
+
+
+def forgetful(make: Callable[[], Any]) -> Any:
+    """What the function makes now."""
+    return make()
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """What there is room in: the floor that is free (None: all of it), the metres that stay free between any two things, at
+    least, the spots that the recipe names, what stands there before (the model that company joins, at the origin, facing -Y),
+    and the recipe's field that asks for all this, which messages begin with.
+
+    `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it; `clearance`: metres
+    of air above, None where it has no end; `seen_from`: azimuth and elevation, degrees, of the camera, where one is known;
+    `memory`: keeps what is simulated; `moves`: whether the ways of things to their places are needed, too; `built` gives the
+    parts of the place's mesh up to a height above the floor, as far as a layout reaches, metres; `blocked` holds those for the
+    things that are placed; `lanes`,
+    `bays` and `pavements`: those of the place; `furniture` gives what stands on and beside them, of a zoo's place.
+    """
+
+    free: Footprint | None = None
+    gap: float = 0.0
+    spots: tuple[Spot, ...] = ()
+    taken: tuple[tuple[Shape, Matrix4], ...] = ()
+    field: str = "scene.company"
+    below: float = 0.0
+    clearance: float | None = None
+    seen_from: tuple[float, float] | None = None
+    memory: Memory = forgetful
+    moves: bool = False
+    built: Callable[[float, float], Obstacles | None] | None = None
+    blocked: Obstacles | None = None
+    lanes: tuple[Lane, ...] = ()
+    bays: tuple[Bay, ...] = ()
+    pavements: tuple[Lane, ...] = ()
+    furniture: Callable[[float, float], Obstacles | None] | None = None
+
+    def obstacles(self, shapes: Sequence[Shape], reach: float) -> Room:
+        """The same room with `blocked`: the parts of its place that are in the way of things of these shapes, up to `reach`
+        metres from the middle.
+        """
+        if self.built is None or not shapes:
+            return self
+        highest = max(float(np.ptp(shape.box[:, 2])) for shape in shapes)
+        return replace(self, blocked=self.built(highest, reach))
+
+    def is_clear(self, own: Footprint | Outline, others: Crowd) -> bool:
+        """Return whether something that covers so much of the floor is clear of others and of the place, by the gap."""
+        if not others.is_clear(own, self.gap):
+            return False
+        return self.blocked is None or not self.blocked.meets(own.corners, self.gap)
+
+    @property
+    def prints(self) -> tuple[Footprint, ...]:
+        """What things that stand there before cover of the floor."""
+        return tuple(footprint(shape.box, pose) for shape, pose in self.taken)
+
+
+def checked(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], poses: Sequence[Matrix4]) -> Sequence[Matrix4]:
+    """The same poses, of things that stand upright on the floor.
+
+    Raises RecipeError where two are nearer than the room's gap, by their boxes, or nearer to what stands there before, or where
+    one is beyond the free floor.
+    """
+    names = ["the model that it joins"] * len(room.taken) + [spec.key for spec in cast]
+    prints = [*room.prints, *(footprint(shape.box, pose) for shape, pose in zip(shapes, poses, strict=True))]
+    crowded = first_crowded(prints, room.gap, len(room.taken))
+    beyond = next((i for i in range(len(room.taken), len(prints)) if room.free and not room.free.contains(prints[i])), None)
+    if crowded is not None and (beyond is None or crowded[0] <= beyond):
+        i, j = crowded
+        raise RecipeError(
+            f"{room.field}.layout: expected {room.gap:g} m between all models; found {names[i]} and {names[j]} "
+            "nearer or in one another: move them, or use layout: scatter"
+        )
+    if beyond is not None:
+        raise RecipeError(
+            f"{room.field}.layout: expected all models in the free part of the place; found {names[beyond]} beyond it"
+        )
+    return poses

@@ -1,0 +1,98 @@
+"""Where there is room for one thing more."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.composing.placing._crowd import Crowd, TakenMap
+from viewsphere.composing.placing._footprint import Footprint, Outline, standing
+from viewsphere.composing.placing._room import Room
+from viewsphere.model.scene import IDENTITY, Matrix4
+
+TRIES = 2000
+"""Spots that are tried for one model; the circle they lie in grows with each."""
+
+GROWTH = 0.01
+
+SPREAD_TRIES = 400
+"""Spots of a bounded floor that are tried for one model: where fewer than one in a hundred is free, another draw finds room
+sooner."""
+
+Float = NDArray[np.float64]
+Cover = Callable[[Matrix4], Any]
+"""What a thing at a pose covers of the floor: a Footprint, or an Outline."""
+
+
+@dataclass(frozen=True, eq=False)
+class Others:
+    """What stands on the floor already, and maps of where no other thing can, the largest things' last, if many are to come."""
+
+    maps: tuple[TakenMap, ...] = ()
+    crowd: Crowd = field(default_factory=Crowd)
+
+    def add(self, cover: Footprint | Outline) -> None:
+        """Add one more."""
+        self.crowd.add(cover)
+        for taken in self.maps:
+            taken.add(cover)
+
+    def untaken(self, cover: Cover, spots: Float, turns: Float) -> NDArray[np.intp]:
+        """Numbers of the spots (N, 2) that may be clear for a thing turned so, radians; most crowded ones are left out."""
+        x, y, _, inner, _ = cover(IDENTITY).circle
+        fitting = [taken for taken in self.maps if taken.slim <= inner]
+        if not fitting:
+            return np.arange(len(spots))
+        cos, sin = np.cos(turns), np.sin(turns)
+        return np.flatnonzero(~fitting[-1].at(spots + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)))
+
+
+def free_spot(rng: np.random.Generator, room: Room, box: Float, others: Others, cover: Cover) -> Matrix4 | None:
+    """A pose on the free floor, turned at random, where what it covers is clear of what others cover: uniform in a circle that
+    grows until there is room; None where none is found.
+    """
+    draws = rng.random((TRIES, 3))
+    radii = _radii(room, box, others)
+    away = radii * np.sqrt(draws[:, 1])
+    spots = np.stack([away * np.cos(2 * np.pi * draws[:, 0]), away * np.sin(2 * np.pi * draws[:, 0])], axis=1)
+    for i in others.untaken(cover, spots, 2 * np.pi * draws[:, 2]).tolist():
+        (turn, far, azimuth), radius = draws[i].tolist(), float(radii[i])
+        x, y = (radius * math.sqrt(far) * f(2 * math.pi * turn) for f in (math.cos, math.sin))
+        pose = standing(box, x, y, 360.0 * azimuth)
+        own = cover(pose)
+        if (room.free is None or room.free.contains(own)) and room.is_clear(own, others.crowd):
+            return pose
+    return None
+
+
+def _radii(room: Room, box: Float, others: Others) -> Float:
+    """Radii of the circle that grows, one for each try: boxes are no nearer than the first; a hull is somewhere in its box."""
+    if not others.crowd.covers:
+        return np.zeros(TRIES)
+    narrowest, first = float((box[4] - box[2])[:2].min() / 2), others.crowd.covers[0]
+    start = room.gap + (narrowest / 4 if isinstance(first, Outline) else float(first.half.min()) + narrowest)
+    radii = np.multiply.accumulate(np.array([start, *[1 + GROWTH] * (TRIES - 1)]))
+    if room.free is not None:
+        radii[1:] = radii[1:].clip(max=float(np.linalg.norm(room.free.corners, axis=1).max()))
+    return radii
+
+
+def spread_spot(
+    rng: np.random.Generator, room: Room, floor: Footprint, box: Float, others: Others, cover: Cover
+) -> Matrix4 | None:
+    """A pose on a bounded floor, turned at random and uniform over all that are clear of what others cover and of the place;
+    None where none is found.
+    """
+    draws = rng.random((SPREAD_TRIES, 3))
+    spots = floor.center + (2 * draws[:, :2] - 1) * floor.half @ floor.axes
+    for i in others.untaken(cover, spots, 2 * np.pi * draws[:, 2]).tolist():
+        pose = standing(box, float(spots[i, 0]), float(spots[i, 1]), 360.0 * float(draws[i, 2]))
+        own = cover(pose)
+        if floor.contains(own) and room.is_clear(own, others.crowd):
+            return pose
+    return None

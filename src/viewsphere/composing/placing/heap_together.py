@@ -1,0 +1,27 @@
+"""Close by, turned at random: one after another, uniform in a circle that grows until there is room."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from viewsphere.composing.placing import Draws, Room, Shape
+from viewsphere.composing.placing._scattered import Gaps, scattered
+from viewsphere.composing.placing._spot import free_spot
+from viewsphere.model.camera import Camera
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
+
+
+class Options(Gaps):
+    """Options of how closely models stand."""
+
+
+def place(
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+) -> Sequence[Matrix4]:
+    """Poses near the middle, or near what stands there before; raises RecipeError where no spot is found for one."""
+    return scattered(cast, room, shapes, rng, options, free_spot)
+
+
+PLACER = PlacerSpec(options=Options, place=place)

@@ -1,0 +1,78 @@
+"""Spread over the free floor, turned at random: uniform over all spots that are clear; on an endless floor, and beside a model
+that company joins, close by, as `heap_together`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.composing.placing import Draws, Footprint, Room, Shape, draws_of
+from viewsphere.composing.placing._scattered import Gaps, scattered
+from viewsphere.composing.placing._spot import Cover, Others, free_spot, spread_spot
+from viewsphere.model.camera import Camera
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.numbers import Length
+from viewsphere.model.scene import Matrix4
+from viewsphere.plugins.placer import PlacerSpec
+from viewsphere.recipe.draws import Drawn, drawn
+
+NEAR = 10.0
+"""Metres from the middle in which models stand where they have room: cameras look there, and a street is 200 m long."""
+
+LOOSE = 8.0
+"""Ratio of the floor's area to that of the models' boxes: 20 cars in a street with furniture find room at the first draw."""
+
+
+class Options(Gaps):
+    """Options of how closely models stand, and how far from the middle."""
+
+    reach: Drawn[Length] | None = Field(
+        default=None,
+        description="metres from the middle along and across the floor, at most; default: 10, and farther where the models need"
+        " more room, as cameras look at the middle",
+    )
+
+
+def place(
+    cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws, options: Options
+) -> Sequence[Matrix4]:
+    """Poses, no two boxes, or hulls, nearer than the room's gap; raises RecipeError where no spot is found for one."""
+    if room.free is None or room.taken:
+        return scattered(cast, room, shapes, rng, options, free_spot)
+    if options.reach is None:
+        floor = _roomy(room.free, shapes)
+    else:
+        floor = _within(room.free, drawn(options.reach, draws_of(rng, "reach")))
+
+    def spot(draws: np.random.Generator, room: Room, box: NDArray[np.float64], others: Others, cover: Cover) -> Matrix4 | None:
+        return spread_spot(draws, room, floor, box, others, cover)
+
+    return scattered(cast, room, shapes, rng, options, spot, floor)
+
+
+def _roomy(free: Footprint, shapes: Sequence[Shape]) -> Footprint:
+    """The part of a floor around the middle that holds the models loosely; all of a smaller floor."""
+    needed = LOOSE * sum(float(np.prod(shape.box[4, :2] - shape.box[2, :2])) for shape in shapes)
+    reach, all_of_it = NEAR, float((np.abs(free.axes @ free.center) + free.half).max())
+    floor = _within(free, reach)
+    while 4 * float(np.prod(floor.half)) < needed and reach < all_of_it and (floor.half < free.half).any():
+        reach *= 2
+        floor = _within(free, reach)
+    return floor
+
+
+def _within(floor: Footprint, reach: float) -> Footprint:
+    """The part of a floor that is so near to the origin along its axes; all of one that is wholly farther away."""
+    middle = floor.axes @ floor.center
+    low, high = np.maximum(middle - floor.half, -reach), np.minimum(middle + floor.half, reach)
+    if (high <= low).any():
+        return floor
+    return replace(floor, center=(low + high) / 2 @ floor.axes, half=(high - low) / 2)
+
+
+PLACER = PlacerSpec(options=Options, place=place)

@@ -1,0 +1,1 @@
+"""What surrounds the things: places, sky, sun, weather, pictures."""

@@ -1,0 +1,325 @@
+"""A recipe's scene made concrete: light, ground, materials and finish of a shot, finish and camera of a frame.
+
+Every distribution draws from a generator of its own, named by its field, and by the model and the pose as far as it is drawn
+for them: one more field, model or pose changes nobody else's draw.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import cached_property, lru_cache, partial
+from typing import Any
+
+from viewsphere import materials
+from viewsphere.composing.scene.pictures import Kind, Pictures
+from viewsphere.composing.scene.scenery import draw_names, is_indoors
+from viewsphere.composing.scene.sun import sun_position
+from viewsphere.composing.scene.weather import through_windows, weathered
+from viewsphere.composing.seeds import Names, scene_generators, share
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.camera import orbit_center
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import (
+    WHITE,
+    AnyLight,
+    AnySky,
+    Background,
+    Daylight,
+    Environment,
+    Finish,
+    Ground,
+    Scene,
+    Sky,
+    Sun,
+    Vector,
+)
+from viewsphere.model.substance import Substance
+from viewsphere.model.thing import Repaint
+from viewsphere.recipe.draws import RngOf, alternatives, drawn, is_random
+from viewsphere.recipe.entries import concrete, pictures_of
+from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame, ViewEntry
+from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, NightEntry, NightSky, SunEntry
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.surface import GroundEntry, MaterialEntry
+
+PARTS = tuple(Finish.model_fields)
+"""The parts of a finish, which have their names in a recipe's scene, too."""
+
+WEATHER = frozenset({"rain", "snow", "wet"})
+"""Fields of a scene whose drops, flakes and puddles have random places."""
+
+INDOOR_STOPS = 3.5
+"""The exposure at which a room by day is as bright as a street."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scenes:
+    """The scenes of a recipe. `model` is a model's key, `pose` a pose's name, or, for what all frames of a sequence share, the
+    name of the pose whenever it is taken. By the name of a `variation` differ the noise, and the draws of the fields of the
+    scene that are `drawn_alone` for it.
+    """
+
+    recipe: Recipe
+    pictures: Pictures
+    variation: str = ""
+    drawn_alone: frozenset[str] = frozenset()
+
+    @cached_property
+    def is_jittered(self) -> bool:
+        """Whether poses are moved."""
+        return self.recipe.scene.jitter != JitterEntry()
+
+    @cached_property
+    def is_target_moved(self) -> bool:
+        """Whether poses need to know what they look at, because it is moved."""
+        return self.recipe.scene.jitter.target != JitterEntry().target
+
+    @cached_property
+    def has_finish_per_frame(self) -> bool:
+        """Whether every frame has a finish of its own."""
+        return self.recipe.scene.effects.is_noisy or any(
+            self._draw(part) == "per_frame" and (is_random(part) or getattr(part, "images", None) is not None)
+            for part in self._finishing
+        )
+
+    def scene(self, model: str, pose: str) -> Scene:
+        """Light and ground for a shot, and the finish that its frames share."""
+        return self._scene(draw_names(self.recipe.scene.draw, model, pose), self._names_of_finish(model, None, pose))
+
+    def finish(self, model: str, pose: str, place: str) -> Finish:
+        """The finish of one frame; `place` is the name of its pose whenever it is taken."""
+        return self._finish(self._names_of_finish(model, pose, place), (model, pose))
+
+    def repaints(self, spec: ModelSpec, model: str, pose: str) -> tuple[Repaint, ...]:
+        """The changes to a target's materials, in a shot that is about `model`: a model looks alike beside any other."""
+        entry = self.recipe.scene
+        each = entry.draw in ("per_frame", "per_sequence")
+        names = (spec.key, model, pose) if each else draw_names(entry.draw, spec.key, None)
+        return tuple(
+            self._repaint(drawn(material, self._rng_of(names), ("materials", str(i))), i, names)
+            for i, material in enumerate(entry.materials)
+            if fnmatchcase(spec.key, material.models)
+        )
+
+    def _repaint(self, entry: MaterialEntry, number: int, names: Names) -> Repaint:
+        if entry.texture is not None:
+            return concrete(entry, texture=_substance(entry.texture, 512, self._rng_of(names), ("materials", str(number))))
+        if entry.images is not None:
+            return concrete(entry, image=self._file("textures", entry.images, ("materials", str(number), "images"), names))
+        return concrete(entry, image=None if entry.image is None else self.pictures["image", entry.image][0])
+
+    def jitter(self, model: str, name: str) -> JitterEntry:
+        """What is added to a pose, everything drawn."""
+        entry = self.recipe.scene.jitter
+        return drawn(entry, self._rng_of(draw_names(entry.draw, model, name)), ("jitter",))
+
+    def jittered(self, pose: Viewpoint, model: str, name: str) -> Viewpoint:
+        """The pose moved at random; it keeps its index. One without a target of its own keeps to the models' centre."""
+        by = self.jitter(model, name)
+        azimuth = pose.azimuth_deg + by.azimuth_deg
+        elevation = min(max(pose.elevation_deg + by.elevation_deg, -90.0), 90.0)
+        target = None if pose.target is None else tuple(a + b for a, b in zip(pose.target, by.target, strict=True))
+        return pose.model_copy(
+            update={
+                "azimuth_deg": azimuth,
+                "elevation_deg": elevation,
+                "distance": pose.distance * (1 + by.distance),
+                "tilt_deg": pose.tilt_deg + by.tilt_deg,
+                "target": target,
+                "category": pose_category(azimuth, elevation, self.recipe.viewpoints.bins),
+            }
+        )
+
+    def _rng_of(self, names: Names) -> RngOf:
+        shared = scene_generators(self.recipe.seed, names)
+        alone = scene_generators(self.recipe.seed, self._alone(names))
+        return lambda path: (alone if path[0] in self.drawn_alone else shared)(path)
+
+    def _alone(self, names: Names) -> Names:
+        """The names that draws of this variation alone are keyed by."""
+        return (*names, "variation", self.variation)
+
+    def _names_of_finish(self, model: str, pose: str | None, place: str) -> tuple[Names, ...]:
+        """What background, smoother, view and effects are drawn for; empty where every frame has a finish of its own."""
+        if pose is None and self.has_finish_per_frame:
+            return ()
+        draws = map(self._draw, self._finishing)
+        return tuple(draw_names(draw, model, place if draw == "per_sequence" else pose) for draw in draws)
+
+    def _draw(self, entry: object) -> str:
+        """When a part of the finish is drawn; a choice between several is made for every frame, or sequence."""
+        if isinstance(entry, PerFrame):
+            return entry.draw
+        return "per_frame" if self.recipe.time is None else "per_sequence"
+
+    @property
+    def _finishing(self) -> tuple[object, ...]:
+        """The entries of a finish's parts."""
+        return tuple(getattr(self.recipe.scene, name) for name in PARTS)
+
+    @cached_property
+    def _is_indoors(self) -> bool:
+        return is_indoors(self.recipe, self.recipe.scene.place)
+
+    @cached_property
+    def _scene(self) -> Callable[[Names, tuple[Names, ...]], Scene]:
+        """Scenes by what they are drawn for; the last are kept, because many shots share one."""
+
+        @lru_cache(maxsize=64)
+        def scene(names: Names, names_of_finish: tuple[Names, ...]) -> Scene:
+            entry, rng_of = self.recipe.scene, self._rng_of(names)
+            sun, above = drawn(entry.sun, rng_of, ("sun",)), drawn(entry.sky, rng_of, ("sky",))
+            sky = self._sky(above, names)
+            made = Scene(
+                sun=_moon(above.night, sun) if isinstance(above, NightSky) else _sun(sun, sky),
+                sky=sky.model_copy(update={"strength": 0.0}) if isinstance(sky, Daylight) and is_night(sun) else sky,
+                lights=_lights(entry.lights, rng_of),
+                ground=self._ground(drawn(entry.ground, rng_of, ("ground",)), rng_of),
+                finish=self._finish(names_of_finish, ()) if names_of_finish else Finish(),
+            )
+            outdoors = weathered(made, entry, rng_of, partial(self._weather_seed, names))
+            return through_windows(made, outdoors) if self._is_indoors else outdoors
+
+        return scene
+
+    def _weather_seed(self, names: Names, use: str) -> int:
+        """The seed of what falls or lies on the ground: of a variation alone where that has weather of its own."""
+        of = self._alone(names) if self.drawn_alone & WEATHER else names
+        return int(share(self.recipe.seed, "weather", use, *of) * 2**32)
+
+    def _sky(self, entry: Any, names: Names) -> AnySky:
+        if isinstance(entry, HdriSky):
+            return concrete(entry, file=self._file("hdri", entry.hdri, ("sky", "hdri"), names))
+        if isinstance(entry, NightSky):
+            return _night(entry.night)
+        return concrete(entry.daylight if isinstance(entry, DaylightSky) else entry)
+
+    def _ground(self, entry: Any, rng_of: RngOf) -> Ground | None:
+        if entry == "auto":
+            entry = self.recipe.scene.automatic_ground
+        if not isinstance(entry, GroundEntry):
+            return None if entry == "off" else Ground(catcher=entry == "catcher")
+        files = {name: self.pictures["image", path][0] for name in pictures_of(Ground) if (path := getattr(entry, name))}
+        if entry.material is not None:
+            made = _substance(entry.material, 1024, rng_of, ("ground",))
+            tile = materials.metres(made.name, made.seed)
+            return concrete(entry, material=made, tile=tile, color=entry.color or WHITE)
+        ground: Ground = concrete(entry, **files)
+        return ground if entry.color or not entry.image else ground.model_copy(update={"color": WHITE})
+
+    def _file(self, kind: Kind, path: str, field: tuple[str, ...], names: Names) -> str:
+        """The file that a path of the recipe means, drawn where that is a folder."""
+        files = self.pictures[kind, path]
+        if len(files) == 1:
+            return files[0]
+        return files[int(self._rng_of(names)((*field, "file")).integers(len(files)))]
+
+    def _finish(self, names: tuple[Names, ...], frame: Names) -> Finish:
+        parts = {name: self._part(name, drawn_for) for name, drawn_for in zip(PARTS, names, strict=True)}
+        if self.recipe.scene.effects.is_noisy:
+            of = (*frame, self.variation) if self.variation else frame
+            seed = int(share(self.recipe.seed, "noise", *of) * 2**32)
+            parts["effects"] = parts["effects"].model_copy(update={"seed": seed})
+        return Finish(**parts)
+
+    @cached_property
+    def _part(self) -> Callable[[str, Names], Any]:
+        """One part of a finish by what it is drawn for; the last are kept."""
+
+        @lru_cache(maxsize=256)
+        def part(field: str, names: Names) -> Frozen:
+            entry = drawn(getattr(self.recipe.scene, field), self._rng_of(names), (field,))
+            if isinstance(entry, BackgroundEntry):
+                return self._background(entry, names)
+            if isinstance(entry, ViewEntry) and entry.exposure == "auto":
+                return concrete(entry, exposure=INDOOR_STOPS if self._is_indoors else 0.0)
+            return concrete(entry)
+
+        return part
+
+    def _background(self, entry: BackgroundEntry, names: Names) -> Background:
+        image = None
+        if entry.images is not None:
+            image = self._file("images", entry.images, ("background", "images"), names)
+        elif entry.image is not None:
+            image = self.pictures["image", entry.image][0]
+        return concrete(entry, image=image)
+
+
+def _substance(name: Any, size: int, rng_of: RngOf, field: tuple[str, ...]) -> Substance:
+    """A piece of a material; what else is drawn of it follows from the seed."""
+    return Substance(name=name, seed=int(rng_of((*field, "seed")).integers(2**32)), size=size)
+
+
+def _sun(entry: Any, sky: AnySky) -> Sun | None:
+    if not isinstance(entry, SunEntry):
+        return None if entry == "off" or (entry == "auto" and isinstance(sky, Environment)) else Sun()
+    angles = _angles(entry)
+    if angles is None:
+        return concrete(entry)
+    return concrete(entry, azimuth_deg=angles[0], elevation_deg=angles[1]) if angles[1] > 0 else None
+
+
+def _night(entry: NightEntry) -> Sky:
+    """A sky that the moon and the lights of towns light."""
+    dark, glow = 0.05 + 0.5 * entry.moon, entry.glow
+    return Sky(
+        zenith=(0.1 * dark + 0.1 * glow, 0.13 * dark + 0.1 * glow, 0.24 * dark + 0.1 * glow),
+        horizon=(0.15 * dark + glow, 0.18 * dark + 0.8 * glow, 0.28 * dark + 0.65 * glow),
+    )
+
+
+def _moon(entry: NightEntry, sun: object) -> Sun | None:
+    if sun == "off" or not entry.moon:
+        return None
+    place = {"azimuth_deg": entry.azimuth_deg, "elevation_deg": entry.elevation_deg}
+    return Sun(strength=entry.moon, color=(0.75, 0.87, 1.0), **place)
+
+
+def check_night(recipe: Recipe) -> None:
+    """Raise RecipeError for a sky of night above which the sun stands."""
+    scene = recipe.scene
+    if any(isinstance(sky, NightSky) for sky in alternatives(scene.sky)):
+        for sun in alternatives(scene.sun):
+            if isinstance(sun, SunEntry) and not is_night(sun):
+                raise RecipeError(
+                    "scene.sun: expected auto, off, or a date and time of the night beside sky: night; found one above the "
+                    "horizon: leave it out, or take another sky"
+                )
+
+
+def _angles(entry: SunEntry) -> tuple[float, float] | None:
+    """Azimuth, as for cameras, and elevation of a sun that is given by date, time and place. North is +Y."""
+    if entry.date is None or entry.time is None or entry.latitude is None or entry.longitude is None:
+        return None
+    compass, elevation = sun_position(entry.date, entry.time, entry.latitude, entry.longitude)
+    return (180 - compass) % 360, elevation
+
+
+def is_night(entry: object) -> bool:
+    """Whether a sun that is given by date, time and place, none of them drawn, is below the horizon."""
+    if not isinstance(entry, SunEntry) or is_random((entry.date, entry.time, entry.latitude, entry.longitude)):
+        return False
+    angles = _angles(entry)
+    return angles is not None and angles[1] <= 0
+
+
+def _lights(entries: tuple[LampEntry, ...], rng_of: RngOf) -> tuple[AnyLight, ...]:
+    lights: list[AnyLight] = []
+    for i, entry in enumerate(entries):
+        for j in range(drawn(entry.count, rng_of, ("lights", str(i), "count"))):
+            lamp = drawn(entry, rng_of, ("lights", str(i), str(j)))
+            at = getattr(lamp, "at", None)
+            lights.append(concrete(lamp) if at is None else concrete(lamp, position=_spot(at)))
+    return tuple(lights)
+
+
+def _spot(at: At) -> Vector:
+    x, y, z = orbit_center(math.radians(at.azimuth_deg), math.radians(at.elevation_deg), at.distance).tolist()
+    return x, y, z

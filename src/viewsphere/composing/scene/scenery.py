@@ -1,0 +1,365 @@
+"""What stands around the targets: the pieces of a place, and flat planes with pictures."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from viewsphere import plugins
+from viewsphere.assets.paths.inside import split_source
+from viewsphere.composing.placing import Footprint, footprint, standing
+from viewsphere.composing.scene.pictures import IMAGE_SUFFIXES, files_in, proportions
+from viewsphere.composing.scene.place_file import FileOffers, offers_of
+from viewsphere.composing.seeds import Names, generator, scene_generators, share
+from viewsphere.errors import ModelError, RecipeError, UserError
+from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.rotation import compose, transform
+from viewsphere.model.mistakes import nearest, one_of
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Matrix4
+from viewsphere.recipe.draws import drawn
+from viewsphere.recipe.models import ZOO, unit_metres
+from viewsphere.recipe.motion import Motions
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scenery import Labels, PlaceEntry, PlaneEntry
+from viewsphere.zoo.places import Bay, Lane, Surface, Traffic
+
+TRIES = 200
+"""Spots that are tried for one plane."""
+
+SCENERY = "scenery-"
+"""What keys of scenery begin with."""
+
+UPRIGHT: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+
+
+class Naming(Protocol):
+    """What gives a piece of scenery its category's id: 0 for the background's."""
+
+    def __call__(self, category: str, labels: Labels, /) -> int:
+        """The id."""
+        ...
+
+
+@dataclass(frozen=True)
+class SceneryPiece:
+    """A model and where it stands; `labels` says whether it is an object of its own.
+
+    name: unique in its place; motion: how it moves under time, as the recipe's `field` says.
+    """
+
+    model: ModelSpec
+    world_from_piece: Matrix4
+    labels: Labels
+    name: str = ""
+    motion: Motions | None = None
+    field: str = ""
+
+
+def draw_names(draw: str, model: str, pose: str | None) -> Names:
+    """What a draw is for; `pose` is only needed for one a frame, or a sequence: the frame's name, or the sequence's."""
+    if draw == "fixed":
+        return ()
+    return (model,) if draw == "per_model" or pose is None else (model, pose)
+
+
+def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: Naming) -> tuple[SceneryPiece, ...]:
+    """The place's pieces, turned as the entry says; of a file there is one.
+
+    Raises RecipeError for an unknown place, for a file that is not there, and for motions of pieces that it does not have.
+    """
+    if entry.name:
+        return _moving(entry, _laid_pieces(recipe, entry, _turned(recipe, entry, names), names, category_id))
+    return _moving(entry, (_place_file(recipe, entry, names, category_id),))
+
+
+def _laid_pieces(
+    recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, names: Names, category_id: Naming
+) -> tuple[SceneryPiece, ...]:
+    laid = draw_place(recipe, entry, names)
+    pieces: list[SceneryPiece] = []
+    for piece in laid.pieces:
+        spec = ModelSpec(
+            key=scenery_key(piece.family, f"{piece.seed}"),
+            source=ZOO + piece.family,
+            seed=piece.seed,
+            category=piece.category,
+            category_id=category_id(piece.category, entry.labels),
+            centring="as_is",
+        )
+        pieces.append(SceneryPiece(spec, composed(world_from_place, piece.world_from_piece), entry.labels, piece.name))
+    return tuple(pieces)
+
+
+def _moving(entry: PlaceEntry, pieces: tuple[SceneryPiece, ...]) -> tuple[SceneryPiece, ...]:
+    """The pieces with their motions: the first pattern that a piece's name matches counts."""
+    motions = entry.motion or {}
+    for pattern in motions:
+        if not any(fnmatchcase(piece.name, pattern) for piece in pieces):
+            known = sorted({piece.name.rstrip("0123456789") + "*" for piece in pieces})
+            raise RecipeError(
+                f"scene.place.motion: expected patterns of its pieces' names, such as {', '.join(known)}; found {pattern!r}"
+                f"{nearest(pattern, known)}"
+            )
+    return tuple(_with_motion(piece, motions) for piece in pieces)
+
+
+def _with_motion(piece: SceneryPiece, motions: Mapping[str, Motions]) -> SceneryPiece:
+    for pattern, motion in motions.items():
+        if fnmatchcase(piece.name, pattern):
+            return replace(piece, motion=motion, field=f"scene.place.motion.{pattern}")
+    return piece
+
+
+def place_lanes(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Lane, ...]:
+    """The lanes of a place where it stands, world axes; none where it has none. Raises RecipeError for a file's lane that
+    cannot be one.
+    """
+    if entry is None:
+        return ()
+    world_from_place = np.array(_world_from_place(recipe, entry, names))
+    return tuple(_carried(lane, world_from_place) for lane in _offered(recipe, entry, names).lanes)
+
+
+def place_surfaces(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Surface, ...]:
+    """Where things may stand above the floor of a place, world axes; none where it has none. Raises RecipeError for a file's
+    surface that cannot be one.
+    """
+    if entry is None:
+        return ()
+    world_from_place = _world_from_place(recipe, entry, names)
+    laid = getattr(_offered(recipe, entry, names), "surfaces", ())
+    return tuple(replace(one, world_from_surface=composed(world_from_place, one.world_from_surface)) for one in laid)
+
+
+def is_indoors(recipe: Recipe, entry: PlaceEntry | None) -> bool:
+    """Whether targets are in a room: whether the place's module says INDOORS, or its file."""
+    return entry is not None and (entry.is_room if entry.name else _file_offers(recipe, entry).indoors)
+
+
+def _offered(recipe: Recipe, entry: PlaceEntry, names: Names) -> Any:
+    """What a place offers, in its own axes: a `zoo.places.Place`, or the `FileOffers` of a file."""
+    return draw_place(recipe, entry, names) if entry.name else _file_offers(recipe, entry)
+
+
+def _file_offers(recipe: Recipe, entry: PlaceEntry) -> FileOffers:
+    return offers_of(_file_spec(recipe, entry))
+
+
+def _world_from_place(recipe: Recipe, entry: PlaceEntry, names: Names) -> Matrix4:
+    """World from the axes of a place: those of its layout, or of its file's mesh, of which `origin` is at the world's."""
+    world_from_place = _turned(recipe, entry, names)
+    if entry.name:
+        return world_from_place
+    x, y, z = entry.origin
+    moved = ((1.0, 0.0, 0.0, -x), (0.0, 1.0, 0.0, -y), (0.0, 0.0, 1.0, -z), (0.0, 0.0, 0.0, 1.0))
+    return composed(world_from_place, moved)
+
+
+def _carried(lane: Lane, world_from_place: NDArray[np.float64]) -> Lane:
+    points: Any = tuple(map(tuple, transform(world_from_place, lane.points).tolist()))
+    return replace(lane, points=points)
+
+
+def place_bays(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Bay, ...]:
+    """The parking bays of a place where it stands, in world axes; empty for places without."""
+    if entry is None:
+        return ()
+    world_from_place = _world_from_place(recipe, entry, names)
+    bays = getattr(_offered(recipe, entry, names), "bays", ())
+    return tuple(replace(bay, world_from_bay=composed(world_from_place, bay.world_from_bay)) for bay in bays)
+
+
+def place_pavements(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Lane, ...]:
+    """The pavements of a place where it stands, in world axes; empty for places without."""
+    if entry is None:
+        return ()
+    world_from_place = np.array(_world_from_place(recipe, entry, names))
+    return tuple(_carried(way, world_from_place) for way in getattr(_offered(recipe, entry, names), "pavements", ()))
+
+
+def draw_place(recipe: Recipe, entry: PlaceEntry, names: Names) -> Any:
+    """The layout (a `zoo.places.Place`) that a recipe's seed and these names draw; raises RecipeError for an unknown place."""
+    if entry.parked is None and entry.walkers is None:
+        return _drawn_place(recipe.seed, entry.name, names, None)
+    rngs = scene_generators(recipe.seed, names)
+    parked = None if entry.parked is None else drawn(entry.parked, rngs, ("place", "parked"))
+    walkers = 0 if entry.walkers is None else drawn(entry.walkers, rngs, ("place", "walkers"))
+    return _drawn_place(recipe.seed, entry.name, names, Traffic(parked, walkers))
+
+
+@lru_cache(maxsize=16)
+def _drawn_place(seed: int, name: str, names: Names, traffic: Traffic | None) -> Any:
+    try:
+        module = plugins.place(name)
+    except UserError:
+        raise RecipeError(f"scene.place: {one_of(ZOO + name, [ZOO + known for known in plugins.places()])}") from None
+    rng, draw = generator(seed, "place", name, *names), getattr(module, f"{name}_random")
+    return draw(rng) if traffic is None else draw(rng, traffic)
+
+
+def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footprint | None:
+    """The floor that a place leaves to its targets, None if it does not say. Raises RecipeError for a file whose `origin` is
+    not on its floor.
+    """
+    if entry is None:
+        return None
+    if not entry.name:
+        return _floor_of_file(recipe, entry, names)
+    rectangle = getattr(draw_place(recipe, entry, names), "free", None)
+    if rectangle is None:
+        return None
+    x0, y0, x1, y1 = rectangle
+    return footprint(box_vertices((x0, y0, 0.0), (x1, y1, 0.0)), _turned(recipe, entry, names))
+
+
+def _floor_of_file(recipe: Recipe, entry: PlaceEntry, names: Names) -> Footprint | None:
+    floor = _file_offers(recipe, entry).floor
+    if floor is None:
+        return None
+    if not floor.has(entry.origin):
+        raise RecipeError(
+            f"scene.place.origin: expected a point on {floor.name!r}, the floor of {Path(entry.source).name}, such as "
+            f"{[round(v, 3) for v in floor.middle]}; found {list(entry.origin)}: set origin, or call the object another name"
+        )
+    return footprint(floor.box, composed(_world_from_place(recipe, entry, names), floor.place_from_floor))
+
+
+def _turned(recipe: Recipe, entry: PlaceEntry, names: Names) -> Matrix4:
+    """World from place."""
+    turn = drawn(entry.turn, scene_generators(recipe.seed, names), ("place", "turn"))
+    return standing(np.zeros((8, 3)), azimuth_deg=turn)
+
+
+def composed(a: ArrayLike, b: ArrayLike) -> Matrix4:
+    """The rigid motion (4, 4) that does `b`, then `a`, as things keep it."""
+    rows: Any = tuple(tuple(row) for row in compose(np.array(a), np.array(b)).tolist())
+    return rows
+
+
+def _place_file(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: Naming) -> SceneryPiece:
+    spec = _file_spec(recipe, entry).model_copy(update={"category_id": category_id(entry.category, entry.labels)})
+    return SceneryPiece(spec, _world_from_place(recipe, entry, names), entry.labels, Path(spec.source).stem)
+
+
+def _file_spec(recipe: Recipe, entry: PlaceEntry) -> ModelSpec:
+    """The model of a file; raises RecipeError for one that is not there."""
+    path = recipe.folder / Path(entry.source).expanduser()
+    try:
+        file, inside = split_source(path)
+    except ModelError as error:
+        raise RecipeError(f"scene.place: {error}") from None
+    if not file.is_file():
+        raise RecipeError(f"scene.place: expected zoo:<place> or a model file; found none at {file}")
+    return ModelSpec(
+        key=scenery_key(path.stem, "/".join((file.name, *inside))),
+        source=path.as_posix(),
+        category=entry.category,
+        category_id=0,
+        up=entry.up,
+        forward=entry.forward,
+        unit=None if entry.unit is None else unit_metres(entry.unit),
+        centring="as_is",
+    )
+
+
+def scenery_key(name: str, rest: str) -> str:
+    """A key that says what it is of and differs for other scenery."""
+    safe = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)[:60]
+    return f"{SCENERY}{safe}-{hashlib.sha256(f'{name}/{rest}'.encode()).hexdigest()[:10]}"
+
+
+def plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
+    """Absolute paths of the pictures of each entry of planes, sorted; raises RecipeError where there are none."""
+    found: list[tuple[str, ...]] = []
+    for i, entry in enumerate(recipe.scene.planes):
+        if entry.image is not None:
+            path = recipe.folder / Path(entry.image).expanduser()
+            files = (path.as_posix(),) if path.is_file() else ()
+            problem = f"scene.planes[{i}].image: expected an image file; found none at {path}"
+        else:
+            folder = recipe.folder / Path(entry.images or "").expanduser()
+            files = files_in(folder)
+            endings = ", ".join(IMAGE_SUFFIXES)
+            problem = f"scene.planes[{i}].images: expected a folder with images ({endings}); found none in {folder}"
+        if not files:
+            raise RecipeError(problem)
+        found.append(files)
+    return tuple(found)
+
+
+def plane_spec(recipe: Recipe, entry: PlaneEntry, path: str, category_id: Naming) -> ModelSpec:
+    """The model of a plane with this picture."""
+    file = Path(path)
+    inside = file.relative_to(recipe.folder) if file.is_relative_to(recipe.folder) else file.name
+    return ModelSpec(
+        key=scenery_key(file.stem, f"{inside} {entry.height!r}"),
+        source=path,
+        category=entry.category,
+        category_id=category_id(entry.category, entry.labels),
+        unit=entry.height,
+        centring="floor",
+    )
+
+
+def plane_pieces(
+    recipe: Recipe,
+    images: Sequence[Sequence[str]],
+    model: str,
+    pose: str | None,
+    targets: Sequence[Footprint],
+    category_id: Naming,
+    redraw: Names = (),
+) -> Iterator[SceneryPiece]:
+    """The planes of one model, or of one frame, clear of the targets and of one another; `redraw` names another draw.
+
+    Raises RecipeError where that cannot be.
+    """
+    standing_there = list(targets)
+    for i, entry in enumerate(recipe.scene.planes):
+        names = (*draw_names(entry.draw, model, pose), *redraw)
+        count = drawn(entry.count, scene_generators(recipe.seed, names), ("planes", str(i), "count"))
+        for j in range(count):
+            purpose = (*names, str(i), str(j))
+            if share(recipe.seed, "plane shown", *purpose) >= entry.share:
+                continue
+            rng = generator(recipe.seed, "plane", *purpose)
+            path = images[i][int(rng.integers(len(images[i])))]
+            half = entry.height * proportions(path) / 2
+            box = box_vertices((-half, 0.0, 0.0), (half, 0.0, entry.height))
+            move = _plane_spot(f"scene.planes[{i}]", entry, rng, box, standing_there)
+            standing_there.append(footprint(box, move))
+            yield SceneryPiece(plane_spec(recipe, entry, path, category_id), move, entry.labels)
+
+
+def _plane_spot(
+    where: str, entry: PlaneEntry, rng: np.random.Generator, box: NDArray[np.float64], others: Sequence[Footprint]
+) -> Matrix4:
+    if entry.at is not None:
+        move = standing(box, *entry.at)
+        if not all(footprint(box, move).apart(other, 0.0) for other in others):
+            raise RecipeError(
+                f"{where}.at: expected the plane clear of the models and of other planes; found it in one: move it"
+            )
+        return move
+    assert entry.around is not None
+    (near, far), (low, high) = entry.around.distance, entry.around.azimuth
+    for _ in range(TRIES):
+        distance, azimuth = near + rng.random() * (far - near), low + rng.random() * (high - low)
+        x, y = distance * math.sin(math.radians(azimuth)), -distance * math.cos(math.radians(azimuth))
+        move = standing(box, x, y, azimuth + 180.0)
+        if all(footprint(box, move).apart(other, 0.0) for other in others):
+            return move
+    raise RecipeError(
+        f"{where}.around: expected room for the plane clear of the models and of other planes; found none: "
+        "ask for fewer, or for a larger distance"
+    )

@@ -1,0 +1,53 @@
+"""Motions of the rig over time: one file a kind, named as in recipes; none imports another.
+
+A trajectory is asked once for all instants of a sequence, so that no cut of the sequence changes it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere import plugins
+from viewsphere.composing.trajectories._shake import Handheld, shaken
+from viewsphere.composing.trajectories._world import RigPose, Trajectory, World
+from viewsphere.composing.viewpoints.camera import looking
+from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
+from viewsphere.model.scene import IDENTITY, Vector
+from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, Sphere, Viewpoints
+
+__all__ = ["RigPose", "Trajectory", "World", "instant", "is_still", "shaken", "standing", "trajectory"]
+
+
+def is_still(viewpoints: Viewpoints) -> bool:
+    """Whether the viewpoints are places at which a camera stays, each for a sequence; otherwise they are one motion."""
+    return isinstance(viewpoints, (Grid, Jitter, Sphere, Normal))
+
+
+def trajectory(viewpoints: Viewpoints, folder: Path) -> Trajectory:
+    """The motion that a recipe's viewpoints mean, shaken where they say so; paths start from `folder`, the recipe's.
+
+    Raises RecipeError for a file that cannot be read, ValueError for viewpoints that stay still.
+    """
+    if is_still(viewpoints):
+        raise ValueError(f"trajectory: expected viewpoints that move, got {viewpoints.kind}")
+    steady: Trajectory = plugins.attribute(f"composing.trajectories.{viewpoints.kind}.trajectory")(viewpoints, folder)
+    return Handheld(steady, viewpoints.shake) if viewpoints.shake else steady
+
+
+def standing(viewpoint: Viewpoint, focus: Vector) -> RigPose:
+    """The rig at a viewpoint at which it stays, to be shaken; it looks at `focus` unless the viewpoint has its own target."""
+    now = looking(viewpoint, focus, index=0)
+    return RigPose(np.array(now.world_from_rig), now.focus)
+
+
+def instant(pose: RigPose, index: int, seconds: float, view: int, bins: float, **more: Any) -> Instant:
+    """The instant of a sequence at which the rig is there; `view` numbers its viewpoint, whose categories are `bins` degrees
+    wide. `more` are further fields of the instant.
+    """
+    a, b, c = ((x, y, z, w) for x, y, z, w in pose.world_from_rig[:3].tolist())
+    viewpoint = viewpoint_of(pose.world_from_rig, pose.focus, view, bins).rounded()
+    seen = {"focus": pose.focus, "viewpoint": viewpoint, "intrinsics": pose.intrinsics}
+    return Instant(index=index, world_from_rig=(a, b, c, IDENTITY[3]), seconds=seconds, **seen, **more)

@@ -1,0 +1,54 @@
+"""The hand that is not still."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.composing.trajectories._aim import DIGITS
+from viewsphere.composing.trajectories._world import RigPose, Trajectory, World
+from viewsphere.geometry.noise import noise
+from viewsphere.geometry.rotation import compose, rigid, rotation_about
+from viewsphere.model.camera import Intrinsics
+from viewsphere.recipe.aim import Shake
+
+Float = NDArray[np.float64]
+
+
+def shaken(poses: Sequence[RigPose], shake: Shake, times: Float, world: World) -> tuple[RigPose, ...]:
+    """The poses, turned about and moved along their own axes by smooth noise that follows from the sequence's names."""
+    return tuple(_shaken(poses, shake, times, world))
+
+
+def _shaken(poses: Sequence[RigPose], shake: Shake, times: Float, world: World) -> Iterator[RigPose]:
+    hand = noise(world.rng("shake"), 6, shake.hertz)
+    for pose, seconds in zip(poses, times.tolist(), strict=True):
+        off = hand.at(seconds)
+        by = rigid(rotation_about(math.radians(shake.degrees) * off[:3]), shake.mm / 1000 * off[3:])
+        yield RigPose(np.round(compose(pose.world_from_rig, by), DIGITS) + 0.0, pose.focus, pose.intrinsics)
+
+
+@dataclass(frozen=True, eq=False)
+class Handheld:
+    """A trajectory that is shaken."""
+
+    steady: Trajectory
+    shake: Shake
+
+    @property
+    def digest(self) -> str:
+        """That of the trajectory."""
+        return self.steady.digest
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """That of the trajectory."""
+        return self.steady.intrinsics
+
+    def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
+        """As `Trajectory.poses`."""
+        return shaken(self.steady.poses(times, world), self.shake, times, world)

@@ -1,0 +1,58 @@
+"""Along a lane of the place, as a camera on a car."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.composing.trajectories._aim import aimed, focuses
+from viewsphere.composing.trajectories._along import level
+from viewsphere.composing.trajectories._world import RigPose, World
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.curve import Curve, spline
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.mistakes import one_of
+from viewsphere.recipe.trajectories import DrivePath
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """At an even speed, above the lane's middle or beside it."""
+
+    entry: DrivePath
+    digest: str = ""
+    intrinsics: Intrinsics | None = None
+
+    def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
+        """As `Trajectory.poses`; RecipeError for a place without lanes, or without this one, and a start beyond its end."""
+        entry, curve = self.entry, self._lane(world)
+        if entry.offset >= curve.length:
+            raise RecipeError(
+                f"viewpoints.offset: expected less than {curve.length:.4g} m, the lane's length; found {entry.offset:g}"
+            )
+        lengths = entry.offset + entry.speed * times
+        ahead = level(curve, lengths)
+        right = np.stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))], axis=1)
+        centers = curve.at(lengths) + entry.side * right + np.array([0.0, 0.0, entry.height])
+        return aimed(centers, ahead, focuses(entry, entry.look, times, world), world)
+
+    def _lane(self, world: World) -> Curve:
+        if not world.lanes:
+            raise RecipeError(
+                "viewpoints.kind: expected a place with lanes for drive; found none: set scene.place, or take spline"
+            )
+        lanes = {lane.name: lane for lane in world.lanes}
+        name = self.entry.lane or world.lanes[0].name
+        if name not in lanes:
+            raise RecipeError(f"viewpoints.lane: {one_of(name, tuple(lanes))}")
+        return spline(lanes[name].points, lanes[name].closed)
+
+
+def trajectory(entry: DrivePath, folder: Path) -> Drive:
+    """The motion that an entry of a recipe means."""
+    return Drive(entry)

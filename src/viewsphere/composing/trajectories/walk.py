@@ -1,0 +1,105 @@
+"""A walk at eye height: straight stretches and arcs, or through points, with a gentle bob."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.composing.trajectories._aim import aimed, focuses
+from viewsphere.composing.trajectories._along import level
+from viewsphere.composing.trajectories._world import RigPose, World
+from viewsphere.geometry.curve import Curve, spline
+from viewsphere.model.camera import Intrinsics
+from viewsphere.recipe.trajectories import WalkPath
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """From a time (seconds) on, at a place, with a heading (radians, counter-clockwise from +Y) that changes by `rate` a
+    second.
+    """
+
+    begin: float
+    x: float
+    y: float
+    heading: float
+    rate: float
+
+    def at(self, seconds: float, speed: float) -> tuple[float, float, float]:
+        """Place and heading at a time: on a line, or on an arc of radius speed / rate."""
+        passed = seconds - self.begin
+        heading = self.heading + self.rate * passed
+        if self.rate == 0:
+            way = speed * passed
+            return self.x - way * math.sin(heading), self.y + way * math.cos(heading), heading
+        radius = speed / self.rate
+        x = self.x + radius * (math.cos(heading) - math.cos(self.heading))
+        return x, self.y + radius * (math.sin(heading) - math.sin(self.heading)), heading
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """Steps make the eyes go up and down, and half as often to both sides."""
+
+    entry: WalkPath
+    digest: str = ""
+    intrinsics: Intrinsics | None = None
+
+    def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
+        """As `Trajectory.poses`."""
+        entry = self.entry
+        if self._curve is None:
+            places, ahead = self._freely(times)
+            walked = entry.speed * times
+        else:
+            walked = np.minimum(entry.speed * times, self._curve.length)
+            places, ahead = self._curve.at(walked), level(self._curve, walked)
+        right = np.stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))], axis=1)
+        sway, rise = self._bob(walked)
+        centers = places + sway[:, None] * right + np.array([0.0, 0.0, entry.eye_height])
+        centers[:, 2] += rise
+        return aimed(centers, ahead, focuses(entry, entry.look, times, world), world)
+
+    @cached_property
+    def _curve(self) -> Curve | None:
+        return None if self.entry.points is None else spline([(x, y, 0.0) for x, y in self.entry.points])
+
+    def _freely(self, times: Float) -> tuple[Float, Float]:
+        """Places on the floor and directions (T, 3) from the start on, turn after turn."""
+        stretches = tuple(self._stretches())
+        begins = np.array([stretch.begin for stretch in stretches])
+        found = [
+            stretches[max(int(np.searchsorted(begins, t, side="right")) - 1, 0)].at(t, self.entry.speed) for t in times.tolist()
+        ]
+        places = np.array([(x, y, 0.0) for x, y, _ in found])
+        return places, np.array([(-math.sin(h), math.cos(h), 0.0) for *_, h in found])
+
+    def _stretches(self) -> Iterator[Stretch]:
+        entry = self.entry
+        assert entry.start is not None
+        now = Stretch(0.0, *entry.start, math.radians(entry.heading), 0.0)
+        yield now
+        for turn in entry.turns:
+            rate = math.copysign(math.radians(entry.turn_rate), turn.degrees)
+            for begin, faster in ((turn.at, rate), (turn.at + abs(turn.degrees) / entry.turn_rate, 0.0)):
+                now = Stretch(begin, *now.at(begin, entry.speed), faster)
+                yield now
+
+    def _bob(self, walked: Float) -> tuple[Float, Float]:
+        """Metres to the right, and up, after so many metres."""
+        strides = [2 * math.pi * metres / self.entry.stride for metres in walked.tolist()]
+        sway = np.array([self.entry.bob / 2 * math.sin(phase) for phase in strides])
+        return sway, np.array([self.entry.bob * math.sin(2 * phase) for phase in strides])
+
+
+def trajectory(entry: WalkPath, folder: Path) -> Walk:
+    """The motion that an entry of a recipe means."""
+    return Walk(entry)

@@ -1,0 +1,1 @@
+"""Poses of cameras, drawn, listed and read from files."""

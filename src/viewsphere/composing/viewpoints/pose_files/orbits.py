@@ -1,0 +1,62 @@
+"""Poses as azimuth, elevation, distance and tilt: CSV with a header, and Render for CNN's view files."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+from viewsphere.composing.tables import known_columns
+from viewsphere.composing.viewpoints.pose_files.entries import Orbit, PoseFile
+from viewsphere.composing.viewpoints.pose_files.lines import counted, number, read_lines, read_text
+from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import nearest
+
+NEEDED = ("azimuth", "elevation", "distance")
+TILTS = ("tilt", "theta", "in_plane")
+"""Names of the roll: ours, PASCAL3D+'s, and that of pose estimators; all turn the same way."""
+
+
+def read_csv(path: Path) -> PoseFile:
+    """A table with the columns azimuth, elevation, distance and, if it likes, tilt (or theta); others are left alone.
+
+    Degrees and metres. PASCAL3D+'s `viewpoint` fields have these names and meanings
+    (https://cvgl.stanford.edu/projects/pascal3d.html).
+    """
+    text = read_text(path)
+    delimiter = ";" if ";" in text.partition("\n")[0] else ","
+    rows = csv.DictReader(text.splitlines(), delimiter=delimiter, skipinitialspace=True)
+    try:
+        columns = [c.strip().lower() for c in rows.fieldnames or ()]
+        rows.fieldnames = columns
+        for name in NEEDED:
+            if name not in columns:
+                found = known_columns(NEEDED, columns)
+                raise RecipeError(f"{path}:1: expected columns {', '.join(NEEDED)}; found {found}{nearest(name, columns)}")
+        tilt = next((name for name in TILTS if name in columns), None)
+        names = (*NEEDED, tilt) if tilt else NEEDED
+        entries: list[Orbit] = []
+        for row in rows:
+            where = f"{path}:{rows.line_num}"
+            entries.append(_orbit([number(row[n], f"{where}: {n}") for n in names], where))
+    except csv.Error as error:
+        raise RecipeError(f"{path}:{rows.line_num}: expected CSV; found: {error}") from None
+    return PoseFile(tuple(entries))
+
+
+def read_view(path: Path) -> PoseFile:
+    """Lines of azimuth, elevation, tilt, distance (https://github.com/ShapeNet/RenderForCNN, `render_model_views.py`)."""
+    entries: list[Orbit] = []
+    for line, words in read_lines(path):
+        where = f"{path}:{line}"
+        azimuth, elevation, tilt, distance = counted(words, 4, where)
+        entries.append(_orbit([azimuth, elevation, distance, tilt], where))
+    return PoseFile(tuple(entries))
+
+
+def _orbit(values: list[float], where: str) -> Orbit:
+    orbit = Orbit(*values)
+    if not -90 <= orbit.elevation <= 90:
+        raise RecipeError(f"{where}: elevation: expected -90 to 90 degrees; found {orbit.elevation:g}")
+    if orbit.distance <= 0:
+        raise RecipeError(f"{where}: distance: expected metres above 0; found {orbit.distance:g}")
+    return orbit

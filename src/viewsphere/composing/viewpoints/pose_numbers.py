@@ -1,0 +1,131 @@
+"""The data set's numbers of poses: a pose that was there keeps its number, new ones are counted on.
+
+A pose is known by a 64-bit digest of its name and of where its camera stands. Digests that follow from a part's recipe are
+not kept but computed when somebody appends: they would be more than all else that a plan says.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from base64 import b64decode, b64encode
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from viewsphere.composing.time_steps import TimedPoses
+from viewsphere.composing.viewpoints.poses import ListedPoses, Poses
+from viewsphere.composing.viewpoints.sequence_poses import SequencePoses, TrajectoryPoses, poses_of
+from viewsphere.errors import StoreError
+from viewsphere.model.numbers import Natural
+from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.recipe.viewpoints import Viewpoints
+from viewsphere.store import Part, PlanRecord
+from viewsphere.store.index import Ranges
+from viewsphere.store.shots.records import typed
+
+Indices = NDArray[np.int64]
+Names = NDArray[np.uint64]
+
+_VIEWPOINTS: TypeAdapter[Viewpoints] = TypeAdapter(Viewpoints)
+_TIME, _SEED = TypeAdapter(TimeEntry), TypeAdapter(Natural)
+
+
+def pose_names(views: Poses) -> Names:
+    """The digest of every pose; one of a camera that moves is known by its whole motion."""
+    moving = isinstance(views, SequencePoses) and isinstance(views.base, TrajectoryPoses)
+    motion = (views.viewpoints.model_dump_json(), views.digest) if moving else ()
+    shared = ("shared",) if views.are_shared else ()
+    filled = () if views.are_known or moving else (views.fill,)
+    known = (
+        (views.name(i), tuple(views.view(i)), views.target(i), *motion, *shared, *(fill(i) for fill in filled))
+        for i in range(len(views))
+    )
+    digests = (hashlib.blake2b(repr(one).encode(), digest_size=8).digest() for one in known)
+    return np.frombuffer(b"".join(digests), np.dtype("<u8"))
+
+
+def follows_from_recipe(views: Poses) -> bool:
+    """Whether a recipe alone says which poses these are, without any file."""
+    plain = views.base if isinstance(views, SequencePoses) else views
+    return not isinstance(plain, ListedPoses | TimedPoses) and not plain.digest
+
+
+def kept(names: Names) -> str:
+    """Digests as a part's `pose_names` keeps them."""
+    return b64encode(names.tobytes()).decode()
+
+
+def names_of(there: PlanRecord) -> Names:
+    """The digest of every pose of a data set by its number; 0 for those of which nothing is known."""
+    known = np.zeros(0, np.dtype("<u8"))
+    for part in there.parts:
+        if part.pose_names is not None:
+            new = np.frombuffer(b64decode(part.pose_names), np.dtype("<u8"))
+        else:
+            new = _unknown(pose_names(_views(part)), known) if part.new_poses else known[:0]
+        known = np.concatenate([known, new])
+    return known
+
+
+def numbered(there: PlanRecord, views: Poses) -> tuple[Sequence[int], Names]:
+    """The data set's number of every pose, new ones counted on; and the digests of the new ones."""
+    if not there.poses:
+        return range(len(views)), np.zeros(0, np.dtype("<u8")) if follows_from_recipe(views) else pose_names(views)
+    wanted, known = pose_names(views), names_of(there)
+    new = _unknown(wanted, known)
+    number_of: dict[int, int] = {}
+    for number, name in enumerate((*known.tolist(), *new.tolist())):
+        number_of.setdefault(name, number)
+    return [number_of[name] for name in wanted.tolist()], new
+
+
+def first_numbers(there: PlanRecord) -> Indices:
+    """The first number of every pose: merged data sets may have a pose several times."""
+    _, first, which = np.unique(names_of(there), return_index=True, return_inverse=True)
+    return first[which].astype(np.int64)
+
+
+def has_poses_of(there: PlanRecord, views: Poses) -> bool:
+    """Whether the data set's poses are these, in this order, as is plain from its recipe."""
+    brought = [part for part in there.parts if part.new_poses]
+    if len(brought) != 1 or brought[0].pose_names is not None or not follows_from_recipe(views):
+        return False
+    return there.poses == len(views) and _views(brought[0]) == views
+
+
+def flat(ranges: Iterable[tuple[int, int]]) -> Indices:
+    """The numbers of ranges [first, stop)."""
+    return np.concatenate([np.empty(0, np.int64), *(np.arange(first, stop) for first, stop in ranges)])
+
+
+def as_ranges(numbers: Indices) -> Ranges:
+    """Ascending numbers as ranges [first, stop)."""
+    if not len(numbers):
+        return ()
+    gaps = np.flatnonzero(numbers[1:] - numbers[:-1] > 1)
+    firsts, lasts = np.append(numbers[:1], numbers[gaps + 1]), np.append(numbers[gaps], numbers[-1:])
+    return tuple(zip(firsts.tolist(), (lasts + 1).tolist(), strict=True))
+
+
+def _views(part: Part) -> Poses:
+    """The poses of a part's recipe, one from which they follow; raises StoreError where a stranger changed it."""
+    recipe: dict[str, Any] = part.recipe
+    time = recipe.get("time")
+    try:
+        viewpoints = typed(_VIEWPOINTS, recipe["viewpoints"])
+        return poses_of(viewpoints, time and typed(_TIME, time), typed(_SEED, recipe["seed"]))
+    except (LookupError, ValueError) as error:
+        raise StoreError(
+            f"plan.json: recipe {part.name!r:.100}: expected the viewpoints from which poses follow, found "
+            f"{type(error).__name__}: {error}: render the recipe anew"
+        ) from None
+
+
+def _unknown(wanted: Names, known: Names) -> Names:
+    """Those of the wanted ones that are not known, each once, in their order."""
+    seen = set[int](known.tolist())
+    new = [name for name in dict.fromkeys(wanted.tolist()) if name not in seen]
+    return np.array(new, np.dtype("<u8"))

@@ -1,0 +1,486 @@
+"""From a recipe's viewpoints to poses, and from a pose to a camera."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from abc import abstractmethod
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Self, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.normalise import rotation as axes_rotation
+from viewsphere.composing.seeds import generator
+from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics, Orbit, PoseFile, read_poses
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.geometry.rotation import rigid, transform
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Viewpoint, viewpoint_of
+from viewsphere.model.scene import Vector
+from viewsphere.recipe.aim import Fill, FillBetween
+from viewsphere.recipe.values import Range
+from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Poses(Sequence[Viewpoint]):
+    """The poses of a recipe, in index order, made one by one when asked for: a million of them take no memory.
+
+    `counts` are the factors of their number, outermost loop first.
+    """
+
+    viewpoints: Viewpoints
+    seed: int
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what the recipe does not say of the poses, as it stands in a file; empty if there is no such thing."""
+        return ""
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The lens that a file of poses names, the first one's where poses have lenses of their own."""
+        return None
+
+    def lens(self, index: int) -> Intrinsics | None:
+        """The pose's own lens, None where all have one."""
+        return None
+
+    @property
+    def lowest_elevation(self) -> float:
+        """The lowest elevation there can be, degrees; where they are normal around one, that one."""
+        assert isinstance(self.viewpoints, Grid | Sphere | Normal | Jitter)
+        elevation = self.viewpoints.elevation
+        if isinstance(elevation, Range):
+            elevation = elevation.start
+        return min(elevation) if isinstance(elevation, tuple) else elevation
+
+    @property
+    def are_known(self) -> bool:
+        """Whether the recipe alone says where cameras stand."""
+        return not isinstance(getattr(self.viewpoints, "distance", None), Fill | FillBetween)
+
+    def fill(self, index: int) -> float | None:
+        """The share of the picture that a model fills, from which the pose's distance follows; None where that is given."""
+        return None
+
+    def target(self, index: int) -> Vector | None:
+        """What the camera looks at, world metres; None: the centre of the model's box."""
+        target = self.viewpoints.target
+        return target if isinstance(target, tuple) else None
+
+    @property
+    @abstractmethod
+    def counts(self) -> dict[str, int]:
+        """What there is how many of; the product is the number of poses."""
+
+    @abstractmethod
+    def name(self, index: int) -> str:
+        """The pose's stable name: equal for the same pose wherever it stands in the list."""
+
+    def place(self, index: int) -> str:
+        """The pose's name whenever it is taken: equal at all time steps of an animation."""
+        return self.name(index)
+
+    @abstractmethod
+    def view(self, index: int) -> Orbit:
+        """Where the camera stands."""
+
+    @property
+    def are_shared(self) -> bool:
+        """Return whether random poses are the same for all subjects."""
+        return getattr(self.viewpoints, "shared", False)
+
+    def of(self, subject: str) -> Poses:
+        """The poses that a subject is taken from: random ones are drawn for each, unless they are shared."""
+        return self if self.are_shared else self.drawn_for(subject)
+
+    def drawn_for(self, name: str) -> Poses:
+        """The same poses, random ones drawn anew for this name."""
+        return replace(self, seed=int(generator(self.seed, "viewpoints", name).integers(2**63)))
+
+    @cached_property
+    def _length(self) -> int:
+        return math.prod(self.counts.values())
+
+    def __len__(self) -> int:
+        return self._length
+
+    @overload
+    def __getitem__(self, index: int) -> Viewpoint: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Viewpoint]: ...
+    def __getitem__(self, index: int | slice) -> Viewpoint | Sequence[Viewpoint]:
+        if isinstance(index, slice):
+            return tuple(self._pose(i) for i in range(*index.indices(len(self))))
+        i = index + len(self) if index < 0 else index
+        if not 0 <= i < len(self):
+            raise IndexError(f"expected a pose of 0..{len(self) - 1}, got {index}")
+        return self._pose(i)
+
+    def _pose(self, index: int) -> Viewpoint:
+        view = self.view(index)
+        return Viewpoint(
+            index=index,
+            azimuth_deg=view.azimuth,
+            elevation_deg=view.elevation,
+            distance=view.distance,
+            tilt_deg=view.tilt,
+            fill=self.fill(index),
+            target=self.target(index),
+            category=pose_category(view.azimuth, view.elevation, self.viewpoints.bins),
+        )
+
+
+@dataclass(frozen=True)
+class RepeatedPoses(Poses):
+    """Poses that are each taken several times; all but the times of a pose is the pose's."""
+
+    base: Poses
+
+    @abstractmethod
+    def taken(self, index: int) -> int:
+        """The number, among the poses, of the one that is taken."""
+
+    def drawn_for(self, name: str) -> Self:
+        """The same poses as often, random ones drawn anew for this name."""
+        base = self.base.drawn_for(name)
+        return self if base is self.base else replace(self, viewpoints=base.viewpoints, seed=base.seed, base=base)
+
+    def target(self, index: int) -> Vector | None:
+        """The pose's."""
+        return self.base.target(self.taken(index))
+
+    def place(self, index: int) -> str:
+        """The pose's."""
+        return self.base.place(self.taken(index))
+
+    def view(self, index: int) -> Orbit:
+        """The pose's."""
+        return self.base.view(self.taken(index))
+
+    def fill(self, index: int) -> float | None:
+        """The pose's."""
+        return self.base.fill(self.taken(index))
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The lens that a file of poses names."""
+        return self.base.intrinsics
+
+    def lens(self, index: int) -> Intrinsics | None:
+        """The pose's."""
+        return self.base.lens(self.taken(index))
+
+    @property
+    def lowest_elevation(self) -> float:
+        """That of the poses."""
+        return self.base.lowest_elevation
+
+    @property
+    def are_known(self) -> bool:
+        """Whether the poses are."""
+        return self.base.are_known
+
+
+@dataclass(frozen=True)
+class GridPoses(Poses):
+    """All combinations of a grid: tilt outermost, then distance, elevation, azimuth innermost."""
+
+    viewpoints: Grid | Jitter
+
+    def drawn_for(self, name: str) -> Poses:
+        """The same: nothing is random."""
+        return self
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of tilts, distances, elevations and azimuths."""
+        return self.viewpoints.axis_counts
+
+    def name(self, index: int) -> str:
+        """The pose's values."""
+        fill = self.fill(index)
+        return "pose " + " ".join(repr(v + 0.0) for v in self.view(index)) + ("" if fill is None else f" fill {fill!r}")
+
+    def view(self, index: int) -> Orbit:
+        """The values that this index stands for; distance 1 where that follows from a share to be filled."""
+        tilt, distance, elevation, azimuth = self._places(index)
+        grid = self.viewpoints
+        return Orbit(
+            axis_value(grid.azimuth, azimuth),
+            axis_value(grid.elevation, elevation),
+            1.0 if isinstance(grid.distance, Fill) else axis_value(grid.distance, distance),
+            axis_value(grid.tilt, tilt),
+        )
+
+    def fill(self, index: int) -> float | None:
+        """The share that this index stands for."""
+        distance = self.viewpoints.distance
+        return axis_value(distance.fill, self._places(index)[1]) if isinstance(distance, Fill) else None
+
+    def _places(self, index: int) -> tuple[int, int, int, int]:
+        """The numbers of the tilt, distance, elevation and azimuth."""
+        _, distances, elevations, azimuths = self._axis_lengths
+        index, azimuth = divmod(index, azimuths)
+        index, elevation = divmod(index, elevations)
+        return *divmod(index, distances), elevation, azimuth
+
+    @cached_property
+    def _axis_lengths(self) -> tuple[int, ...]:
+        return tuple(self.viewpoints.axis_counts.values())
+
+
+@dataclass(frozen=True)
+class JitteredPoses(Poses):
+    """Random offsets on a grid; the draws for one pose of the grid follow one another."""
+
+    viewpoints: Jitter
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Those of the grid, and the draws for each of its poses."""
+        return {**self.viewpoints.axis_counts, "draws": self.viewpoints.count}
+
+    def name(self, index: int) -> str:
+        """The values of the grid's pose, and the number of the draw."""
+        place, draw = divmod(index, self.viewpoints.count)
+        return f"{self._grid.name(place)} draw {draw}"
+
+    def view(self, index: int) -> Orbit:
+        """The grid's pose, moved."""
+        around, by = self._grid.view(index // self.viewpoints.count), self.viewpoints.plus_minus
+        azimuth, elevation, distance, tilt = generator(self.seed, "jitter", self.name(index)).random(4)
+        low, high = max(around.elevation - by.elevation, -90.0), min(around.elevation + by.elevation, 90.0)
+        return Orbit(
+            around.azimuth + (2 * azimuth - 1) * by.azimuth,
+            low + elevation * (high - low),
+            around.distance + (2 * distance - 1) * by.distance,
+            around.tilt + (2 * tilt - 1) * by.tilt,
+        )
+
+    def fill(self, index: int) -> float | None:
+        """The grid pose's."""
+        return self._grid.fill(index // self.viewpoints.count)
+
+    @cached_property
+    def _grid(self) -> GridPoses:
+        return GridPoses(self.viewpoints, self.seed)
+
+
+@dataclass(frozen=True)
+class SpherePoses(Poses):
+    """Uniform by area on the sphere, or on the part of it between two azimuths and two elevations."""
+
+    viewpoints: Sphere
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The number of draws."""
+        return {"draws": self.viewpoints.count}
+
+    def name(self, index: int) -> str:
+        """The number of the draw."""
+        return f"draw {index}"
+
+    def view(self, index: int) -> Orbit:
+        """Azimuth, the sine of the elevation, distance and tilt, each uniform; distance 1 where a share is to be filled."""
+        part = self.viewpoints
+        u = self._shares(index)
+        low, high = (math.sin(math.radians(e)) for e in part.elevation)
+        sine = min(max(low + u[1] * (high - low), -1.0), 1.0)
+        elevation = min(max(math.degrees(math.asin(sine)), part.elevation[0]), part.elevation[1])
+        metres = (1.0, 1.0) if isinstance(part.distance, FillBetween) else part.distance
+        azimuth, distance, tilt = (
+            lo + x * (hi - lo) for x, (lo, hi) in ((u[0], part.azimuth), (u[2], metres), (u[3], part.tilt))
+        )
+        return Orbit(azimuth, elevation, distance, tilt)
+
+    def fill(self, index: int) -> float | None:
+        """A uniform share."""
+        distance = self.viewpoints.distance
+        return _between(distance.fill, self._shares(index)[2]) if isinstance(distance, FillBetween) else None
+
+    def _shares(self, index: int) -> Float:
+        return generator(self.seed, "sphere", self.name(index)).random(4)
+
+
+@dataclass(frozen=True)
+class NormalPoses(Poses):
+    """Normal around one pose."""
+
+    viewpoints: Normal
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The number of draws."""
+        return {"draws": self.viewpoints.count}
+
+    def name(self, index: int) -> str:
+        """The number of the draw."""
+        return f"draw {index}"
+
+    def view(self, index: int) -> Orbit:
+        """A draw; those beyond a pole, or at no distance, are drawn again."""
+        mean, sd = self.viewpoints, self.viewpoints.sd
+        metres = 1.0 if isinstance(mean.distance, FillBetween) else mean.distance
+        rng = generator(self.seed, "normal", self.name(index))
+        while True:
+            view = Orbit(
+                rng.normal(mean.azimuth, sd.azimuth),
+                rng.normal(mean.elevation, sd.elevation),
+                rng.normal(metres, sd.distance),
+                rng.normal(mean.tilt, sd.tilt),
+            )
+            if abs(view.elevation) <= 90 and view.distance > 0:
+                return view
+
+    def fill(self, index: int) -> float | None:
+        """A uniform share."""
+        distance = self.viewpoints.distance
+        if not isinstance(distance, FillBetween):
+            return None
+        return _between(distance.fill, float(generator(self.seed, "fill", self.name(index)).random()))
+
+
+def _between(ends: tuple[float, float], share: float) -> float:
+    return float(ends[0] + share * (ends[1] - ends[0]))
+
+
+@dataclass(frozen=True)
+class ListedPoses(Poses):
+    """Poses of a file. A motion's target is the point on the optical axis that is nearest to the models, 1 m ahead of the
+    camera if that lies behind it.
+    """
+
+    viewpoints: PoseList
+    file: PoseFile
+
+    def drawn_for(self, name: str) -> Poses:
+        """The same: nothing is random."""
+        return self
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The number of poses."""
+        return {"poses": len(self.file.entries)}
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the poses and the lens, and of all that a file of shots says."""
+        shots = "".join(shot.said.model_dump_json() for shot in self.file.shots)
+        return hashlib.sha256((repr(self.file) + shots).encode()).hexdigest()
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The file's lens, if it names one, the first of several."""
+        return self.file.lenses[0] if self.file.lenses else self.file.intrinsics
+
+    def lens(self, index: int) -> Intrinsics | None:
+        """The pose's own lens, where the file names several."""
+        return self.file.lenses[index] if self.file.lenses else None
+
+    @property
+    def lowest_elevation(self) -> float:
+        """Of orbits; motions may be below the ground, or not, whatever their angles."""
+        return min((view.elevation for view, target in self._views if target is None), default=90.0)
+
+    def name(self, index: int) -> str:
+        """The pose's values, and how often they were there before: a camera that rests has equal poses; a shot's own name."""
+        return self._names[index]
+
+    def view(self, index: int) -> Orbit:
+        """The values of the file, or those of a motion."""
+        return self._views[index][0]
+
+    def target(self, index: int) -> Vector | None:
+        """The recipe's for orbits; of a motion, a point on the optical axis."""
+        return self._views[index][1] or super().target(index)
+
+    @cached_property
+    def _views(self) -> tuple[tuple[Orbit, Vector | None], ...]:
+        turn = world_turn(self.viewpoints, self.file)
+        return tuple(
+            self._view_of(turn, entry) if isinstance(entry, Extrinsics) else (entry, None) for entry in self.file.entries
+        )
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        if self.file.shots:
+            return tuple(_shot_name(shot) for shot in self.file.shots)
+        seen: Counter[str] = Counter()
+        names: list[str] = []
+        for view, target in self._views:
+            name = "pose " + " ".join(repr(v + 0.0) for v in (*view, *(target or ())))
+            names.append(f"{name} again {seen[name]}" if seen[name] else name)
+            seen[name] += 1
+        return tuple(names)
+
+    def _view_of(self, turn: Float, motion: Extrinsics) -> tuple[Orbit, Vector]:
+        view = viewpoint_of(placed(motion, turn, self.viewpoints), (0.0, 0.0, 0.0), 0)
+        assert view.target is not None
+        return Orbit(view.azimuth_deg, view.elevation_deg, view.distance, view.tilt_deg), view.target
+
+
+def _shot_name(shot: Arranged) -> str:
+    """The shot's name, and a digest of what it says: one that is changed is another."""
+    return f"shot {shot.name} {hashlib.sha256(shot.said.model_dump_json().encode()).hexdigest()[:16]}"
+
+
+def world_turn(viewpoints: PoseList, file: PoseFile) -> Float:
+    """Our world from a file's, (3, 3)."""
+    up = viewpoints.up or file.up
+    return axes_rotation(up, viewpoints.forward or ("-z" if up[1] == "y" else "-y"), "viewpoints")
+
+
+def placed(motion: Extrinsics, turn: Float, viewpoints: PoseList) -> Float:
+    """The pose of a file's camera in our world, (4, 4), metres, OpenCV axes."""
+    rotation = transform(turn, motion.R)  # rows: the camera's axes
+    return rigid(rotation.T, viewpoints.scale * transform(turn, np.subtract(motion.center, viewpoints.origin)))
+
+
+def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
+    """The poses of a recipe's viewpoints; `seed` and `folder`, from which paths start, are the recipe's.
+
+    Raises RecipeError for a file of poses that cannot be read.
+    """
+    match viewpoints:
+        case PoseList():
+            path = folder / Path(viewpoints.path).expanduser()
+            return ListedPoses(viewpoints, seed, pose_file(path, viewpoints))
+        case Jitter():
+            return JitteredPoses(viewpoints, seed)
+        case Sphere():
+            return SpherePoses(viewpoints, seed)
+        case Normal():
+            return NormalPoses(viewpoints, seed)
+        case Grid():
+            return GridPoses(viewpoints, seed)
+        case _:
+            raise RecipeError(
+                f"viewpoints.kind: expected grid, sphere, normal, jitter or file without time; found {viewpoints.kind}, which "
+                "needs time: set time: {frames: 50, fps: 25}"
+            )
+
+
+def pose_file(path: Path, viewpoints: PoseList, zooms: bool = False) -> PoseFile:
+    """What a file of poses, or the camera of a 3D file, says; with `zooms` the camera's lens may change. Raises RecipeError for
+    files that cannot be read.
+    """
+    from viewsphere.composing.viewpoints.pose_files import cameras
+
+    is_scene = viewpoints.format == "cameras" or (viewpoints.format == "auto" and path.suffix.lower() in cameras.SUFFIXES)
+    if not is_scene:
+        for name in viewpoints.of_cameras:
+            raise RecipeError(f"viewpoints.{name}: expected a 3D file ({', '.join(cameras.SUFFIXES)}); found {path}")
+        return read_poses(path, viewpoints.format, viewpoints.every)
+    return cameras.read_cameras(path, viewpoints, zooms).thinned(viewpoints.every)

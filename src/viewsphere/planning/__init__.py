@@ -1,0 +1,1 @@
+"""From a recipe to rows: models, viewpoints, splits, rigs; the samplers."""

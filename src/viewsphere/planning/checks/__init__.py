@@ -1,0 +1,1 @@
+"""Checks and warnings of a plan, before anything is rendered."""

@@ -1,0 +1,284 @@
+"""What has to hold of a recipe before it is planned; each check raises RecipeError for the first thing that does not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from typing import TypeVar
+
+from pydantic import JsonValue
+
+from viewsphere import plugins
+from viewsphere.composing.layouts import check_layout, check_orientation
+from viewsphere.composing.redraws import redraws_frames
+from viewsphere.composing.viewpoints.poses import Poses
+from viewsphere.errors import RecipeError
+from viewsphere.labels import Needs, channels, labels, on_request
+from viewsphere.model.channel import MATERIAL_PASSES, PASSES, PICTURES
+from viewsphere.model.mistakes import nearest, one_of, read_options, shown
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.suggestions import suggestion
+from viewsphere.planning.models import count_models
+from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.light import NightSky
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.rig import SensorList
+from viewsphere.recipe.scenes import SamplerEntry, ScenesEntry
+from viewsphere.recipe.surface import GroundEntry
+from viewsphere.recipe.weather import FogEntry
+
+Said = TypeVar("Said")
+
+
+def check_redraws(recipe: Recipe) -> None:
+    """Something can be drawn again where too little is seen of a model; only still pictures may be empty."""
+    for name in ("min_visibility", "wanted", "empty") if recipe.time is not None else ():
+        if getattr(recipe, name) is not None:
+            raise RecipeError(f"{name}: expected none beside time, as it is about single pictures; found one: leave it out")
+    if recipe.wanted is not None and recipe.min_visibility is not None:
+        raise RecipeError("wanted: expected wanted or min_visibility; found both: write wanted: {visibility: [0.3, 1]}")
+    for name in ("min_visibility", "wanted"):
+        if getattr(recipe, name) is not None and not redraws_frames(recipe):
+            raise RecipeError(
+                f"{name}: expected something to draw again, viewpoints of kind sphere, normal or jitter, scene.jitter or "
+                f"scene.company.draw: per_frame; found viewpoints of kind {recipe.viewpoints.kind} and nothing drawn for each "
+                "frame"
+            )
+
+
+def check_distractors(recipe: Recipe) -> None:
+    """There are models to be told from distractors, and distractors where some are asked for, and only there."""
+    unlabelled = [i for i, entry in enumerate(recipe.models) if not entry.is_labelled]
+    asked = span(recipe.scenes.distractors)[1] if isinstance(recipe.scenes, ScenesEntry) else 0
+    if len(unlabelled) == len(recipe.models):
+        raise RecipeError(
+            "models[0].labels: expected models that are labelled beside distractors; found none: leave labels out"
+        )
+    if unlabelled and not asked:
+        raise RecipeError(
+            f"models[{unlabelled[0]}].labels: expected scenes.distractors beside background, how many are put among the "
+            "others; found none: set scenes: {count: 100, distractors: [1, 5]}"
+        )
+    if asked and not unlabelled:
+        raise RecipeError("scenes.distractors: expected models with labels: background; found none")
+
+
+def check_names(recipe: Recipe) -> None:
+    """The engine, the formats, the sampler, the placer and the channels are known, and still pictures are enough for these."""
+    _check_plugin("engine", "engines", recipe.engine.name)
+    for i, entry in enumerate(recipe.formats):
+        _check_plugin(f"formats[{i}]", "formats", entry.name)
+        if entry.options:
+            entry.arguments(f"formats[{i}].{entry.name}")
+    company = recipe.scene.company
+    if company is not None:
+        check_layout(company.layout, "scene.company")
+        check_orientation(company.orientation, "scene.company")
+    _check_plugin("scenes.sampler", "samplers", recipe.sampler)
+    if isinstance(recipe.scenes, SamplerEntry):
+        plugins.load(SamplerSpec, recipe.sampler).read_options(recipe.sampler, recipe.scenes.options, "scenes")
+    if isinstance(recipe.scenes, ScenesEntry):
+        check_layout(recipe.scenes.layout, "scenes")
+        check_orientation(recipe.scenes.orientation, "scenes")
+    for i, name in enumerate(recipe.channels):
+        if name in on_request():
+            raise RecipeError(f"channels[{i}]: expected a channel; found {name}, which is one of annotations")
+        if name not in channels():
+            raise RecipeError(f"channels[{i}]: {_unknown(name, tuple(channels()))}")
+        check_needs(recipe, f"channels[{i}]", name)
+        _check_painted(recipe, f"channels[{i}]", name)
+    for i, name in enumerate(recipe.annotations):
+        _check_annotation(recipe, f"annotations[{i}]", name)
+    for name, given in recipe.labels.items():
+        _check_options(recipe, name, given)
+
+
+def _check_plugin(field: str, kind: plugins.Kind, name: str) -> None:
+    """A plug-in that is known."""
+    known = plugins.names(kind)
+    if name not in known:
+        raise RecipeError(f"{field}: {one_of(name, known)}")
+
+
+def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
+    """A label that can be asked for, with what it needs."""
+    if name in channels():
+        raise RecipeError(f"{where}: expected a label of objects or of pictures; found {name}, which is one of channels")
+    if name in labels() and name not in on_request():
+        raise RecipeError(f"{where}: expected a label on request; found {name}, which every data set has: leave it out")
+    if name not in on_request():
+        of = [label.name for label in on_request().values() if name in {field.name for field in label.fields}]
+        known = f"expected a label; found {name}, a field of {of[0]}: name that" if of else _unknown(name, tuple(on_request()))
+        raise RecipeError(f"{where}: {known}")
+    check_needs(recipe, where, name)
+
+
+def _unknown(name: str, known: tuple[str, ...]) -> str:
+    """The message of a name that is no such label, with a word where a label that every data set has is meant."""
+    meant = None if suggestion(name, known) else suggestion(name, labels())
+    if meant is None or meant in on_request() or meant in channels():
+        return one_of(name, known)
+    return f"{shown(name)} is unknown; `{meant}` is in every data set: leave it out. Valid: {', '.join(known)}"
+
+
+def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) -> None:
+    """Options of a label that the recipe names."""
+    if name not in labels():
+        raise RecipeError(f"labels: {one_of(name, tuple(name for name, label in labels().items() if label.options))}")
+    options = labels()[name].options
+    if options is None:
+        raise RecipeError(f"labels.{name}: expected no options, {name} has none; found {', '.join(given) or 'a mapping'}")
+    if name not in (*recipe.channels, *recipe.annotations):
+        raise RecipeError(
+            f"labels: expected labels that the recipe names; found {name!r}: name it in channels or annotations, too"
+        )
+    read_options(options, given, f"labels.{name}")
+
+
+def check_needs(recipe: Recipe, where: str, name: str) -> None:
+    """See that the recipe has what a label compares: instants, sensors, a LiDAR, tracks; raises RecipeError."""
+    needs, rig = labels()[name].needs if name in labels() else Needs(), recipe.rig
+    for field, what, is_lacking in (
+        ("time", "whose instants are compared", bool(needs.instants or needs.poses) and recipe.time is None),
+        ("rig", "whose sensors are compared", needs.rig and recipe.rig is None),
+        ("rig", "with a sensor that is rectified with its own", needs.rectified and recipe.rig is None),
+        ("rig", "with a LiDAR among its sensors", needs.lidar and not (isinstance(rig, SensorList) and rig.has_lidar)),
+        ("tracks", "which say what is followed", needs.tracks and recipe.tracks is None),
+    ):
+        if is_lacking:
+            raise RecipeError(f"{where}: expected {field} beside {name}, {what}; found none: set {field}")
+
+
+def _check_painted(recipe: Recipe, where: str, name: str) -> None:
+    """A pass needs an engine that paints it, and what surfaces are made of needs materials that viewsphere made."""
+    paints = _engine_says(recipe, "PAINTS", PICTURES)
+    if name in PASSES and name not in paints:
+        raise RecipeError(
+            f"{where}: expected a label, or what engine: {recipe.engine.name} paints ({', '.join(paints)}); found {name}: "
+            "leave it out, or take engine: raster or cycles"
+        )
+    if name in MATERIAL_PASSES and recipe.scene.blend is not None:
+        raise RecipeError(
+            f"{where}: expected no {name} with scene.blend, whose materials may be any nodes; found it: leave it out, or take "
+            "the file's meshes alone by scene.place"
+        )
+
+
+def check_blend(recipe: Recipe) -> None:
+    """A .blend file as the scene needs an engine that renders it."""
+    if recipe.scene.blend is not None and not _engine_says(recipe, "OPENS_SCENES", False):
+        raise RecipeError(
+            f"scene.blend: expected engine: cycles, eevee or workbench, which render the file; found {recipe.engine.name}: "
+            "name one of these, or take the file's meshes alone by scene.place"
+        )
+
+
+def check_catcher(recipe: Recipe) -> None:
+    """A ground that may be a shadow catcher needs an engine that has one."""
+    scene = recipe.scene
+    grounds = [scene.automatic_ground if ground == "auto" else ground for ground in alternatives(scene.ground)]
+    catches = any(ground == "catcher" or (isinstance(ground, GroundEntry) and ground.catcher) for ground in grounds)
+    if catches and not _engine_says(recipe, "CATCHES_SHADOWS", True):
+        raise RecipeError(
+            f"scene.ground: expected on, off or a material for engine: {recipe.engine.name}; found catcher, which auto is "
+            "before background: environment: set it to off, or take engine: cycles or raster"
+        )
+
+
+def _engine_says(recipe: Recipe, name: str, default: Said) -> Said:
+    return getattr(plugins.load("engines", recipe.engine.name), name, default)
+
+
+def check_frames(recipe: Recipe, views: Poses) -> None:
+    """Not more models x poses than are wanted at most, where these are what is taken."""
+    if recipe.scenes is not None:
+        return
+    models, count = count_models(recipe), math.prod(views.counts.values())
+    if models * count > recipe.max_frames:
+        factors = " x ".join(f"{n:,} {what}" for what, n in {"models": models, **views.counts}.items())
+        raise RecipeError(
+            f"viewpoints: expected at most {recipe.max_frames:,} frames; found {models * count:,} ({factors}): "
+            f"set max_frames: {models * count} in the recipe if that is meant"
+        )
+
+
+def check_sizes(recipe: Recipe, views: Poses, sampler: SamplerSpec) -> None:
+    """Pictures that take their lenses from a file are of one size, unless the sampler makes them of any."""
+    if not recipe.camera.of_viewpoints or sampler.of_any_size:
+        return
+    sizes = {f"{lens.width} x {lens.height}" for i in range(len(views)) if (lens := views.lens(i))}
+    if len(sizes) > 1:
+        raise RecipeError(
+            f"camera.of_viewpoints: expected lenses of one size; found {', '.join(sorted(sizes)[:3])}: list what they show, "
+            "with scenes: {sampler: listed}"
+        )
+
+
+def check_all_frames(recipe: Recipe, frames: int, factors: str) -> None:
+    """Not more frames than are wanted at most, with all time steps or scenes."""
+    if frames > recipe.max_frames:
+        raise RecipeError(
+            f"models: expected at most {recipe.max_frames:,} frames; found {frames:,} ({factors}): "
+            f"set max_frames: {frames} in the recipe if that is meant"
+        )
+
+
+def check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
+    """The models that the splits list have to be there, once; if no split has a share, all have to be listed."""
+    keys, seen = {spec.key for spec in specs}, dict[str, str]()
+    for name, listed in recipe.splits.shares.items():
+        for key in listed if isinstance(listed, tuple) else ():
+            if key not in keys:
+                raise RecipeError(f"splits.{name}: expected keys of models; found {key!r}{nearest(key, keys)}")
+            if key in seen:
+                raise RecipeError(
+                    f"splits.{name}: expected every model in one split; found {key!r}, listed in {seen[key]!r} too"
+                )
+            seen[key] = name
+    if all(isinstance(s, tuple) for s in recipe.splits.shares.values()) and keys - seen.keys():
+        raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
+
+
+def check_photo(recipe: Recipe) -> None:
+    """A photograph as the background has its own weather and hour: fog and night do not reach it."""
+    scene = recipe.scene
+    if not any(entry.image is not None or entry.images is not None for entry in scene.backgrounds):
+        return
+    is_foggy = any(isinstance(fog, FogEntry) for fog in alternatives(scene.fog))
+    is_dark = any(isinstance(sky, NightSky) for sky in alternatives(scene.sky))
+    if is_foggy or is_dark:
+        field, what = ("scene.fog", "fog") if is_foggy else ("scene.sky", "night")
+        raise RecipeError(
+            f"{field}: {what} does not reach the photographs of `scene.background`, which would stay clear and bright behind "
+            f"the models. Leave out {what}, or use `background: sky` or photographs of such weather with `scene.sun: off`"
+        )
+
+
+def check_shutter(recipe: Recipe) -> None:
+    """What moves is blurred once: by an open shutter, or by an effect."""
+    blurs = alternatives(recipe.scene.effects.motion_blur)
+    if recipe.time is not None and recipe.time.shutter and any(span(blur)[1] > 0 for blur in blurs):
+        raise RecipeError(
+            "time.shutter: expected 0 beside scene.effects.motion_blur, which blurs pictures, too; found "
+            f"{recipe.time.shutter:g}: leave one of them out"
+        )
+
+
+def check_splits(recipe: Recipe) -> None:
+    """Splits by place need a place."""
+    if recipe.splits.by == "place" and recipe.scene.place is None:
+        raise RecipeError(
+            "splits.by: expected scene.place, whose draws it tells apart; found none: set one, or split by model, pose or frame"
+        )
+
+
+def check_materials(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
+    """Every change of materials is for some model."""
+    for i, entry in enumerate(recipe.scene.materials):
+        if not any(fnmatchcase(spec.key, entry.models) for spec in specs):
+            raise RecipeError(
+                f"scene.materials[{i}].models: expected a pattern of models' keys, such as {specs[0].key}; "
+                f"found {entry.models!r}, which fits none"
+            )

@@ -1,0 +1,104 @@
+"""What sequences would be refused for, as far as that is known before a model is read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewsphere.composing.layouts import has_ways
+from viewsphere.composing.motion import Lane
+from viewsphere.composing.scene.scenery import SCENERY, SceneryPiece, draw_names, place_pieces
+from viewsphere.composing.seeds import generator
+from viewsphere.composing.trajectories import World
+from viewsphere.composing.viewpoints.sequence_poses import SequencePoses, TrajectoryPoses
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.model.thing import Thing
+from viewsphere.planning.samplers._course import no_such_thing, piece_moving, target_moving, time_of
+from viewsphere.recipe.scenes import ScenesEntry
+
+if TYPE_CHECKING:
+    from viewsphere.planning.plan import Plan
+
+MOST_SUBJECTS = 1000
+"""Subjects that are looked at beforehand, the first ones; the others are when their shots are made."""
+
+UNKNOWN = (np.nan, np.nan, np.nan)
+"""Where something is whose model was not read."""
+
+
+def check_sequences(planned: Plan) -> None:
+    """Raise RecipeError for lanes that there are not, for looks at things that are not there, and for motions that cannot be.
+
+    Each is looked for in the first sequence of a subject; motions drawn for later ones, when these are made.
+    """
+    checked = set[str]()
+    for subject in planned.subjects[:MOST_SUBJECTS]:
+        cast = planned.sampler.cast(planned, subject, 0)
+        lanes = () if planned.composition is None else planned.composition.lanes(subject, planned.scene_pose(0))
+        _check_trajectory(planned, subject, cast, lanes)
+        _check_motions(planned, subject, cast, lanes, checked)
+    _check_pieces(planned)
+
+
+def _check_trajectory(planned: Plan, subject: str, cast: Sequence[ModelSpec], lanes: tuple[Lane, ...]) -> None:
+    """Ask for the rig at the first and at the last instant, in a world where nobody knows where the things are."""
+    assert isinstance(planned.pose_list, SequencePoses)
+    if not isinstance(planned.pose_list.base, TrajectoryPoses):
+        return
+    time, names = time_of(planned), (subject, planned.pose_list.place(0))
+
+    def center(wanted: int | str, instant: int) -> np.ndarray:
+        _check_thing(planned, wanted, cast)
+        return np.array(UNKNOWN)
+
+    world = World(time.fps, UNKNOWN, center, partial(generator, planned.recipe.seed, "rig", *names), lanes)
+    planned.pose_list.base.trajectory.poses(np.array([0.0, time.at(time.count - 1)]), world)
+
+
+def _check_thing(planned: Plan, wanted: int | str, cast: Sequence[ModelSpec]) -> None:
+    """Scenery may be looked at, too, which is known when it is placed."""
+    known = {number: spec.key for number, spec in enumerate(cast, 1)}
+    scenery = planned.composition
+    if isinstance(wanted, int):
+        is_there = wanted <= len(known) + (0 if scenery is None else scenery.most_scenery)
+    else:
+        is_there = wanted in known.values() or (scenery is not None and wanted.startswith(SCENERY))
+    if not is_there:
+        raise no_such_thing(wanted, known)
+
+
+def _check_motions(planned: Plan, subject: str, cast: Sequence[ModelSpec], lanes: tuple[Lane, ...], checked: set[str]) -> None:
+    """Make the motions of models, each model's once."""
+    names = (subject, planned.pose_list.place(0))
+    company, scenes = planned.recipe.scene.company, planned.recipe.scenes
+    entry = scenes if isinstance(scenes, ScenesEntry) else company
+    falls = entry is not None and has_ways(entry.layout)
+    for slot, spec in enumerate(cast):
+        if spec.key not in checked:
+            checked.add(spec.key)
+            way = _nowhere if falls and (slot or scenes is not None) else None
+            target_moving(planned, Thing(id=slot + 1, model=spec), slot, names, lanes, way)
+
+
+def _nowhere(seconds: float) -> Matrix4:
+    """Where a thing is on a way that nobody asked for yet."""
+    return IDENTITY
+
+
+def _check_pieces(planned: Plan) -> None:
+    """Make the motions of a place's pieces, each pattern's once."""
+    subject, pose = planned.subjects[0], planned.scene_pose(0)
+    names = (subject, planned.pose_list.place(0))
+    lanes = () if planned.composition is None else planned.composition.lanes(subject, pose)
+    for piece in {piece.field: piece for piece in _pieces(planned, subject, pose)}.values():
+        piece_moving(planned, Thing(id=0, model=piece.model), piece, names, lanes)
+
+
+def _pieces(planned: Plan, subject: str, pose: str | None) -> Iterator[SceneryPiece]:
+    place = planned.recipe.scene.place
+    if place is not None:
+        yield from place_pieces(planned.recipe, place, draw_names(place.draw, subject, pose), lambda category, labels: 0)

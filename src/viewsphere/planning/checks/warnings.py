@@ -1,0 +1,212 @@
+"""What of a recipe would make pictures without anything to see: no light, an exposure that hides all, a camera that looks away.
+
+All of it is told from the recipe alone, hence of lamps and photographed skies with a wide margin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import product
+from statistics import fmean
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.composing.scene.draws import is_night
+from viewsphere.composing.viewpoints.poses import Poses
+from viewsphere.geometry.camera import orbit_center
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.scene import Sun
+from viewsphere.recipe.draws import alternatives, component, span
+from viewsphere.recipe.light import DaylightSky, HdriSky, NightSky, SunEntry
+from viewsphere.recipe.models import Dimensions, Length, ModelEntry
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scene import SceneEntry
+
+Float = NDArray[np.float64]
+
+MOST_POSES = 1000
+"""Poses that are looked at, evenly over all."""
+
+UNKNOWN = 30.0
+"""How much brighter or darker than its strength says a lamp may be, which may be near, or a photograph."""
+
+DARK, BRIGHT = 2.0**-10, 16.0
+"""Radiance that every view transform shows as black, and as white."""
+
+DRAWS = 20
+"""How often random poses are drawn to tell what is so in their mean."""
+
+MOSTLY = 2 / 3
+"""Share of the picture; a camera that looks ahead has half of it below the horizon."""
+
+BLACKEST = 0.02
+"""Reflectance of the darkest paint."""
+
+SMALLEST = 12
+"""Pixels, of the longer side of its box, below which an object is too small for most detectors."""
+
+TOO_SMALL = f"which for most detectors is too small (under {SMALLEST})"
+
+
+def no_light(scene: SceneEntry) -> Iterator[str]:
+    """A warning if there is no light at all, or none in some of the scenes that may be drawn."""
+    dark = [] if scene.blend is not None else [high == 0 for _, high in _lights(scene)]
+    if any(dark):
+        some = "" if all(dark) else " in some of what may be drawn"
+        yield (
+            f"scene: no light{some}: sun, sky and lights are off or of strength 0: models are black, unless they shine by "
+            "themselves; set scene.sun: on, or a strength"
+        )
+
+
+def hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
+    """A warning for an exposure that makes white black, or black white."""
+    lit = [light for light in _lights(scene) if light[1] > 0]
+    if not lit or scene.blend is not None or scene.view.exposure == "auto":
+        return
+    low, high = span(scene.view.exposure)
+    if max(light[1] for light in lit) * 2**low < DARK:
+        yield f"scene.view.exposure: at {low:g} stops white is black, and so is the picture; raise it, or the lights' strength"
+    if BLACKEST * min(light[0] for light in lit) * 2**high > BRIGHT:
+        yield f"scene.view.exposure: at {high:g} stops black is white, and so is the picture; lower it, or the lights' strength"
+
+
+def out_of_view(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
+    """A warning if the models' centre is in no picture, or jitter moves it out of some; of scenes it is not known.
+
+    How large the models are is not known yet: near ones may still be seen.
+    """
+    scene = recipe.scene
+    if lens.distortion is not None or not views.are_known:
+        return
+    widest = math.hypot(max(lens.cx, lens.width - lens.cx) / lens.fx, max(lens.cy, lens.height - lens.cy) / lens.fy)
+    chosen = _some(views)
+    centres = [views.target(i) for i in chosen]
+    away = [_offset(views, i) for i in chosen]
+    if (
+        recipe.scenes is None
+        and not scene.is_composed
+        and all(c is not None and _misses(np.array([c]), d, widest) for c, d in zip(centres, away, strict=True))
+    ):
+        yield (
+            "viewpoints: the models' centre, which stands at the origin, is in no picture: pictures may be empty; "
+            "look at it with target: center, or from farther away"
+        )
+        return
+    ends = [span(component(scene.jitter.target, axis)) for axis in range(3)]
+    corners = np.array(list(product(*ends)))
+    if not corners.any():
+        return
+    least = 1 + span(scene.jitter.distance)[0]
+    if any(_misses(corners, d * least, widest) for c, d in zip(centres, away, strict=True) if c is None):
+        farthest = float(np.linalg.norm(corners, axis=1).max())
+        yield (
+            f"scene.jitter.target: up to {farthest:.3g} m move the models' centre out of the picture: pictures may be empty; "
+            "ask for less, for a larger viewpoints.distance or for a larger camera.fov_deg"
+        )
+
+
+def hidden_background(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[str]:
+    """A warning if an endless ground hides most of the photographs that are to be the background, in the mean of the poses."""
+    pictures = [entry for entry in scene.backgrounds if entry.image is not None or entry.images is not None]
+    if not pictures or not scene.always_has_ground:
+        return
+    draws = [views.drawn_for(str(n)) for n in range(DRAWS)]  # scenes draw their own poses, few each
+    hidden = fmean(_below_horizon(there.view(i).elevation, lens) for there in draws for i in _some(there, MOST_POSES // DRAWS))
+    if hidden > MOSTLY:
+        yield (
+            f"scene.background: the endless ground hides about {100 * hidden:.0f} % of its pictures; set scene.ground: "
+            "catcher, which shows shadows alone, or off"
+        )
+
+
+def too_small(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
+    """A warning for each entry of models of which the recipe says how long they are, or how much they fill, and that is less
+    than `SMALLEST` pixels at the farthest viewpoint.
+    """
+    chosen = _some(views)
+    fills = [fill for i in chosen if (fill := views.fill(i)) is not None]
+    pixels = min(fills, default=math.inf) * max(lens.width, lens.height)
+    if pixels < SMALLEST:
+        yield f"viewpoints.distance: a share of {min(fills):g} is {pixels:.2g} pixels, {TOO_SMALL}: ask for more"
+    if fills or not views.are_known:
+        return
+    farthest = max(views.view(i).distance for i in chosen) * (1 + span(recipe.scene.jitter.distance)[1])
+    for i, entry in enumerate(recipe.models):
+        length = _length(entry)
+        pixels = math.inf if length is None else length * max(lens.fx, lens.fy) / farthest
+        if pixels < SMALLEST:
+            yield (
+                f"models[{i}]: {length:g} m seen from {farthest:g} m are about {pixels:.2g} pixels, {TOO_SMALL}: come "
+                "nearer, or ask for larger pictures, a longer lens or distance: {fill: ...}"
+            )
+
+
+def _some(views: Poses, most: int = MOST_POSES) -> list[int]:
+    """Numbers of at most so many poses, evenly over all."""
+    return np.unique(np.linspace(0, len(views) - 1, min(len(views), most)).round().astype(int)).tolist()
+
+
+def _below_horizon(elevation_deg: float, lens: Intrinsics) -> float:
+    """The share of a picture's height that lies below the horizon, for a camera without tilt and distortion."""
+    horizon = lens.cy - lens.fy * math.tan(math.radians(min(max(elevation_deg, -89), 89)))
+    return min(max(1 - horizon / lens.height, 0.0), 1.0)
+
+
+def _length(entry: ModelEntry) -> float | None:
+    """The longest side, metres, that a recipe says models have; of a length that is scaled to, that."""
+    if isinstance(entry.scale, Length):
+        return span(entry.scale.length)[0]
+    size = entry.real_size if entry.scale == "real_size" else None
+    return max(size.width, size.height, size.length) if isinstance(size, Dimensions) else None
+
+
+def _offset(views: Poses, index: int) -> Float:
+    """From what a camera looks at to where it stands, (3,)."""
+    view = views.view(index)
+    return orbit_center(math.radians(view.azimuth), math.radians(view.elevation), view.distance)
+
+
+def _misses(targets: Float, offset: Float, widest: float) -> bool:
+    """Whether the origin is out of a picture that looks at one of the targets (N, 3) from this offset (3,) to it."""
+    distance = float(np.linalg.norm(offset))
+    along = targets @ (offset / distance)
+    beside = np.linalg.norm(targets - along[:, None] * (offset / distance), axis=1)
+    depth = distance + along
+    return bool(((depth <= 0) | (beside > widest * np.maximum(depth, 0))).any())
+
+
+def _lights(scene: SceneEntry) -> Iterator[tuple[float, float]]:
+    """About the least and the greatest radiance of white, for every pair of skies and suns that there may be."""
+    lamps = 0.0
+    for lamp in scene.lights:
+        color = max(span(lamp.color)[1], span(getattr(lamp, "below", 0.0))[1])
+        lamps += UNKNOWN * span(lamp.count)[1] * span(lamp.strength)[1] * color
+    for sky, sun in product(alternatives(scene.sky), alternatives(scene.sun)):
+        above, shining = _sky(sky, is_night(sun)), _sun(sun, isinstance(sky, HdriSky))
+        yield above[0] + shining[0], above[1] + shining[1] + lamps
+
+
+def _sky(sky: Any, night: bool) -> tuple[float, float]:
+    if isinstance(sky, HdriSky):
+        return span(sky.strength)[0] / UNKNOWN, span(sky.strength)[1] * UNKNOWN
+    if isinstance(sky, NightSky):
+        low, high = span(sky.night.glow)
+        return low / 2, high + span(sky.night.moon)[1]
+    if isinstance(sky, DaylightSky):
+        low, high = span(sky.daylight.strength)
+        return (0.0, 0.0) if night else (low / UNKNOWN, high * UNKNOWN)
+    low, high = span(sky.strength)
+    colors = [span(sky.zenith), span(sky.horizon)]
+    return low * min(c[0] for c in colors), high * max(c[1] for c in colors)
+
+
+def _sun(sun: Any, photographed: bool) -> tuple[float, float]:
+    if sun == "off" or is_night(sun) or (sun == "auto" and photographed):
+        return 0.0, 0.0
+    entry = sun if isinstance(sun, SunEntry) else Sun()
+    strength, color = span(entry.strength), span(entry.color)
+    return 0.0, strength[1] * color[1] / math.pi

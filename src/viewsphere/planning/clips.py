@@ -1,0 +1,77 @@
+"""Animations of files that models play in sequences: when each begins and ends, and which of its frames are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from viewsphere.assets.timeline import Blenders, Timeline
+from viewsphere.composing.motion import Start, mover
+from viewsphere.composing.seeds import generator
+from viewsphere.composing.time_steps import animated_file, animation, resting
+from viewsphere.errors import each
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import IDENTITY
+from viewsphere.model.thing import TimeStep
+from viewsphere.recipe.models import ModelEntry
+from viewsphere.recipe.motion import MotionEntry, Motions, has_clip, listed
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.sequence import TimeEntry
+
+
+def with_clips(
+    recipe: Recipe, models: Sequence[tuple[ModelSpec, int]]
+) -> tuple[tuple[ModelSpec, ...], tuple[Timeline | None, ...]]:
+    """The models as at the first frame of the animation that each plays, and when that is; None of those that play none.
+    `models` are specifications with the number of their entry.
+
+    Raises RecipeError for files that cannot be read, and for those in which nothing moves, all together.
+    """
+    with Blenders.none_yet() as blenders:
+
+        def line_of(one: tuple[ModelSpec, int]) -> Timeline | None:
+            spec, number = one
+            played = [field for field, motions in playing(recipe, number) if has_clip(motions)]
+            return _timeline(spec, recipe.models[number], played[0], blenders) if played else None
+
+        lines = tuple(each(line_of, models))
+    pairs = zip(models, lines, strict=True)
+    return tuple(spec if line is None else resting(spec, recipe.models[number], line) for (spec, number), line in pairs), lines
+
+
+def playing(recipe: Recipe, number: int) -> tuple[tuple[str, Motions | None], ...]:
+    """The motions that models of an entry may have, with their fields: their own, and those of distractors."""
+    company = recipe.scene.company
+    own = (f"models[{number}].motion", recipe.models[number].motion)
+    return (own,) if company is None else (own, ("scene.company.motion", company.motion))
+
+
+def shown_steps(recipe: Recipe, number: int, spec: ModelSpec, line: Timeline) -> tuple[TimeStep, ...]:
+    """The time steps that may be shown of a model in any sequence, ascending: all frames of its animation where what is shown
+    is drawn.
+    """
+    assert recipe.time is not None
+    found: dict[int, TimeStep] = {}
+    for field, motions in playing(recipe, number):
+        clips = tuple(entry for _, entry in listed(motions, field) if entry.kind == "clip")
+        if any(map(_is_drawn, clips)):
+            return tuple(TimeStep(frame=frame, seconds=line.seconds(frame)) for frame in range(line.first, line.last + 1))
+        if clips:
+            found |= {step.frame: step for step in _played(clips, spec, line, recipe.time, field)}
+    return tuple(found[frame] for frame in sorted(found))
+
+
+def _played(clips: tuple[MotionEntry, ...], spec: ModelSpec, line: Timeline, time: TimeEntry, field: str) -> list[TimeStep]:
+    """The time steps that are shown at all instants, and just before and after, which blurred pictures show."""
+    around = range(-1, time.count + 1) if time.shutter else range(time.count)
+    start = Start(IDENTITY, spec, time.at(time.count - 1), lambda *names: generator(0, *names))
+    there = tuple(entry.model_copy(update={"enter": None, "leave": None}) for entry in clips)
+    moved = mover(there, start.playing(line, field)).at([time.at(i) for i in around])
+    return [step for step in moved.steps if step is not None]
+
+
+def _is_drawn(entry: MotionEntry) -> bool:
+    return any(isinstance(value, (dict, list)) for value in entry.options.values())
+
+
+def _timeline(spec: ModelSpec, entry: ModelEntry, field: str, blenders: Blenders) -> Timeline:
+    return animation(animated_file(spec, field), spec.confined, entry.clip, field, blenders, entry.fps)

@@ -1,0 +1,140 @@
+"""Where a plan's cameras stand before anything is rendered, and whether one would stand inside of a model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.composing.composition import BoxOf
+from viewsphere.composing.redraws import is_redrawn
+from viewsphere.composing.viewpoints.camera import distance_problem, inside_box, looking
+from viewsphere.composing.viewpoints.poses import Poses
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.camera import orbit_center
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.scene import Vector
+from viewsphere.model.thing import Thing
+from viewsphere.planning.plan import Plan
+from viewsphere.planning.samplers import Standing
+
+Float = NDArray[np.float64]
+
+MOST_CAMERAS = 20_000
+"""Poses of a model that are looked at beforehand, evenly over all; the others are when their shot is rendered."""
+
+MOST_RIGS = 1000
+"""Poses of a model for which all sensors of a rig are looked at beforehand, evenly over all."""
+
+MOST_PAIRS = 1_000_000
+"""Likewise of all models together."""
+
+MOST_DRAWS = 20_000
+"""Likewise where each model has random poses of its own: a draw takes some 40 microseconds, so that all take about a second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """Cameras of a plan; those of poses that are the same for all models are computed once."""
+
+    plan: Plan
+    box_of: BoxOf
+    _offsets: dict[range, tuple[Float, Float]] = field(default_factory=dict[range, tuple[Float, Float]])
+
+    def problem(self, subject: str) -> RecipeError | None:
+        """The first pose whose camera would stand inside an object's box, in words; None if there is none.
+
+        Cameras that can be drawn again are left to their shots, and so are draws for each frame and distances by a share of the
+        picture. Room for all objects is looked for in any case.
+        """
+        subject = self.plan.world(subject)
+        for there in self.plan.standing(subject, self.box_of):
+            if not there.views.are_known or is_redrawn(self.plan.recipe):
+                continue
+            most = MOST_PAIRS if there.views is self.plan.pose_list else MOST_DRAWS
+            step = -(-self.plan.poses // max(1, min(MOST_CAMERAS, most // len(self.plan.subjects))))
+            poses = there.poses[::step]
+            cameras = self.cameras(there.things, poses, there.target, subject, there.views)
+            for thing in there.things:
+                box = transform(thing.world_from_object, self.box_of(thing.model, thing.step))
+                inside = inside_box(box, cameras)
+                if inside.any():
+                    view = there.views[poses[int(np.flatnonzero(inside)[0])]]
+                    pose = self.plan.viewpoint(subject, view, there.target)
+                    return RecipeError(f"viewpoints.distance: {distance_problem(pose, box)} (model {thing.key})")
+            if problem := self._of_other_sensors(there, poses[:: -(-len(poses) // MOST_RIGS)], subject):
+                return problem
+        return None
+
+    def _of_other_sensors(self, there: Standing, poses: Sequence[int], subject: str) -> RecipeError | None:
+        """The first pose at which a sensor that is not the rig's first one would stand inside an object's box."""
+        others = self.plan.rig.sensors[1:]
+        if not others:
+            return None
+        x, y, z = self._middle(there.things).tolist() if there.target is None else there.target
+        views = [self.plan.viewpoint(subject, there.views[i], (x, y, z)) for i in poses]
+        rigs = [looking(view, (x, y, z), index=0).world_from_rig for view in views]
+        boxes = [(thing, transform(thing.world_from_object, self.box_of(thing.model, thing.step))) for thing in there.things]
+        for sensor, (thing, box) in product(others, boxes):
+            centers = np.array([transform(rig, np.array(sensor.rig_from_sensor)[:3, 3]) for rig in rigs])
+            for i in np.flatnonzero(inside_box(box, centers)):
+                place = ", ".join(f"{v:.3g}" for v in centers[i])
+                return RecipeError(
+                    f"rig: expected all sensors outside of the models; found {sensor.name} at ({place}) inside the box of "
+                    f"model {thing.key} (pose {views[i].index}): move the sensor nearer to the first one, or the rig away"
+                )
+        return None
+
+    def _middle(self, things: Sequence[Thing]) -> Float:
+        """The middle (3,) of the targets."""
+        targets = [thing for thing in things if thing.is_target]
+        corners = np.concatenate([transform(t.world_from_object, self.box_of(t.model, t.step)) for t in targets])
+        return corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
+
+    def cameras(
+        self,
+        things: Sequence[Thing],
+        poses: Sequence[int],
+        target: Vector | None = None,
+        subject: str | None = None,
+        views: Poses | None = None,
+    ) -> Float:
+        """Where the cameras of these poses of a subject (by default the plan's first) stand, (poses, 3) world metres, when
+        these things are placed; they look at `target`, by default at the middle of what is placed.
+        """
+        middle = self._middle(things) if target is None else np.array(target)
+        subject, views = subject or self.plan.subjects[0], views or self.plan.pose_list
+        if not self.plan.scenes.is_jittered:
+            offsets, own = self._stand(poses, views)
+            return offsets + np.where(np.isnan(own), middle, own)
+        x, y, z = middle.tolist()
+        return np.array([_stand(self.plan.viewpoint(subject, views[i], (x, y, z))) for i in poses])
+
+    def _stand(self, poses: Sequence[int], views: Poses) -> tuple[Float, Float]:
+        """From what the cameras look at to where they stand, and what they look at: NaN where that is the models' centre."""
+        if views is not self.plan.pose_list or not isinstance(poses, range):
+            return _standing(poses, views)
+        if poses not in self._offsets:
+            self._offsets[poses] = _standing(poses, views)
+        return self._offsets[poses]
+
+
+def _standing(poses: Sequence[int], views: Poses) -> tuple[Float, Float]:
+    found = [views.view(i) for i in poses]
+    values = np.array([(view.azimuth, view.elevation, view.distance) for view in found])
+    azimuth, elevation = np.radians(values[:, :2]).T
+    level = np.cos(elevation)
+    direction = np.stack([level * np.sin(azimuth), -level * np.cos(azimuth), np.sin(elevation)], axis=1)
+    targets = np.array([views.target(i) or (math.nan,) * 3 for i in poses])
+    return values[:, 2:] * direction, targets
+
+
+def _stand(pose: Viewpoint) -> Float:
+    """Where the camera of a pose with a target stands, (3,) world metres."""
+    assert pose.target is not None
+    return np.array(pose.target) + orbit_center(math.radians(pose.azimuth_deg), math.radians(pose.elevation_deg), pose.distance)

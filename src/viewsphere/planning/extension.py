@@ -1,0 +1,337 @@
+"""Parts of a data set: what a recipe adds to the frames that are there, and how its plan renders them.
+
+A frame is known by its model's key and its pose; a pose by its name and where the camera stands. A part holds models x poses
+of its recipe less what earlier parts hold. Poses, frames, categories and models are numbered on; nothing is renumbered.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from importlib.metadata import version
+from itertools import chain, groupby
+
+import numpy as np
+
+from viewsphere.composing.composition import BoxOf
+from viewsphere.composing.sendable import Sendable
+from viewsphere.composing.viewpoints.pose_numbers import (
+    Indices,
+    as_ranges,
+    first_numbers,
+    flat,
+    follows_from_recipe,
+    has_poses_of,
+    kept,
+    numbered,
+)
+from viewsphere.errors import RecipeError
+from viewsphere.model.instant import Instant
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
+from viewsphere.model.share import ALL, Share
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import TimeStep
+from viewsphere.planning.fitting import check_fit, settings
+from viewsphere.planning.plan import Plan
+from viewsphere.store import Block, Category, Part, PlanRecord, Row, Simulated, Store
+from viewsphere.store.index import Index, Ranges, numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Portion(Sendable):
+    """A part of a data set, and the plan of its recipe, which renders it. `record` is the whole data set's.
+
+    A run may have a `share` of it: every n-th shot of each index, whatever is there already.
+    """
+
+    plan: Plan
+    record: PlanRecord
+    number: int
+    share: Share = ALL
+
+    @property
+    def part(self) -> Part:
+        """The part."""
+        return self.record.parts[self.number]
+
+    @property
+    def adds_nothing(self) -> bool:
+        """Whether all that its recipe asks for was there before."""
+        return not self.part.frames and not self.part.supplies
+
+    def remembering(self, store: Store) -> Portion:
+        """The same portion, which keeps in the store what is simulated for it."""
+        return replace(self, plan=self.plan.changed(memory=Simulated(store.root)))
+
+    def __str__(self) -> str:
+        """What the part adds, in words."""
+        plan, part = self.plan, self.part
+        there = plan.frames - part.frames
+        less = f" less {there:,} that are there" if there else ""
+        text = f"adds {quantity(part.frames, 'frame')} ({plan.factors}{less})"
+        for number, channels in part.supplies:
+            text += f", and {', '.join(channels)} to {quantity(self.record.parts[number].frames, 'frame')} that are there"
+        return text
+
+    @cached_property
+    def models(self) -> tuple[tuple[ModelSpec, tuple[TimeStep, ...]], ...]:
+        """The models that the recipe keeps, with the data set's numbers of their categories, and their time steps; of a share
+        those that its shots need, and its share of all, so that shares together have every model.
+        """
+        kept = enumerate(self.plan.kept_specs)
+        own = (spec for i, spec in kept if self.share.is_all or self.share.has(i) or spec.key in self._needed)
+        return tuple((self._numbered(spec), self.plan.steps_of(spec)) for spec in own)
+
+    @cached_property
+    def _needed(self) -> frozenset[str]:
+        """Keys of the models that may be in the shots; no more of these are looked at than it takes to find all models."""
+        around = () if self.plan.composition is None else self.plan.composition.models
+        found, every = {spec.key for spec in around}, {spec.key for spec in self.plan.kept_specs}
+        for row in self._told_apart:
+            found.update(spec.key for spec in self.cast(row))
+            if every <= found:
+                break
+        return frozenset(found)
+
+    @property
+    def _told_apart(self) -> Iterator[Row]:
+        """The shots, but for those that show the same models as another."""
+        if self.plan.recipe.scene.is_moved_each_frame:
+            return self.rows
+        return (next(index.of(subject)) for index in self.indices for subject, shots in index.counts.items() if shots)
+
+    @cached_property
+    def indices(self) -> tuple[Index, ...]:
+        """The indices of the shots: of its own ones, then of those with channels of older frames."""
+        return tuple(replace(index, share=self.share) for index in self.record.indices_of(self.number))
+
+    @property
+    def rows(self) -> Iterator[Row]:
+        """The shots, in the order of their indices."""
+        return chain.from_iterable(self.indices)
+
+    @cached_property
+    def subjects(self) -> tuple[str, ...]:
+        """What the shots show, each once; of the whole part all that the plan has."""
+        if self.share.is_all:
+            return self.plan.taken
+        return tuple(dict.fromkeys(subject for index in self.indices for subject, shots in index.counts.items() if shots))
+
+    def find(self, key: str) -> Row | None:
+        """The row of this key among the shots, None if there is none."""
+        return next((row for row in (index.find(key) for index in self.indices) if row is not None), None)
+
+    def cast(self, row: Row) -> tuple[ModelSpec, ...]:
+        """The recipe's models in a shot, that of its frames first."""
+        return self.plan.cast(row.subject, self._of_recipe(row.positions[0][0]))
+
+    def shot(self, row: Row, box_of: BoxOf, tries: Sequence[int] = (), redraw: int = 0) -> Shot:
+        """The shot of a row; `box_of`, `tries`, `redraw` and errors as for `Plan.shot`."""
+        poses = tuple(numbers(row.positions))
+        own = [self._of_recipe(pose) for pose in poses]
+        made = self.plan.take(row.subject, own, box_of, row.key, row.first, tries, redraw)
+        number_of = iter(poses)
+        instants = (_at_pose(now, next(number_of)) if now.recorded else now for now in made.instants)
+        return made.model_copy(
+            update={
+                "things": tuple(thing.model_copy(update={"model": self._numbered(thing.model)}) for thing in made.things),
+                "instants": tuple(instants),
+                "channels": self._channels(row.first),
+            }
+        )
+
+    def whole(self, row: Row) -> Row | None:
+        """Return all poses that the recipe has of a row's scene, in the recipe's numbers, as for `Plan.whole`."""
+        return self.plan.whole(replace(row, positions=as_ranges(np.array(list(map(self._of_recipe, numbers(row.positions)))))))
+
+    def _channels(self, frame: int) -> tuple[str, ...]:
+        return dict(self.part.supplies).get(self.record.part_of(frame), self.part.channels)
+
+    def _of_recipe(self, pose: int) -> int:
+        """The recipe's number of a pose of the data set."""
+        return pose if self._recipe_numbers is None else int(self._recipe_numbers[pose])
+
+    @cached_property
+    def _recipe_numbers(self) -> Indices | None:
+        """The recipe's number of every pose of the data set, -1 for those that it lacks; None where all are the same."""
+        if has_poses_of(self.record, self.plan.pose_list):
+            return None
+        wanted, _ = numbered(self.record, self.plan.pose_list)
+        of_recipe = np.full(self.record.poses, -1, np.int64)
+        of_recipe[wanted] = np.arange(len(wanted))
+        return of_recipe[first_numbers(self.record)]
+
+    @cached_property
+    def _category_ids(self) -> dict[str, int]:
+        return {category.name: category.id for category in reversed(self.record.categories)}
+
+    def _numbered(self, spec: ModelSpec) -> ModelSpec:
+        if not spec.category_id:
+            return spec  # background
+        return spec.model_copy(update={"category_id": self._category_ids[spec.category]})
+
+
+def _at_pose(now: Instant, pose: int) -> Instant:
+    """The instant with the data set's number of its pose."""
+    return now.model_copy(update={"viewpoint": now.viewpoint and now.viewpoint.model_copy(update={"index": pose})})
+
+
+NOTHING = PlanRecord("", "", "", {}, (), (), (), (), 0, 0, 0)
+"""A data set without parts."""
+
+
+def whole(planned: Plan) -> Portion:
+    """A recipe's plan as the only part of a data set."""
+    return extend(planned, NOTHING)
+
+
+def resumed(planned: Plan, there: PlanRecord, number: int) -> Portion:
+    """A part of a data set that this plan began before."""
+    wanted, _ = numbered(there, planned.pose_list)
+    return Portion(planned.keeping(_splits(there.parts[:number]), wanted), there, number)
+
+
+def extend(planned: Plan, there: PlanRecord) -> Portion:
+    """What a recipe adds to a data set, as its new last part.
+
+    Raises RecipeError where the recipe's pictures or labels would not fit those that are there.
+    """
+    with planned.recipe.located():
+        check_fit(planned, there)
+        held_splits = _splits(there.parts)
+        wanted, names = numbered(there, planned.pose_list)
+        planned = planned.keeping(held_splits, wanted)
+        blocks = tuple(_missing(planned, there, wanted))
+        supplies = tuple(_supplies(planned, there, wanted))
+        categories = _categories(planned, there)
+    poses = len(names) if there.poses or len(names) else len(wanted)
+    part = Part(
+        digest=planned.digest,
+        version=version("viewsphere"),
+        name=planned.recipe.name,
+        recipe=planned.recipe.model_dump(mode="json"),
+        channels=_joined(there.channels, planned.recipe.channels),
+        first=there.frames,
+        frames=sum(block.samples for block in blocks),
+        max_objects=planned.max_objects,
+        blocks=blocks,
+        sampler=planned.recipe.sampler,
+        supplies=supplies,
+        shot_frames=planned.shot_frames,
+        settings=settings(planned),
+        new_poses=poses,
+        pose_names=None if not there.poses and follows_from_recipe(planned.pose_list) else kept(names),
+        dealt_splits={key: name for key, name in planned.dealt_splits.items() if key not in held_splits},
+    )
+    record = PlanRecord(
+        version=part.version,
+        digest=part.digest,
+        name=part.name,
+        recipe=part.recipe,
+        categories=categories,
+        splits=_joined(there.splits, planned.splits),
+        channels=part.channels,
+        models=_joined(there.models, (spec.key for spec in planned.kept_specs)),
+        poses=there.poses + poses,
+        frames=there.frames + part.frames,
+        max_objects=max(there.max_objects, planned.max_objects),
+        parts=(*there.parts, part),
+    )
+    return Portion(planned, record, len(there.parts))
+
+
+def _splits(parts: Sequence[Part]) -> dict[str, str]:
+    """The split of every model, scene or sequence that these parts brought, where splits are by these."""
+    return {key: split for part in parts for key, split in part.dealt_splits.items()}
+
+
+def _categories(planned: Plan, there: PlanRecord) -> tuple[Category, ...]:
+    """The data set's, then the recipe's new ones, numbered on; a category is known by its name."""
+    found = {category.name: category for category in reversed(there.categories)}  # imported ones may share a name
+    added: list[Category] = []
+    number = max((category.id for category in there.categories), default=0)
+    for category in planned.categories:
+        known = found.get(category.name)
+        if known is None:
+            number += 1
+            found[category.name] = replace(category, id=number)
+            added.append(found[category.name])
+        elif known.supercategory != category.supercategory:
+            raise RecipeError(
+                f"models: expected supercategory {known.supercategory!r} for category {category.name!r}, as the data set has; "
+                f"found {category.supercategory!r}"
+            )
+    return (*there.categories, *added)
+
+
+def _missing(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterator[Block]:
+    """Blocks of the frames that the data set lacks: subjects in the plan's order, poses in the data set's."""
+    if not there.parts:
+        yield from planned.blocks
+        return
+    held: defaultdict[str, list[Ranges]] = defaultdict(list)
+    for block in chain.from_iterable(part.blocks for part in there.parts if part.is_sampled):
+        for key in block.subjects:
+            held[key].append(block.positions)
+    first_of, asked = first_numbers(there), np.array(wanted, np.int64)
+
+    @cache
+    def lack(positions: Ranges, has: tuple[Ranges, ...]) -> Ranges:
+        return as_ranges(np.setdiff1d(asked[flat(positions)], first_of[flat(chain.from_iterable(has))]))
+
+    for block in planned.blocks:
+        for poses, subjects in groupby(block.subjects, lambda key, block=block: lack(block.positions, tuple(held[key]))):
+            if poses:
+                yield Block(tuple(subjects), poses, block.each)
+
+
+def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterator[tuple[int, tuple[str, ...]]]:
+    """Channels that frames of earlier parts lack: their part's number, and the channels in the table's order."""
+    subjects = set(planned.taken)
+    for number, part in enumerate(there.parts):
+        if not part.is_sampled or not part.frames:
+            continue
+        _check_annotations(planned, part)
+        lacking = tuple(c for c in planned.recipe.channels if c not in there.channels_of(number))
+        if not lacking:
+            continue
+        shown = set(part.subjects)
+        absent = shown - subjects
+        poses = np.unique(first_numbers(there)[flat(chain.from_iterable(block.positions for block in part.blocks))])
+        asked = np.array(wanted, np.int64)
+        together = planned.recipe.scene.company is not None and subjects != shown
+        if not part.is_product:
+            together = planned.recipe.model_dump(mode="json")["models"] != part.recipe["models"]
+        problem = (
+            f"no {'model' if part.is_product else 'scene'} {min(absent)!r}"
+            if absent
+            else f"only {len(np.intersect1d(asked, poses)):,} of {quantity(len(poses), 'pose')}"
+            if not np.isin(poses, asked).all()
+            else f"{'company' if part.is_product else 'scenes'} drawn from other models"
+            if together
+            else None
+        )
+        if problem:
+            raise RecipeError(
+                f"channels: expected all models and poses of the data set in the recipe, to add {lacking[0]} to its frames; "
+                f"found {problem}: list them, or leave {lacking[0]} out"
+            )
+        yield number, lacking
+
+
+def _check_annotations(planned: Plan, part: Part) -> None:
+    """Annotations are computed with their frames, and are not added to those that are there."""
+    known = part.recipe.get("annotations", ())
+    absent = next((name for name in planned.recipe.annotations if name not in known), None)
+    if absent:
+        raise RecipeError(
+            f"annotations: expected those of the frames that are there ({', '.join(known) or 'none'}), which get no others; "
+            f"found {absent}: leave it out, or render to another folder"
+        )
+
+
+def _joined(old: Sequence[str], new: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*old, *new)))

@@ -1,0 +1,436 @@
+"""From a recipe's model entries to one specification a model: files found, keys made, sizes looked up."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import re
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
+from functools import cache
+from glob import has_magic
+from itertools import chain
+from pathlib import Path
+from typing import Literal
+
+from viewsphere.assets.load import BLENDER_SUFFIXES, UP, check_source, needs_blender
+from viewsphere.assets.paths.inside import split_source
+from viewsphere.blender.interpreter import find_blender
+from viewsphere.composing.scene.entries_walked import below, matching, named
+from viewsphere.composing.seeds import generator, share
+from viewsphere.composing.tables import Cells, table_rows
+from viewsphere.errors import ModelError, RecipeError, each
+from viewsphere.limits import limits
+from viewsphere.model.file_names import is_reserved
+from viewsphere.model.mistakes import nearest, one_of
+from viewsphere.model.model_spec import ModelSpec, Size
+from viewsphere.plugins import families
+from viewsphere.recipe.draws import drawn
+from viewsphere.recipe.models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.store import Category
+from viewsphere.zoo import things
+
+MODEL_SUFFIXES = frozenset({".obj", ".glb", ".gltf", ".ply", ".stl", ".off", ".dae", ".3mf"})
+"""Endings that folders and patterns are searched for; others are found by patterns that end in them, as `cars/*.fbx` does."""
+
+ANY = "any"
+"""Stands for every family of the zoo whose members are things."""
+
+LONGEST_KEY = 150
+"""Bytes; names of files and of folders that are being written add up to some hundred more."""
+
+COLUMNS = ("name", "width", "height", "length")
+Sizes = Mapping[str, tuple[float, float, float]]
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A model that an entry means: the entry's index, the key it would like, a file's path or `zoo:<family>`."""
+
+    entry: int
+    key: str
+    source: str
+
+    @property
+    def in_zoo(self) -> bool:
+        return self.source.startswith(ZOO)
+
+
+def count_models(recipe: Recipe) -> int:
+    """How many models there are, without making their specifications; raises RecipeError for files and families of the zoo that
+    are not there, of all entries together.
+    """
+
+    def count(index: int) -> int:
+        families = _families(recipe, index)
+        return len(families) * _count(recipe, index) if families else len(_files(recipe, index))
+
+    return sum(each(count, (i for i, entry in enumerate(recipe.models) if entry.is_labelled)))
+
+
+def model_specs(recipe: Recipe) -> tuple[ModelSpec, ...]:
+    """One specification a model: entries in the recipe's order, files sorted; keys follow from names only.
+
+    Raises RecipeError as `numbered_specs` does.
+    """
+    return tuple(spec for spec, _ in numbered_specs(recipe))
+
+
+def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
+    """The same, each with the number of its entry.
+
+    Raises RecipeError for files not found, models that a table of sizes lacks, and categories with two supercategories, each
+    kind of all models together; and for two models of one key.
+    """
+    found = each(lambda i: tuple(_found(recipe, i)), range(len(recipe.models)))
+    ids = {c.name: c.id for c in categories(recipe)}
+    table = cache(_read_sizes)
+
+    def numbered(found: _Found) -> tuple[ModelSpec, int]:
+        entry = recipe.models[found.entry]
+        if not found.in_zoo:
+            _check_file(entry, found)
+        category = _category(entry, found.source)
+        spec = ModelSpec(
+            key=found.key,
+            source=found.source,
+            seed=int(generator(recipe.lasting_seed, found.source, found.key).integers(2**63)) if found.in_zoo else None,
+            category=category,
+            supercategory=entry.supercategory,
+            category_id=ids[category] if entry.is_labelled else 0,
+            up=entry.up,
+            forward=entry.forward,
+            unit=None if entry.unit is None else unit_metres(entry.unit),
+            centring=entry.centring,
+            scale=_scale(recipe, entry, found.key),
+            real_size=_real_size(recipe, found, table),
+            confined=entry.confined,
+            sidecar=_sidecar(recipe, found.entry),
+            symmetries="found" if entry.symmetries == "found" else None,
+            keypoints=entry.keypoints,
+            faces="as_file" if entry.faces == "as_file" else None,
+            color=entry.color,
+            material=entry.material,
+        )
+        return spec, found.entry
+
+    return tuple(each(numbered, _with_unique_keys([*chain.from_iterable(found)])))
+
+
+def files_below(folder: Path) -> Iterator[tuple[str, int, str]]:
+    """Of the model files in a folder and those below: a pattern of each folder and suffix, how many files it names, and their
+    folder's name in words; those that only Blender reads are among them.
+    """
+    endings = MODEL_SUFFIXES | {f".{suffix}" for suffix in BLENDER_SUFFIXES}
+    found = (file for file in _shown(folder, "new") if file.suffix.lower() in endings and file.is_file())
+    groups = Counter((file.parent, file.suffix) for file in found)
+    for (parent, suffix), count in sorted(groups.items()):
+        pattern = (parent.relative_to(folder) / f"*{suffix}").as_posix()
+        yield pattern, count, re.sub(r"[_-]+", " ", parent.absolute().name).strip() or "model"
+
+
+def _shown(folder: Path, where: str) -> list[Path]:
+    """Return all files and folders below a folder that are not hidden."""
+    return [file for file in below(folder, where) if not any(map(_is_hidden, file.relative_to(folder).parts))]
+
+
+def _check_file(entry: ModelEntry, found: _Found) -> None:
+    """See, by its name alone, that a file can be read as the entry says.
+
+    Raises RecipeError for a kind of file that is not read and a forward along the file's up axis, MissingExtraError where
+    Blender reads such files and is not installed.
+    """
+    where, path = f"models[{found.entry}]", Path(found.source)
+    try:
+        suffix = check_source(path)
+    except ModelError as error:
+        raise RecipeError(f"{where}.source: {error}") from None
+    if needs_blender(suffix):
+        find_blender()
+    up = UP.get(suffix)
+    if up and entry.up is None and entry.forward is not None and entry.forward[1] == up:
+        raise RecipeError(
+            f"{where}.forward: {entry.forward} lies along +{up}, which is up in {suffix} files. Set `up:`, too, or another "
+            "`forward:`"
+        )
+
+
+def categories(recipe: Recipe) -> tuple[Category, ...]:
+    """The categories in order of appearance, ids from 1; raises RecipeError for all with two supercategories."""
+    result: dict[str, Category] = {}
+
+    def add(i: int) -> None:
+        entry = recipe.models[i]
+        for source in chain.from_iterable(map(_meant, entry.source)):
+            name = _category(entry, source)
+            category = result.setdefault(name, Category(len(result) + 1, name, entry.supercategory))
+            if category.supercategory != entry.supercategory:
+                raise RecipeError(
+                    f"models[{i}].supercategory: expected {category.supercategory!r}, as category {name!r} has before; "
+                    f"found {entry.supercategory!r}"
+                )
+
+    each(add, (i for i, entry in enumerate(recipe.models) if entry.is_labelled))
+    return tuple(result.values())
+
+
+def _families(recipe: Recipe, index: int) -> tuple[str, ...]:
+    """The zoo families of an entry, none for one of files; raises RecipeError for one that is not there."""
+    for family in recipe.models[index].families:
+        if family not in (ANY, *families()):
+            raise RecipeError(f"models[{index}].source: zoo: {one_of(family, families())}")
+    return recipe.models[index].families
+
+
+def _count(recipe: Recipe, index: int) -> int:
+    """How many models of each of its zoo families an entry means; raises RecipeError for more than are made."""
+    entry, most = recipe.models[index], limits.MAX_MODELS
+    names = ("models", "count", entry.name or "", *entry.source)
+    count = 1 if entry.count is None else drawn(entry.count, lambda path: generator(recipe.lasting_seed, *names, *path))
+    if count > most:
+        raise RecipeError(
+            f"models[{index}].count: expected at most {most:,} (limit MAX_MODELS); found {count:,}; set VIEWSPHERE_MAX_MODELS "
+            "higher if it is meant so"
+        )
+    return count
+
+
+def _scale(recipe: Recipe, entry: ModelEntry, key: str) -> Literal["as_is", "real_size"] | float:
+    """What a model is scaled to: a length is drawn for each."""
+    if not isinstance(entry.scale, Length):
+        return entry.scale
+    return drawn(entry.scale.length, lambda path: generator(recipe.lasting_seed, "models", "scale", key, *path))
+
+
+def _sidecar(recipe: Recipe, index: int) -> str | None:
+    """The path of the sidecar that an entry names; raises RecipeError where there is no such file."""
+    name = recipe.models[index].sidecar
+    if name is None:
+        return None
+    path = _path(recipe.folder, name)
+    if not path.is_file():
+        raise RecipeError(
+            f"models[{index}].sidecar: expected a file of symmetries and keypoints; found no {name!r} in {recipe.folder}"
+        )
+    return Path(os.path.normpath(path)).as_posix()
+
+
+def _category(entry: ModelEntry, source: str) -> str:
+    return entry.category or source.removeprefix(ZOO).replace("_", " ")
+
+
+def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
+    entry = recipe.models[index]
+    for family in _families(recipe, index):
+        for number in range(_count(recipe, index)):
+            yield _Found(index, f"{entry.name or family}_{number:03d}", ZOO + _drawn_family(recipe, family, number))
+    if not entry.families:
+        prefix = f"{entry.name}_" if entry.name else ""
+        for file in _files(recipe, index):
+            yield _Found(index, _short(_free(prefix + _as_key(file.stem))), file.as_posix())
+
+
+def _meant(source: str) -> tuple[str, ...]:
+    """All families that a source may mean, each as a source; the source itself where it means one."""
+    return tuple(ZOO + family for family in things()) if source == ZOO + ANY else (source,)
+
+
+def _drawn_family(recipe: Recipe, family: str, number: int) -> str:
+    """The family of a model: of `any` each in turn before one comes again, every round in an order of its own."""
+    if family != ANY:
+        return family
+    known = things()
+    turn, place = divmod(number, len(known))
+    return sorted(known, key=lambda name: share(recipe.lasting_seed, "family", str(turn), name))[place]
+
+
+def _as_key(text: str) -> str:
+    """The text as a part of a folder's name: letters, digits, `_`, `-` and inner dots."""
+    return re.sub(r"[^\w.-]", "_", text).strip(".") or "model"
+
+
+def _free(key: str) -> str:
+    """The key, with `_` behind it where Windows would take it for a device's name."""
+    return f"{key}_" if is_reserved(key) else key
+
+
+def _short(key: str) -> str:
+    """The key, or its beginning and a digest of all of it where file systems would find it too long (255 bytes)."""
+    data = key.encode()
+    if len(data) <= LONGEST_KEY:
+        return key
+    return f"{data[: LONGEST_KEY - 13].decode(errors='ignore')}-{hashlib.sha256(data).hexdigest()[:12]}"
+
+
+def _files(recipe: Recipe, index: int) -> tuple[Path, ...]:
+    """All files of an entry, sorted, each once; raises RecipeError for a source without any, or not `count` of them."""
+    entry, where = recipe.models[index], f"models[{index}]"
+    files = {file for source in entry.source for file in _matching(recipe.folder, source, where)}
+    if entry.count is not None and entry.count != len(files):
+        raise RecipeError(f"{where}.count: expected {entry.count} model files; found {len(files)}")
+    return tuple(sorted(files, key=lambda f: f.as_posix()))
+
+
+def left_out(recipe: Recipe) -> Iterator[str]:
+    """A warning for each entry whose folders and patterns hold files that only Blender reads, and that no entry names."""
+    taken = cache(lambda: {file for i, entry in enumerate(recipe.models) if not entry.families for file in _files(recipe, i)})
+    for i, entry in enumerate(recipe.models):
+        sources = () if entry.families else entry.source
+        unread = {f for source in sources for f in _unread(recipe.folder, source, f"models[{i}]")}
+        if unread and (unread := unread - taken()):
+            yield f"models[{i}].source: {_naming(recipe.folder, unread)}"
+
+
+def _matching(folder: Path, source: str, where: str) -> list[Path]:
+    path = _path(folder, source)
+    found = _candidates(folder, source, where)
+    matches = found if found == [path] else [f for f in found if f.suffix.lower() in _wanted(path) and f.is_file()]
+    if not matches:
+        endings, unread = ", ".join(sorted(_read_here())), _unread(folder, source, where)
+        hint = f"; {_naming(folder, unread)}" if unread else ""
+        raise RecipeError(f"{where}.source: expected model files ({endings}); {source!r} gives none in {folder}{hint}")
+    return [named(_normal(f), f"{where}.source") for f in matches]
+
+
+def _normal(path: Path) -> Path:
+    """Return the path without `..`; the same object where it has none, as most of many thousands have not."""
+    return Path(os.path.normpath(path)) if ".." in path.parts else path
+
+
+def _unread(folder: Path, source: str, where: str) -> set[Path]:
+    """Files that only Blender reads, which a folder or a pattern means but leaves out."""
+    path = _path(folder, source)
+    others = frozenset(f".{suffix}" for suffix in BLENDER_SUFFIXES) - _wanted(path)
+    if has_magic(source) and path.suffix.lower() in MODEL_SUFFIXES:
+        return set()  # every file that such a pattern means ends as it does
+    found = _candidates(folder, source, where)
+    unread = () if found == [path] else (f for f in found if f.suffix.lower() in others and f.is_file())
+    return {_normal(f) for f in unread}
+
+
+def _naming(folder: Path, unread: Collection[Path]) -> str:
+    """How many files are left out, and a pattern that names some of them as a recipe in this folder does."""
+    first = min(unread, key=lambda f: f.as_posix())
+    parent = first.parent.relative_to(folder) if first.is_relative_to(folder) else first.parent
+    many = "1 file that Blender reads" if len(unread) == 1 else f"{len(unread):,} files that Blender reads"
+    it = "it" if len(unread) == 1 else "them"
+    return f"{many} left out: name {it}, e.g. {(parent / f'*{first.suffix}').as_posix()}"
+
+
+def _path(folder: Path, source: str) -> Path:
+    return folder / Path(source).expanduser()
+
+
+def _candidates(folder: Path, source: str, where: str) -> list[Path]:
+    """The file, or all files and folders that a folder or a pattern means; raises RecipeError for a path without anything."""
+    path = _path(folder, source)
+    if split_source(path)[0].is_file():
+        return [path]
+    if path.is_dir():
+        return _shown(path, where)
+    if has_magic(source):
+        return matching(folder, source, where)
+    kinds = "a file, folder, pattern or zoo:<family>"
+    meant = f"; did you mean {ZOO + source!r}?" if source in families() else ""
+    raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}{meant}")
+
+
+def _wanted(path: Path) -> Set[str]:
+    """Endings of the files that a folder or a pattern means."""
+    ending = path.suffix.lower()
+    return {ending} if ending[1:] in BLENDER_SUFFIXES else _read_here()
+
+
+def _read_here() -> Set[str]:
+    """Endings of the model files that are read without Blender: USD too where its package is installed."""
+    return MODEL_SUFFIXES | {f".{suffix}" for suffix in BLENDER_SUFFIXES if not needs_blender(suffix)}
+
+
+def _is_hidden(name: str) -> bool:
+    return name.startswith((".", "__MACOSX"))
+
+
+def _with_unique_keys(found: list[_Found]) -> list[_Found]:
+    """Files of one name get their ending or their folders' names behind it; raises RecipeError where that is no help."""
+    groups: defaultdict[str, list[_Found]] = defaultdict(list)
+    for item in found:
+        groups[item.key.casefold()].append(item)
+    keys = {item: key for group in groups.values() for item, key in zip(group, _longer_keys(group), strict=True)}
+    renamed = [replace(item, key=keys[item]) for item in found]
+    first: dict[str, _Found] = {}
+    for item in renamed:
+        other = first.setdefault(item.key.casefold(), item)
+        if other is not item:
+            raise RecipeError(
+                f"models[{item.entry}]: expected every model once; found key {item.key!r} again ({item.source}), after "
+                f"models[{other.entry}] ({other.source}): give one of the entries another name"
+            )
+    return renamed
+
+
+def _longer_keys(group: Sequence[_Found]) -> list[str]:
+    """Return the keys of all models that would like the same one, in their order."""
+    keys = [item.key for item in group]
+    if len(group) == 1 or any(item.in_zoo for item in group):
+        return keys
+    paths = [Path(item.source) for item in group]
+    for folders in range(max(len(path.parts) for path in paths)):
+        for ending in (False, True):
+            variants = [_variant(key, path, folders, ending=ending) for key, path in zip(keys, paths, strict=True)]
+            if len({v.casefold() for v in variants}) == len(group):
+                return variants
+    return keys
+
+
+def _variant(key: str, path: Path, folders: int, *, ending: bool) -> str:
+    names = path.parts[-1 - folders : -1]
+    return _short("-".join([key, *map(_as_key, names), *([path.suffix[1:]] if ending else [])]))
+
+
+def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes]) -> Size | Literal["file"] | None:
+    size = recipe.models[found.entry].real_size
+    if isinstance(size, Dimensions):
+        return size.width, size.height, size.length
+    if size == "file" or (size is None and found.in_zoo):
+        return "file"
+    if size is None:
+        return None
+    path, unit = (size.csv, unit_metres(size.unit)) if isinstance(size, SizeTable) else (size, 1.0)
+    sizes = table(recipe.folder / path)
+    name = found.key if found.in_zoo else Path(found.source).stem
+    row = sizes.get(name) or sizes.get(found.key)
+    if row is None:
+        raise RecipeError(
+            f"models[{found.entry}].real_size: expected a row for {name!r} in {recipe.folder / path}; found none"
+            f"{nearest(name, sizes)}"
+        )
+    width, height, length = (value * unit for value in row)
+    return width, height, length
+
+
+def _read_sizes(path: Path) -> Sizes:
+    """Rows of a table of sizes by name; raises RecipeError naming file and line."""
+    sizes: dict[str, tuple[float, float, float]] = {}
+    for where, row in table_rows(path, COLUMNS):
+        name = (row["name"] or "").strip()
+        if not name or name in sizes:
+            raise RecipeError(f"{where}: expected every name once; found {name!r}")
+        sizes[name] = _row_size(row, where)
+    return sizes
+
+
+def _row_size(row: Cells, where: str) -> tuple[float, float, float]:
+    values: list[float] = []
+    for column in COLUMNS[1:]:
+        try:
+            value = float(row[column] or "")
+        except ValueError:
+            value = math.nan
+        if not (0 < value < math.inf):
+            raise RecipeError(f"{where}: {column}: expected a number above 0; found {row[column]!r}")
+        values.append(value)
+    width, height, length = values
+    return width, height, length

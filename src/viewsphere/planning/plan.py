@@ -1,0 +1,491 @@
+"""The plan: which frames a recipe means, in which order, split and unit of work. Meshes are not touched."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from itertools import chain, repeat
+from os import PathLike
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+from viewsphere import plugins
+from viewsphere.assets.metadata.traits import said_of
+from viewsphere.assets.timeline import Timeline
+from viewsphere.composing.composition import BoxOf, Numbering, compose
+from viewsphere.composing.filling import filled
+from viewsphere.composing.motion import check_motions
+from viewsphere.composing.redraws import scene_draws
+from viewsphere.composing.scene.draws import check_night, is_night
+from viewsphere.composing.scene.pictures import check_pictures, proportions, scene_pictures
+from viewsphere.composing.seeds import Names, share
+from viewsphere.composing.time_steps import check_keys, timed
+from viewsphere.composing.viewpoints.sequence_poses import SequencePoses, poses_of
+from viewsphere.errors import RecipeError, each
+from viewsphere.model.credit import Credit
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.notebook import Shown
+from viewsphere.model.rig import Rig
+from viewsphere.model.shot import Shot
+from viewsphere.planning.checks.emptying import emptied
+from viewsphere.planning.checks.models import (
+    check_all_frames,
+    check_blend,
+    check_catcher,
+    check_distractors,
+    check_frames,
+    check_listed,
+    check_materials,
+    check_names,
+    check_photo,
+    check_redraws,
+    check_shutter,
+    check_sizes,
+    check_splits,
+)
+from viewsphere.planning.checks.off_center import off_center
+from viewsphere.planning.checks.sequences import check_sequences
+from viewsphere.planning.checks.warnings import hidden_background, hidden_by_exposure, no_light, out_of_view, too_small
+from viewsphere.planning.clips import with_clips
+from viewsphere.planning.credits import credits_of, unlicensed
+from viewsphere.planning.engine_digest import engine_options, script_digest
+from viewsphere.planning.models import categories, left_out, numbered_specs
+from viewsphere.planning.rigs import rig_of
+from viewsphere.planning.samplers import Standing, Stock, lens
+from viewsphere.planning.splits import expected, quotas
+from viewsphere.planning.tracks import tracks_digest, tracks_of
+from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.light import NightSky
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scene import SceneEntry
+from viewsphere.store import Block, Category, Row
+from viewsphere.store.index import Index, Ranges, length, numbers, under, without
+
+Made = TypeVar("Made")
+
+COUNTED = 200_000
+"""Frames, or scenes, whose splits are counted one by one."""
+
+SHOT_FRAMES = 16
+"""Most frames of a shot, unless the recipe or the caller says otherwise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan(Shown, Stock):
+    """What will be rendered: of every subject, in order, its poses. Nothing here grows with the frames."""
+
+    categories: tuple[Category, ...] = ()
+    shot_frames: int = SHOT_FRAMES
+    credits: Mapping[str, Credit] = field(default_factory=dict[str, Credit])  # known ones, by keys of models that are kept
+
+    @cached_property
+    def sampler(self) -> SamplerSpec:
+        """The sampler that makes the shots."""
+        return plugins.load(SamplerSpec, self.recipe.sampler)
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """Absolute paths of the scene's picture files, by field; those of planes are the composition's."""
+        return tuple(file for files in self.pictures.values() for file in files)
+
+    @property
+    def poses(self) -> int:
+        """Number of poses; of all time steps together where something moves."""
+        return len(self.pose_list)
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return self.rows.samples
+
+    @property
+    def time_steps(self) -> int | None:
+        """Time steps that all models have, 0 if nothing moves; None if they have different numbers."""
+        counts = {len(timing.steps) if timing else 0 for timing in self.timings}
+        return counts.pop() if len(counts) == 1 else None if counts else 0
+
+    @property
+    def factors(self) -> str:
+        """What its frames are the product of, in words."""
+        sensors = len(self.rig.sensors)
+        more = {"sensors": sensors if sensors > 1 else 0, "variations": len(self.recipe.variations or ())}
+        return self.sampler.factors(self) + "".join(f" x {count} {what}" for what, count in more.items() if count)
+
+    @property
+    def max_objects(self) -> int:
+        """Most objects in one frame."""
+        scenery = 0 if self.composition is None else self.composition.most_scenery
+        return self.sampler.most_objects(self.recipe) + scenery
+
+    @property
+    def kept_specs(self) -> tuple[ModelSpec, ...]:
+        """All models that the data set keeps: the recipe's, then labelled scenery's."""
+        return self.model_specs + (() if self.composition is None else self.composition.models)
+
+    @property
+    def kept_keys(self) -> Iterator[tuple[str, ModelSpec]]:
+        """The keys of all models that the data set keeps, and of their time steps."""
+        for spec in self.kept_specs:
+            frames = (None, *(step.frame for step in self.steps_of(spec)))
+            yield from ((spec.key_at(frame), spec) for frame in frames)
+
+    @property
+    def splits(self) -> tuple[str, ...]:
+        """Names of the splits, in the recipe's order."""
+        return tuple(self.recipe.splits.shares)
+
+    @cached_property
+    def split_counts(self) -> dict[str, int]:
+        """Split -> number of its frames; of hashed ones what is expected, where there are more than `COUNTED` to hash."""
+        by, drawn = self.recipe.splits.by, self.recipe.scenes is not None and self.recipe.splits.by == "model"
+        found = Counter({name: 0 for name in self.splits})
+        if by in ("model", "scene", "sequence") and not (drawn and len(self.taken) > COUNTED):
+            for block in self.blocks:
+                for subject in block.subjects:
+                    found[self.split(subject, block.positions[0][0])] += block.size * block.each
+        elif drawn:
+            some = Counter(self.split(subject, 0) for subject in self.taken[:COUNTED])
+            found = Counter(quotas({name: some[name] / COUNTED for name in self.splits}, self.frames))
+        elif by == "pose" and len(self.blocks) == 1 and self.poses <= COUNTED:
+            for pose in numbers(self.blocks[0].positions):
+                found[self.split(self.taken[0], pose)] += len(self.taken) * len(self.rig.sensors)
+        elif self.frames <= COUNTED:
+            taken = (self.split(s, i) for block in self.blocks for s in block.subjects for i in numbers(block.positions))
+            found.update(chain.from_iterable(repeat(name, len(self.rig.sensors)) for name in taken))
+        else:
+            found = Counter(expected(self.recipe.splits, self.frames))
+        return {name: found[name] for name in self.splits}
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What may be meant otherwise."""
+        by = self.recipe.splits.by
+        found = [
+            f"split {name!r} is empty: too few {by}s for its share; list models for it, or split by something else"
+            for name, count in self.split_counts.items()
+            if count == 0
+        ]
+        scene = self.recipe.scene
+        lowest = self.pose_list.lowest_elevation + min(span(scene.jitter.elevation_deg)[0], 0.0)
+        if lowest < 0 and (scene.has_ground or scene.place is not None):
+            found.append(
+                f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
+            )
+        doubts: Iterator[str] = out_of_view(self.recipe, self.pose_list, self.intrinsics)
+        for name, recipe in self.recipe.conditions.items():
+            found += (
+                message.replace("scene", f"variations.{name}", 1) if name else message for message in _unlit(recipe.scene)
+            )
+        doubts = chain(doubts, hidden_background(scene, self.pose_list, self.intrinsics))
+        doubts = chain(doubts, too_small(self.recipe, self.pose_list, self.intrinsics))
+        if self.blend is not None:
+            found += self.blend.warnings
+        found += left_out(self.recipe)
+        return tuple(map(self.recipe.locate, (*found, *doubts)))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is missing for others to use the data set, licences of models; and what options of formats mean for it."""
+        options = chain.from_iterable(entry.notes(self.categories) for entry in self.recipe.formats)
+        return (*unlicensed((spec.key for spec in self.kept_specs), self.credits), *options)
+
+    def split(self, subject: str, pose: int) -> str:
+        """The split of a frame."""
+        return self.sampler.split(self, self.world(subject), pose)
+
+    def keeping(self, splits: Mapping[str, str], poses: Sequence[int] = ()) -> Plan:
+        """The same plan for a data set that has some of its models, scenes and sequences in these splits already, and these
+        numbers for the plan's poses.
+        """
+        own = self if not isinstance(self.pose_list, SequencePoses) else self._numbering(self.pose_list.instants, poses)
+        kept = {key: name for key, name in splits.items() if key in own.dealt_splits}
+        return _composed(own.changed(kept_splits=kept)) if kept else own
+
+    def changed(self, **fields: Any) -> Self:
+        """The same plan with other fields, of which its blocks do not follow: they are not counted out again."""
+        made = replace(self, **fields)
+        if "blocks" in vars(self):
+            vars(made)["blocks"] = self.blocks
+        return made
+
+    def _numbering(self, instants: int, poses: Sequence[int]) -> Plan:
+        """The same plan, whose sequences are numbered as those of a data set, where it has these numbers for their poses."""
+        numbers = tuple(pose // instants for pose in poses[::instants])
+        return self if numbers == tuple(range(len(numbers))) else _composed(self.changed(sequence_numbers=numbers))
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """Which subjects are taken from which poses, time step by time step, by all sensors each."""
+        found = (replace(block, each=len(self.rig.sensors)) for block in self.sampler.blocks(self))
+        return tuple(replace(block, subjects=self._taken(block.subjects)) for block in found)
+
+    @cached_property
+    def taken(self) -> tuple[str, ...]:
+        """What pictures are about: the subjects, where there are variations each under each of them."""
+        return self._taken(self.subjects)
+
+    def _taken(self, subjects: Sequence[str]) -> tuple[str, ...]:
+        names = tuple(self.recipe.variations or ("",))
+        return tuple(under(subject, name) for subject in subjects for name in names)
+
+    def world(self, subject: str) -> str:
+        """The subject without its variation."""
+        return subject if self.recipe.variations is None else without(subject)[0]
+
+    @cached_property
+    def _under(self) -> Mapping[str, Self]:
+        """The same plan under each variation; it shares what was computed, but for light and finish."""
+        return {name: self._lit(recipe, name) for name, recipe in self.recipe.conditions.items()}
+
+    def _lit(self, recipe: Recipe, variation: str) -> Self:
+        made = replace(self, recipe=recipe, untried=self, variation=variation)
+        known = {field.name for field in fields(self)} | {"scenes", "taken", "blocks", "rows", "_under"}
+        vars(made).update({name: value for name, value in vars(self).items() if name not in known})
+        return made
+
+    @cached_property
+    def rows(self) -> Index:
+        """All shots."""
+        return Index(self.blocks, 0, self.shot_frames, 0)
+
+    @property
+    def shot_count(self) -> int:
+        """Number of shots."""
+        return len(self.rows)
+
+    def shot(self, row: Row | int, box_of: BoxOf, tries: Sequence[int] = (), redraw: int = 0) -> Shot:
+        """The shot of a row, or of its number, in the first draw of its scene from `redraw` on that has room for all; raises
+        IndexError past the end.
+
+        `tries`: of each pose, how often what is random in it (its viewpoint, company of its own) is drawn again; none: never.
+        `box_of` gives the sizes of what stands on the floor and of what the cameras look at. Raises RecipeError where there is
+        no room for all that is to stand there, and what `box_of` raises.
+        """
+        row = self.rows[row] if isinstance(row, int) else row
+        return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first, tries, redraw)
+
+    def take(
+        self,
+        subject: str,
+        poses: Sequence[int],
+        box_of: BoxOf,
+        key: str = "",
+        first: int = 0,
+        tries: Sequence[int] = (),
+        redraw: int = 0,
+    ) -> Shot:
+        """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
+        each frame. `first` is the number of its first sample, `tries` and `redraw` as for `shot`.
+        """
+        key = key or f"{subject}-{poses[0]:06d}"
+        names = (self.world(subject), self.scene_pose(poses[0]) or "")
+        return self._fitting(redraw, lambda number: self._taken_at(number, subject, poses, box_of, key, first, tries), names)
+
+    def standing(self, subject: str, box_of: BoxOf) -> Sequence[Standing]:
+        """The places of a subject's objects as far as they are known before rendering, in the first draw that has room."""
+        return self._fitting(
+            0, lambda number: tuple(self.sampler.standing(self.redrawn(number), subject, box_of)), (subject, "")
+        )
+
+    def _fitting(self, redraw: int, make: Callable[[int], Made], names: Names = ()) -> Made:
+        """The result of the first draw of a scene, from this number on, that fits; raises the first draw's RecipeError where
+        none does. `names`: of a scene that is asked for again, whose first fitting draw is kept.
+        """
+        problems: list[RecipeError] = []
+        for number in range(max(redraw, self._fits.get(names, 0)), max(redraw + 1, self.draws)):
+            try:
+                made = make(number)
+            except RecipeError as error:
+                problems.append(error)
+                continue
+            if names and redraw == 0 and number:
+                self._fits[names] = number
+            return made
+        raise problems[0]
+
+    @cached_property
+    def _fits(self) -> dict[Names, int]:
+        """The first fitting draw of each scene whose original does not fit, as far as it was looked for."""
+        return {}
+
+    @cached_property
+    def draws(self) -> int:
+        """The number of draws of each scene, the original included."""
+        return scene_draws(self.recipe)
+
+    def whole(self, row: Row) -> Row | None:
+        """The poses of a row's scene, or sequence, as one row; None where the row has them, or nothing is redrawn for all."""
+        if self.draws == 1 or (self.recipe.time is None and self.recipe.scene.is_moved_each_frame):
+            return None
+        positions, each = self._positions[row.subject], len(self.rig.sensors)
+        if isinstance(self.pose_list, SequencePoses):
+            start = row.positions[0][0] - row.positions[0][0] % self.pose_list.instants
+            positions = ((start, start + self.pose_list.instants),)
+        if positions == row.positions:
+            return None
+        return Row(row.subject, row.subject, 0, length(positions) * each, row.part, positions)
+
+    @cached_property
+    def _positions(self) -> dict[str, Ranges]:
+        """The poses of each subject, at its first time step."""
+        return {subject: block.positions for block in reversed(self.blocks) for subject in block.subjects}
+
+    def _taken_at(
+        self, redraw: int, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int, tries: Sequence[int]
+    ) -> Shot:
+        variation, stock = "", self
+        if self.recipe.variations is not None:
+            subject, variation = without(subject)
+            stock = self._under[variation]
+        stock = stock.redrawn(redraw)
+        stock = stock.trying(dict(zip(poses, tries, strict=True))) if any(tries) else stock
+        with self.recipe.located():
+            made = self.sampler.shot(stock, subject, poses, box_of, key, first)
+            shot = off_center(stock, subject, filled(made, self.recipe.scenes is not None))
+            if variation:
+                named = {"variation": variation, "sequence": shot.sequence and under(shot.sequence, variation)}
+                shot = shot.model_copy(update=named)
+            if self.recipe.empty is None:
+                return shot
+            shares = (share(self.recipe.seed, "empty", subject, self.pose_list.name(pose)) for pose in poses)
+            return emptied(shot, [one < self.recipe.empty for one in shares], box_of)
+
+    def cast(self, subject: str, pose: int | None = None) -> tuple[ModelSpec, ...]:
+        """The recipe's models in a frame of a subject, from a pose (its number); without one, those in all of its frames."""
+        return self.sampler.cast(self, self.world(subject), pose)
+
+    def shots(self, box_of: BoxOf) -> Iterator[Shot]:
+        """All shots in order, made one by one."""
+        return (self.shot(row, box_of) for row in self.rows)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all that a store of this plan holds: the recipe, the models, the backgrounds and the chunks.
+
+        Files count by their names, so that folders can move; what is in a model's file, the store itself watches.
+        """
+        models = [m.model_dump(mode="json") | {"source": Path(m.source).name} for m in self.kept_specs]
+        planes = () if self.composition is None else self.composition.images
+        images = [Path(i).name for files in (self.images, *planes) for i in files]
+        value = [self.recipe.digest, models, self.pose_list.digest, images, self.shot_frames]
+        value += [spec.model_dump(mode="json") | {"source": Path(spec.source).name} for spec, _ in self.distractors]
+        value += [] if self.blend is None else [self.blend.digest]
+        script = script_digest(self.recipe)
+        value += [] if script is None else [script]
+        value += [] if self.own_rig is None else [self.own_rig.model_dump(mode="json")]
+        value += [] if self.tracks is None else [tracks_digest(self.tracks)]
+        return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
+
+
+def _unlit(scene: SceneEntry) -> Iterator[str]:
+    """What makes a scene's pictures black, or white."""
+    dark = not all(isinstance(sky, NightSky) for sky in alternatives(scene.sky))
+    if dark and any(is_night(sun) for sun in alternatives(scene.sun)):
+        yield "scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight"
+    yield from chain(no_light(scene), hidden_by_exposure(scene))
+
+
+def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -> Plan:
+    """What a recipe (or the one in this file) means, frame by frame, without touching a mesh.
+
+    `shot_frames`: most frames of a shot, where the recipe does not say.
+    Raises RecipeError for files that are not there, unknown engines and formats, more frames than `max_frames`.
+    """
+    recipe = Recipe.of(recipe)
+    with recipe.located():
+        check_names(recipe)
+        check_blend(recipe)
+        for one in recipe.conditions.values():
+            check_catcher(one)
+            check_shutter(one)
+            check_photo(one)
+            check_night(one)
+        check_splits(recipe)
+        check_redraws(recipe)
+        check_motions(recipe)
+        views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
+        rig = rig_of(recipe, lens(recipe, views))
+        check_frames(recipe, views)
+        found = numbered_specs(recipe)
+        numbered = tuple((spec, number) for spec, number in found if spec.category_id)
+        distractors = tuple((spec, number) for spec, number in found if not spec.category_id)
+        check_distractors(recipe)
+        specs, timings, views = timed(recipe, numbered, views)
+        lines: tuple[Timeline | None, ...] = (None,) * len(specs)
+        if recipe.time is not None:
+            specs, lines = with_clips(recipe, numbered)
+        check_listed(recipe, specs)
+        check_materials(recipe, specs)
+        most = recipe.shot_frames or shot_frames or SHOT_FRAMES
+        frames = 1 if recipe.is_new_each_frame and recipe.time is None else most
+        timings = timings if any(timings) else ()
+        sampler = plugins.load(SamplerSpec, recipe.sampler)
+        check_sizes(recipe, views, sampler)
+        planned = Plan(
+            recipe,
+            specs,
+            views,
+            scene_pictures(recipe),
+            sampler.subjects(recipe, specs),
+            timings=timings,
+            categories=categories(recipe),
+            shot_frames=frames,
+            own_rig=rig,
+            entries=tuple(number for _, number in numbered),
+            timelines=lines,
+            distractors=distractors,
+            tracks=tracks_of(recipe, rig or Rig.of(lens(recipe, views))),
+        )
+        check_all_frames(recipe, planned.frames, planned.factors)
+        if timings or any(lines):
+            check_keys(planned.kept_keys)
+        planned = _composed(planned)
+        if recipe.time is not None:
+            check_sequences(planned)
+        return planned.changed(credits=_credits(planned))
+
+
+def _credits(planned: Plan) -> dict[str, Credit]:
+    """The credits that are known of the models that a plan keeps."""
+    entries = zip(planned.model_specs, planned.entries, strict=True)
+    said = {spec.key: planned.recipe.models[number].credit for spec, number in entries}
+    return credits_of(planned.kept_specs, {key: credit for key, credit in said.items() if credit is not None})
+
+
+def _composed(planned: Plan) -> Plan:
+    """The plan with all that stands around its models: only those of one split are seen together, where splits are by model."""
+    recipe, specs = planned.recipe, planned.model_specs
+    if not recipe.scene.is_composed:
+        return planned
+    dealt = planned.dealt_splits if recipe.splits.by == "model" else {}
+    splits = [dealt.get(spec.key, "") for spec in specs]
+    numbering = Numbering(planned.subjects, planned.pose_list, planned.schedules if planned.timings else ())
+    composition = compose(recipe, planned.subjects, specs, categories(recipe), splits, numbering)
+    return planned.changed(categories=composition.categories, composition=composition)
+
+
+def check_engine(recipe: Recipe) -> None:
+    """See that the engine takes its options; raises UserError where it does not, or lacks its extra."""
+    engine = plugins.load("engines", recipe.engine.name)
+    with recipe.located():
+        engine.check(engine_options(recipe))
+
+
+def check_sidecars(planned: Plan) -> None:
+    """See that what models' sidecars say can be read; raises ModelError, a line a mistake. No model is read."""
+    each(said_of, planned.kept_specs)
+
+
+def check_images(planned: Plan) -> None:
+    """See that the pictures of the scene and its planes are pictures; raises RecipeError for the first that is not."""
+    with planned.recipe.located():
+        check_pictures(planned.recipe, planned.pictures)
+        for i, files in enumerate(() if planned.composition is None else planned.composition.images):
+            field = "images" if planned.recipe.scene.planes[i].image is None else "image"
+            for path in files:
+                proportions(path, f"scene.planes[{i}].{field}")

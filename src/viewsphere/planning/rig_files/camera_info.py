@@ -1,0 +1,62 @@
+"""ROS' camera_info, a file for each camera, as `camera_calibration` writes it
+(https://docs.ros.org/en/api/sensor_msgs/html/msg/CameraInfo.html).
+
+R turns the raw camera to the rectified one; P[0, 3] = -fx' times the metres from the first camera.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.model.camera import Distortion
+from viewsphere.planning.rig_files.documents import matrix, size
+from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fisheye, inverse, pinhole, rotation
+
+MODELS = ("plumb_bob", "rational_polynomial", "equidistant", "fisheye", "")
+
+
+def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[Calibrated, ...]:
+    """A sensor of each file, named by its `camera_name`, or by the file; the first one's place is the rig's."""
+    found = [_camera(path, document, rectified) for path, document in documents.items()]
+    back = inverse(found[0].rig_from_sensor[:3, :3], found[0].rig_from_sensor[:3, 3])
+    first = Calibrated(found[0].name, found[0].lens, found[0].distortion, np.eye(4), found[0].size)
+    others = (Calibrated(c.name, c.lens, c.distortion, compose(back, c.rig_from_sensor), c.size) for c in found[1:])
+    return first, *others
+
+
+def _camera(path: Path, found: Mapping[str, Any], rectified: bool) -> Calibrated:
+    """A camera's lens, and its place in the axes that all of them are rectified to."""
+    k, p = (matrix(found.get(f"{n}_matrix"), f"{path}: {n}_matrix") for n in ("camera", "projection"))
+    if k.shape != (3, 3) or p.shape != (3, 4):
+        raise RecipeError(
+            f"{path}: expected a 3 x 3 camera_matrix and a 3 x 4 projection_matrix; found {k.shape} and {p.shape}"
+        )
+    if min(p[0, 0], p[1, 1]) <= 0:
+        raise RecipeError(f"{path}: projection_matrix: expected focal lengths above 0; found {p[0, 0]:g} and {p[1, 1]:g}")
+    turn = (
+        matrix(found["rectification_matrix"], f"{path}: rectification_matrix") if "rectification_matrix" in found else np.eye(3)
+    )
+    shift = np.array([-p[0, 3] / p[0, 0], -p[1, 3] / p[1, 1], 0.0]) + 0.0
+    lens = pinhole(p if rectified else k, f"{path}: {'projection' if rectified else 'camera'}_matrix")
+    axes = np.eye(3) if rectified else rotation(turn, f"{path}: rectification_matrix")
+    return Calibrated(
+        name=str(found.get("camera_name") or path.stem),
+        lens=lens,
+        distortion=None if rectified else _distortion(found, path),
+        rig_from_sensor=rigid(axes, shift),
+        size=size(found.get("image_width"), found.get("image_height"), f"{path}: image_width, image_height"),
+    )
+
+
+def _distortion(found: Mapping[str, Any], path: Path) -> Distortion | None:
+    model, where = found.get("distortion_model", ""), f"{path}: distortion_coefficients"
+    if model not in MODELS:
+        raise RecipeError(f"{path}: distortion_model: expected {', '.join(MODELS[:4])}; found {model!r}")
+    numbers = matrix(found["distortion_coefficients"], where).ravel().tolist() if "distortion_coefficients" in found else []
+    return (fisheye if model in ("equidistant", "fisheye") else brown_conrady)(numbers, where)

@@ -1,0 +1,82 @@
+"""What a calibration holds of a sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.composing.viewpoints.pose_files.motions import nearest_rotation
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import rigid, transform
+from viewsphere.model.camera import Distortion
+from viewsphere.model.mistakes import told_of
+
+Float = NDArray[np.float64]
+
+CENTER = 0.5
+"""What is added to principal points that are counted from the centre of the first pixel."""
+
+RIGHT_ANGLES = 1e-3
+"""How far a file's rotation may be from one, as files of few digits are; it is then made one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A sensor: focal lengths and principal point in pixels (`fx`, `fy`, `cx`, `cy`, from the image's corner), its place
+    (4, 4) in metres, and its size if the file says it.
+    """
+
+    name: str
+    lens: dict[str, float]
+    distortion: Distortion | None
+    rig_from_sensor: Float
+    size: tuple[int, int] | None = None
+
+
+def pinhole(camera: Float, where: str) -> dict[str, float]:
+    """The lens of a calibration's camera matrix (3, 3 or more), whose pixels are counted from the centre of the first one."""
+    fx, fy = float(camera[0, 0]), float(camera[1, 1])
+    if min(fx, fy) <= 0:
+        raise RecipeError(f"{where}: expected focal lengths above 0; found {fx:g} and {fy:g}")
+    return {"fx": fx, "fy": fy, "cx": float(camera[0, 2]) + CENTER, "cy": float(camera[1, 2]) + CENTER}
+
+
+def brown_conrady(numbers: Sequence[float], where: str) -> Distortion | None:
+    """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], of which those from s1 on have to be 0; None where all
+    are.
+    """
+    if len(numbers) not in (0, 4, 5, 8, 12, 14):
+        raise RecipeError(f"{where}: expected 4, 5, 8, 12 or 14 numbers; found {len(numbers)}")
+    if any(numbers[8:]):
+        raise RecipeError(
+            f"{where}: expected no thin prism and no tilted sensor; found numbers after k6: undistort the pictures"
+        )
+    if not any(numbers):
+        return None
+    with told_of(where):
+        return Distortion(model="brown_conrady", coefficients=tuple(numbers[:8]))
+
+
+def fisheye(numbers: Sequence[float], where: str) -> Distortion:
+    """Four numbers of Kannala and Brandt; all 0 is the equidistant fisheye."""
+    if len(numbers) != 4:
+        raise RecipeError(f"{where}: expected 4 numbers; found {len(numbers)}")
+    with told_of(where):
+        return Distortion(model="fisheye", coefficients=tuple(numbers))
+
+
+def rotation(matrix: Float, where: str) -> Float:
+    """The rotation (3, 3) that a file's matrix nearly is; raises RecipeError for any other."""
+    found = nearest_rotation(matrix) if matrix.shape == (3, 3) else None
+    if found is None or np.abs(found - matrix).max() > RIGHT_ANGLES:
+        raise RecipeError(f"{where}: expected a rotation; found a matrix that is none")
+    return found
+
+
+def inverse(turn: Float, shift: Float) -> Float:
+    """The motion (4, 4) back from x -> turn x + shift."""
+    back = np.ascontiguousarray(turn.T)
+    return rigid(back, -transform(back, shift))

@@ -1,0 +1,227 @@
+"""From a recipe's rig to the sensors of its shots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.composing.viewpoints.pose_files.motions import nearest_rotation
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import compose, rigid, transform
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.channel import PASSES
+from viewsphere.model.lidar import LIDAR, Lidar
+from viewsphere.model.mistakes import one_of, told_of
+from viewsphere.model.rig import Rig, Sensor
+from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.planning.rig_files import Calibrated, read_rig
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.rig import RigFile, SensorEntry, SensorList, StereoRig, SurroundRig
+from viewsphere.recipe.scene import CameraEntry
+
+Float = NDArray[np.float64]
+
+SKEWED = 1e-3
+"""How far a matrix that a user wrote may be from the rotation nearest to it."""
+
+
+def rig_of(recipe: Recipe, lens: Intrinsics) -> Rig | None:
+    """The rig that a recipe means, None where it has none; `lens` is its camera's.
+
+    Raises RecipeError for calibrations that cannot be read, sensors that keep channels which the recipe does not, matrices that
+    are no rotations, and for a recipe that asks for disparity of pictures that are not rectified.
+    """
+    match recipe.rig:
+        case None:
+            return None
+        case StereoRig():
+            rig = _mounted({"left": (lens, np.eye(4)), "right": (lens, _moved(recipe.rig.baseline, 0.0, 0.0))})
+        case SurroundRig():
+            rig = _mounted({name: (lens, pose) for name, pose in _around(recipe.rig)})
+        case SensorList():
+            rig = _listed(recipe, recipe.rig, lens)
+        case RigFile():
+            rig = _calibrated(recipe, recipe.rig, lens)
+    _check_disparity(recipe, rig)
+    if rig.sensors[0].lidar and (recipe.camera.is_random or recipe.camera.of_viewpoints):
+        raise RecipeError(
+            f"rig.sensors: expected a camera as the first sensor, as the camera's lens is drawn or its file's; found the LiDAR "
+            f"{rig.sensors[0].name}: list it after a camera"
+        )
+    return rig
+
+
+def _mounted(sensors: Mapping[str, tuple[Intrinsics, Float]]) -> Rig:
+    """Sensors by name, where they stand to one another: to the first after this."""
+    (_, first), *_ = sensors.values()
+    back = None if np.array_equal(first, np.eye(4)) else _inverse(first)
+    poses = (pose if back is None else compose(back, pose) for _, pose in sensors.values())
+    found = zip(sensors.items(), poses, strict=True)
+    return Rig(
+        sensors=tuple(
+            Sensor(name=name, intrinsics=lens, rig_from_sensor=_matrix(pose) if i else IDENTITY)
+            for i, ((name, (lens, _)), pose) in enumerate(found)
+        )
+    )
+
+
+def _listed(recipe: Recipe, entry: SensorList, lens: Intrinsics) -> Rig:
+    rig = _mounted({name: (_lens(name, one, recipe.camera, lens), _pose(name, one)) for name, one in entry.sensors.items()})
+    kept = zip(rig.sensors, entry.sensors.items(), strict=True)
+    more = (
+        (sensor, _measuring(recipe, name, one) | {"channels": _channels(recipe, name, one)}) for sensor, (name, one) in kept
+    )
+    return Rig(sensors=tuple(sensor.model_copy(update=update) for sensor, update in more))
+
+
+def _check_sweep(recipe: Recipe, name: str, entry: SensorEntry) -> None:
+    sweep = 0.0 if entry.lidar is None else entry.lidar.sweep
+    if not sweep:
+        return
+    if recipe.time is None:
+        raise RecipeError(
+            f"rig.sensors.{name}.lidar.sweep: expected time beside it, as all moves meanwhile; found none: set time"
+        )
+    if recipe.time.count > 1 and sweep > recipe.time.at(1) * (1 + 1e-9):
+        raise RecipeError(
+            f"rig.sensors.{name}.lidar.sweep: expected at most the {recipe.time.at(1):g} seconds between two instants; found "
+            f"{sweep:g}"
+        )
+
+
+def _measuring(recipe: Recipe, name: str, entry: SensorEntry) -> dict[str, Lidar]:
+    _check_sweep(recipe, name, entry)
+    return {} if entry.lidar is None else {"lidar": entry.lidar.measuring(recipe.seed)}
+
+
+def _lens(name: str, entry: SensorEntry, camera: CameraEntry, lens: Intrinsics) -> Intrinsics:
+    if entry.lidar is not None:
+        return entry.lidar.intrinsics
+    if not entry.has_lens:
+        return lens
+    try:
+        return entry.lens(camera).intrinsics
+    except ValueError as error:
+        raise RecipeError(f"rig.sensors.{name}: {error}") from None
+
+
+def _channels(recipe: Recipe, name: str, entry: SensorEntry) -> tuple[str, ...] | None:
+    for i, channel in enumerate(entry.channels or ()):
+        kept = "rgba" if channel == "rgb" and "rgba" in recipe.channels else channel
+        if kept not in recipe.channels:
+            raise RecipeError(
+                f"rig.sensors.{name}.channels[{i}]: {one_of(channel, recipe.channels)}, or add it to the recipe's "
+                "channels: a sensor keeps all or some of them"
+            )
+        if (wrong := _not_measured(channel, entry)) is not None:
+            raise RecipeError(f"rig.sensors.{name}.channels[{i}]: {wrong}: leave it out")
+    if entry.channels is None:
+        return None
+    own = {"rgba" if channel == "rgb" and "rgba" in recipe.channels else channel for channel in entry.channels}
+    return tuple(channel for channel in recipe.channels if channel in own)
+
+
+def _not_measured(channel: str, entry: SensorEntry) -> str | None:
+    """What is wrong with a channel that a sensor cannot have."""
+    if entry.lidar is not None and channel in PASSES:
+        return f"expected labels, as a LiDAR takes no pictures; found {channel}"
+    if entry.lidar is None and channel == LIDAR:
+        return f"expected what a camera sees; found {channel}, the points of a LiDAR"
+    return None
+
+
+def _pose(name: str, entry: SensorEntry) -> Float:
+    """Where a sensor stands, (4, 4)."""
+    if entry.look is not None:
+        forward = np.subtract(entry.look, entry.position)
+        if math.hypot(forward[0], forward[2]) < 1e-9 * math.hypot(*forward.tolist()):
+            raise RecipeError(
+                f"rig.sensors.{name}.look: expected a point not straight above or below the sensor; found "
+                f"{list(entry.look)}: turn it by rotation: [90, 0, 0] looks up, [-90, 0, 0] down"
+            )
+        return rigid(_facing(forward), entry.position)
+    if entry.rotation is None:
+        return rigid(np.eye(3), entry.position)
+    first = entry.rotation[0]
+    if isinstance(first, tuple):
+        written = np.array(entry.rotation, np.float64)
+        found = nearest_rotation(written)
+        if found is None or np.abs(found - written).max() > SKEWED:
+            raise RecipeError(f"rig.sensors.{name}.rotation: expected a rotation; found a matrix that is none")
+        return rigid(found, entry.position)
+    x, y, z = entry.rotation
+    return rigid(_turned(float(x), float(y), float(z)), entry.position)  # pyright: ignore[reportArgumentType]
+
+
+def _facing(forward: Float) -> Float:
+    """Axes, in columns, of a sensor that looks along a direction, level in the rig."""
+    x, y, z = (forward / math.sqrt(float((forward * forward).sum()))).tolist()
+    level = math.sqrt(x * x + z * z)
+    right = np.array([z / level, 0.0, -x / level])
+    down = np.array([-x * y / level, level, -y * z / level])
+    return np.column_stack([right, down, (x, y, z)])
+
+
+def _turned(x: float, y: float, z: float) -> Float:
+    """Turned to the right by y, then up by x, then clockwise by z, degrees: Ry Rx Rz, to twelve digits.
+
+    The last digits of sines differ between processors.
+    """
+    (ca, sa), (cb, sb), (cc, sc) = (_cosine_sine(angle) for angle in (x, y, z))
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, ca, -sa], [0.0, sa, ca]])
+    about_y = np.array([[cb, 0.0, sb], [0.0, 1.0, 0.0], [-sb, 0.0, cb]])
+    about_z = np.array([[cc, -sc, 0.0], [sc, cc, 0.0], [0.0, 0.0, 1.0]])
+    return transform(about_y, transform(about_x, about_z.T)).T
+
+
+def _cosine_sine(degrees: float) -> tuple[float, float]:
+    angle = math.radians(degrees)
+    return round(math.cos(angle), 12) + 0.0, round(math.sin(angle), 12) + 0.0
+
+
+def _around(entry: SurroundRig) -> Iterator[tuple[str, Float]]:
+    """Names and poses, each sensor turned on to the right by an equal part of a turn, and `radius` ahead of the middle."""
+    for i in range(entry.count):
+        axes = _turned(0.0, 360.0 * i / entry.count, 0.0)
+        yield f"camera{i}", rigid(axes, entry.radius * axes[:, 2])
+
+
+def _calibrated(recipe: Recipe, entry: RigFile, lens: Intrinsics) -> Rig:
+    paths = [recipe.folder / Path(path).expanduser() for path in entry.path]
+    found = read_rig(paths, entry.format, entry.rectified)
+    return _mounted({one.name: (_sized(one, lens), one.rig_from_sensor) for one in found})
+
+
+def _sized(found: Calibrated, lens: Intrinsics) -> Intrinsics:
+    """The calibrated lens; at the recipe's size where the calibration says none."""
+    width, height = found.size or (lens.width, lens.height)
+    with told_of(f"rig: sensor {found.name}"):
+        return Intrinsics(width=width, height=height, **found.lens, distortion=found.distortion)
+
+
+def _check_disparity(recipe: Recipe, rig: Rig) -> None:
+    asked = next((name for name in recipe.channels if name.startswith("disparity")), None)
+    if asked and not rig.rectified:
+        raise RecipeError(
+            f"channels: expected a rig with two rectified sensors (equal pinhole lenses and axes, one to the "
+            f"right of the other) for {asked}; found none: set rig: {{kind: stereo, baseline: 0.1}}, rectified: true beside a "
+            f"calibration, or leave {asked} out"
+        )
+
+
+def _moved(x: float, y: float, z: float) -> Float:
+    return rigid(np.eye(3), (x, y, z))
+
+
+def _inverse(pose: Float) -> Float:
+    turned = np.ascontiguousarray(pose[:3, :3].T)
+    return rigid(turned, -transform(turned, pose[:3, 3]))
+
+
+def _matrix(pose: Float) -> Matrix4:
+    a, b, c = ((x, y, z, w) for x, y, z, w in (pose[:3] + 0.0).tolist())
+    return a, b, c, IDENTITY[3]

@@ -1,0 +1,229 @@
+"""What a whole sequence does: where its things and its rig are at all of its instants, however shots cut it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+from viewsphere.composing.composition import BoxOf, center, center_of_all, still
+from viewsphere.composing.motion import Lane, Start, mover
+from viewsphere.composing.placing import standing
+from viewsphere.composing.redraws import redraw_names
+from viewsphere.composing.scene.scenery import SceneryPiece
+from viewsphere.composing.seeds import Names, generator
+from viewsphere.composing.trajectories import RigPose, World, shaken
+from viewsphere.composing.trajectories import standing as steady
+from viewsphere.composing.viewpoints.sequence_poses import TrajectoryPoses
+from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import nearest
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Matrix4, Vector
+from viewsphere.model.thing import Motion, Thing
+from viewsphere.planning.samplers._moving import Moving
+from viewsphere.planning.samplers._random import scene_around, scene_distractors, scene_laid, scene_things
+from viewsphere.planning.samplers._stock import Stock
+from viewsphere.recipe.motion import Motions
+from viewsphere.recipe.sequence import TimeEntry
+
+Way = Callable[[float], Matrix4]
+"""Where a thing was at a time, seconds, on the way to where it is placed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One sequence: its things as they are placed, and what moves each, None where it stands still; what cameras look at that
+    have no target of their own; and where the rig is at all instants, None where it stands still at its viewpoint.
+    """
+
+    things: tuple[Thing, ...]
+    moving: tuple[Moving | None, ...]
+    focus: Vector
+    rig: tuple[RigPose, ...] | None
+
+    def things_during(self, instants: Sequence[int]) -> tuple[Thing, ...]:
+        """The things at some instants."""
+        pairs = zip(self.things, self.moving, strict=True)
+        return tuple(_with(thing, moving and moving.during(instants)) for thing, moving in pairs)
+
+    def focus_at(self, instant: int, follows: bool, box_of: BoxOf) -> Vector:
+        """What cameras look at that have no target of their own, and may follow the first thing."""
+        return center(_at(self.things[0], self.moving[0], instant), box_of) if follows else self.focus
+
+
+def _with(thing: Thing, motion: Motion | None) -> Thing:
+    """The thing with this motion; None: as it is placed."""
+    return thing if motion is None else thing.model_copy(update={"motion": motion})
+
+
+def _at(thing: Thing, moving: Moving | None, instant: int) -> Thing:
+    """The thing as it is at an instant: standing still there, or not there."""
+    return _with(thing, moving and moving.at(instant))
+
+
+def time_of(stock: Stock) -> TimeEntry:
+    """The recipe's time."""
+    assert stock.recipe.time is not None
+    return stock.recipe.time
+
+
+@lru_cache(maxsize=2)
+def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
+    """The sequence of a subject whose first pose has this number. The last ones are kept: shots of one follow one another.
+
+    Raises RecipeError where there is no room, and for what cannot move as it should.
+    """
+    around = stock.scene_pose(start)
+    targets = placed_targets(stock, subject, around, box_of)
+    focus = middle(targets, box_of)
+    names = (subject, stock.pose_list.place(start), *redraw_names(stock.redraw))
+    lanes = () if stock.composition is None else stock.composition.lanes(subject, around, stock.redraw)
+
+    pieces: list[Moving | None] = []
+
+    def piece_moved(thing: Thing, piece: SceneryPiece) -> Thing:
+        pieces.append(piece_moving(stock, thing, piece, names, lanes))
+        return thing
+
+    things = targets
+    if stock.composition is not None:
+        things = stock.composition.things(subject, targets, around, box_of, piece_moved, stock.redraw)
+    ways = target_ways(stock, subject, around, box_of)
+    if stock.recipe.scenes is not None:
+        among, beneath = scene_distractors(stock, subject, around, box_of), scene_around(stock, subject, around, box_of)
+        own_ways = zip(among, ways[len(targets) :], strict=True)
+        moving = [_distractor_moving(stock, thing, way, (*names, str(i)), lanes) for i, (thing, way) in enumerate(own_ways)]
+        things, pieces = (*things, *among, *beneath), [*pieces, *moving, *[None] * len(beneath)]
+    own = [target_moving(stock, thing, i, names, lanes, way) for (i, thing), way in zip(enumerate(targets), ways, strict=False)]
+    made = Course(stock.repainted(things, subject, start), (*own, *pieces), focus, None)
+    return replace(made, rig=_rig(stock, made, subject, start, lanes, box_of))
+
+
+def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+    """The targets of a sequence where they are placed, on the floor; `pose` names what is drawn for each sequence."""
+    if stock.recipe.scenes is not None:
+        return scene_things(stock, subject, pose, box_of)
+    spec = stock.spec(subject)
+    if stock.composition is not None:
+        again = redraw_names(stock.redraw)
+        return stock.composition.targets(spec, pose, box_of, again, stock.memory, redraw=stock.redraw)
+    return still((spec,), (standing(box_of(spec)),))
+
+
+def target_ways(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Way | None, ...]:
+    """How each target of a sequence, and then each distractor, came to where it is placed; None: it was put there at once."""
+    if stock.recipe.scenes is not None:
+        made = scene_laid(stock, subject, pose, box_of)
+        return tuple(way.at for way in made.ways) or (None,) * len(made.members)
+    spec = stock.spec(subject)
+    company = None
+    if stock.composition is not None:
+        company = stock.composition.company(
+            spec, pose, box_of, standing(box_of(spec)), redraw_names(stock.redraw), stock.memory, redraw=stock.redraw
+        )
+    if company is None:
+        return (None,)
+    return (None, *(tuple(way.at for way in company.ways) or (None,) * len(company.members)))
+
+
+def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
+    """What cameras look at that have no target of their own: where the targets are placed."""
+    return center(things[0], box_of) if len(things) == 1 else center_of_all(things, box_of)
+
+
+def target_moving(
+    stock: Stock, thing: Thing, slot: int, names: Names, lanes: tuple[Lane, ...], way: Way | None = None
+) -> Moving | None:
+    """What moves a target, the one of this number, in the sequence of these names; None where it stands still."""
+    return _moving(stock, thing, *_motions(stock, thing.model, slot), (*names, str(slot), thing.model.key), lanes, way)
+
+
+def piece_moving(stock: Stock, thing: Thing, piece: SceneryPiece, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
+    """What moves a piece of scenery in the sequence of these names; None where it stands still."""
+    return _moving(stock, thing, piece.motion, piece.field, (*names, piece.name), lanes)
+
+
+def _distractor_moving(stock: Stock, thing: Thing, way: Way | None, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
+    """What moves a model that is not labelled; None where it stands still."""
+    number = {spec.key: number for spec, number in stock.distractors}[thing.model.key]
+    motions, field = stock.recipe.models[number].motion, f"models[{number}].motion"
+    return _moving(stock, thing, motions, field, (*names, "distractor", thing.model.key), lanes, way)
+
+
+def _moving(
+    stock: Stock,
+    thing: Thing,
+    motions: Motions | None,
+    field: str,
+    names: Names,
+    lanes: tuple[Lane, ...],
+    way: Way | None = None,
+) -> Moving | None:
+    """What moves a thing, drawn for these names; None where it stands still."""
+    if motions is None:
+        return None
+    time, rng = time_of(stock), partial(generator, stock.recipe.seed, "motion", *names)
+    place = stock.position.get(thing.model.key)
+    line = None if place is None else stock.timelines[place]
+    start = Start(thing.world_from_object, thing.model, time.at(time.count - 1), rng, lanes, way=way)
+    return Moving(mover(motions, start.playing(line, field)), time)
+
+
+def _motions(stock: Stock, spec: ModelSpec, slot: int) -> tuple[Motions | None, str]:
+    """How a target moves: its model's way, or in company as the recipe says of distractors; and the recipe's field."""
+    company = stock.recipe.scene.company
+    if slot and company is not None:
+        return company.motion, "scene.company.motion"
+    number = stock.entries[stock.position[spec.key]]
+    return stock.recipe.models[number].motion, f"models[{number}].motion"
+
+
+def _rig(
+    stock: Stock, course: Course, subject: str, start: int, lanes: tuple[Lane, ...], box_of: BoxOf
+) -> tuple[RigPose, ...] | None:
+    """Where the rig is at all instants, None where it stands still."""
+    time, views = time_of(stock), stock.sequences_of(subject)
+    times = np.array([time.at(i) for i in range(time.count)])
+    names = (subject, stock.pose_list.place(start), *redraw_names(stock.redraw))
+    world = World(
+        time.fps,
+        course.focus,
+        lambda thing, instant: np.array(_center(course, thing, instant, box_of)),
+        partial(generator, stock.recipe.seed, "rig", *names),
+        lanes,
+    )
+    if isinstance(views.base, TrajectoryPoses):
+        return views.base.trajectory.poses(times, world)
+    shake = stock.recipe.viewpoints.shake
+    if shake is None:
+        return None
+    follows = stock.recipe.viewpoints.target == "follow"
+    held = []
+    for i in range(time.count):
+        at = course.focus_at(i, follows, box_of)
+        held.append(steady(stock.viewpoint(subject, views[start + i], at), at))
+    return shaken(held, shake, times, world)
+
+
+def _center(course: Course, wanted: int | str, instant: int, box_of: BoxOf) -> Vector:
+    """The middle of a thing, by its id or its model's key, at an instant."""
+    pairs = zip(course.things, course.moving, strict=True)
+    thing, moving = next((pair for pair in pairs if wanted in (pair[0].id, pair[0].model.key)), (None, None))
+    if thing is None:
+        raise no_such_thing(wanted, {thing.id: thing.model.key for thing in course.things if thing.id})
+    now = _at(thing, moving, instant)
+    if not now.is_there:
+        raise RecipeError(
+            f"viewpoints.look: expected a thing that is there all the time; found {wanted!r}, which is not at instant {instant}"
+        )
+    return center(now, box_of)
+
+
+def no_such_thing(wanted: int | str, known: Mapping[int, str]) -> RecipeError:
+    """What says that a camera cannot look at a thing; `known` are the keys of those that are there, by their numbers."""
+    there = ", ".join(f"{number} ({key})" for number, key in known.items())
+    return RecipeError(
+        f"viewpoints.look: expected a thing's number or key: {there}; found {wanted!r}{nearest(wanted, known.values())}"
+    )

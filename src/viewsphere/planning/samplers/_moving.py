@@ -1,0 +1,92 @@
+"""A thing that moves through a sequence: where it is at an instant is found when that is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+
+from viewsphere.composing.motion import Mover
+from viewsphere.model.scene import Matrix4
+from viewsphere.model.thing import Motion, TimeStep
+from viewsphere.recipe.sequence import TimeEntry
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """What a mover does at the instants of a sequence: the same whichever of these are asked for."""
+
+    mover: Mover
+    time: TimeEntry
+
+    @property
+    def is_still(self) -> bool:
+        """Whether the thing stands at one place all the time, and shows no time step."""
+        return not self._goes and not self._plays and self._first_step is None
+
+    def at(self, instant: int) -> Motion:
+        """The motion of what stays as the thing is at an instant."""
+        return Motion(poses=(self._pose(instant),), steps=(self._step(instant),))
+
+    def during(self, instants: Sequence[int]) -> Motion:
+        """The motion at some instants. What moves in the sequence is not still where it rests for a while."""
+        poses = tuple(map(self._pose, instants if self._goes else (0,)))
+        steps = tuple(map(self._step, instants if self._plays else (0,)))
+        return Motion(poses=poses, steps=steps, moves=not self.is_still)
+
+    def around(self, instant: int, moments: Iterable[float]) -> Motion:
+        """The motion at moments around an instant, counted in instants."""
+        return self.mover.at([(instant + moment) / self.time.fps for moment in moments])
+
+    @property
+    def plays_file(self) -> bool:
+        """Whether the thing shows time steps of its model's file."""
+        return self.mover.start.timeline is not None
+
+    @cached_property
+    def _goes(self) -> bool:
+        """Whether it is not at one place all the time."""
+        return _differ(map(self._pose, _here_and_there(self.time.count)))
+
+    @cached_property
+    def _plays(self) -> bool:
+        """Whether it shows several time steps."""
+        return self.plays_file and _differ(filter(None, map(self._shown, _here_and_there(self.time.count))))
+
+    @cached_property
+    def _first_step(self) -> TimeStep | None:
+        """The first time step that it shows, None where it plays no file or is never there."""
+        return next(filter(None, map(self._shown, range(self.time.count))), None) if self.plays_file else None
+
+    def _pose(self, instant: int) -> Matrix4 | None:
+        return self.mover.state(self.time.at(instant))[0]
+
+    def _shown(self, instant: int) -> TimeStep | None:
+        return self.mover.state(self.time.at(instant))[1]
+
+    def _step(self, instant: int) -> TimeStep | None:
+        """What it shows; while it is not there what it showed last, and before it enters what it will show first."""
+        if not self.plays_file:
+            return None
+        return next(filter(None, map(self._shown, range(instant, -1, -1))), self._first_step)
+
+
+def _differ(values: Iterator[object]) -> bool:
+    first = next(values, None)
+    return any(value != first for value in values)
+
+
+def _here_and_there(count: int) -> Iterator[int]:
+    """The numbers below `count`, upwards, and in turns by halves, quarters, ...: so two that differ are soon found where they
+    differ at first, or for long.
+    """
+    return chain.from_iterable(zip(range(count), _halved(count), strict=True))
+
+
+def _halved(count: int) -> Iterator[int]:
+    yield 0
+    step = 1 << (count - 1).bit_length()
+    while step:
+        yield from range(step, count, 2 * step)
+        step //= 2

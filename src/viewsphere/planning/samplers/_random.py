@@ -1,0 +1,280 @@
+"""Random scenes of models, as several samplers make them: which models, of which split, and where they stand.
+
+Scene k follows from the seed, its name and the models alone: it is the same however many scenes there are.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from functools import lru_cache, partial
+
+from viewsphere.composing.cast import balanced, mixed
+from viewsphere.composing.composition import BoxOf, still
+from viewsphere.composing.layouts import Laid, laid, remembered_as
+from viewsphere.composing.placing import Piece, Room, footprint
+from viewsphere.composing.redraws import SAME_MODELS, fewer, least_objects, redraw_names, redraws_place
+from viewsphere.composing.scene.scenery import draw_names, place_surfaces, scenery_key
+from viewsphere.composing.seeds import generator, share, shares
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.box import box_vertices
+from viewsphere.limits import limits
+from viewsphere.model.mistakes import one_of
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
+from viewsphere.model.scene import IDENTITY
+from viewsphere.model.thing import Motion, Thing
+from viewsphere.planning.samplers._stock import Stock
+from viewsphere.planning.splits import drawn_split, shared
+from viewsphere.recipe.draws import drawn
+from viewsphere.recipe.layout import SurfaceEntry
+from viewsphere.recipe.models import ZOO
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scenes import ScenesEntry
+from viewsphere.zoo.places import Surface
+
+LOOKS = 8
+"""Looks of one piece of scenery."""
+
+
+def scenes_entry(recipe: Recipe) -> ScenesEntry:
+    """The recipe's random scenes."""
+    assert isinstance(recipe.scenes, ScenesEntry)
+    return recipe.scenes
+
+
+def scene_names(recipe: Recipe) -> tuple[str, ...]:
+    """The scenes' names; raises RecipeError where they have company, or are more than the frames that are wanted at most."""
+    count = scenes_entry(recipe).count
+    if recipe.scene.company is not None:
+        raise RecipeError("scene.company: expected none beside scenes, which have several models each; found one: leave it out")
+    if count > recipe.max_frames:
+        raise RecipeError(
+            f"scenes.count: expected at most {recipe.max_frames:,} frames; found {count:,} scenes: set max_frames: {count} in "
+            "the recipe if that is meant"
+        )
+    check_surface(recipe)
+    return tuple(f"scene-{number:06d}" for number in range(count))
+
+
+def scene_cast(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
+    """The models of a scene, of one split where splits are by model."""
+    recipe, entry = stock.recipe, scenes_entry(stock.recipe)
+    models = _models_for(stock, _group(stock, subject))
+    names = (subject, *redraw_names(stock.redraw, SAME_MODELS))
+    if entry.balance == "models":
+        return mixed(recipe.seed, models, _size(recipe, subject, stock.redraw), names, entry.repeat)
+    cast: list[ModelSpec] = []
+    for category, count in _categories(stock.root)[subject]:
+        own = tuple(spec for spec in models if spec.category == category)
+        cast += mixed(recipe.seed, own, count, names, entry.repeat)
+    return tuple(sorted(cast, key=lambda spec: share(recipe.seed, "slot", subject, spec.key)))
+
+
+def _size(recipe: Recipe, subject: str, redraw: int = 0) -> int:
+    """The number of models in a scene; late redraws drop some, as far as the recipe allows."""
+    count = drawn(scenes_entry(recipe).objects, lambda path: generator(recipe.seed, *path, subject), ("scenes", "objects"))
+    return max(least_objects(recipe, count), count - fewer(recipe, redraw))
+
+
+def _group(stock: Stock, subject: str) -> str:
+    """The split that a scene's models are of, where splits are by model; else the empty name of all."""
+    return scene_split(stock, subject) if stock.recipe.splits.by == "model" else ""
+
+
+def _models_for(stock: Stock, group: str) -> tuple[ModelSpec, ...]:
+    """The models that may meet in scenes of a group."""
+    return tuple(spec for spec in stock.model_specs if not group or stock.dealt_splits[spec.key] == group)
+
+
+@lru_cache(maxsize=2)
+def _categories(stock: Stock) -> dict[str, tuple[tuple[str, int], ...]]:
+    """How many objects of which categories stand in each scene."""
+    recipe, repeat = stock.recipe, scenes_entry(stock.recipe).repeat
+    groups: defaultdict[str, list[str]] = defaultdict(list)
+    for subject in stock.subjects:
+        groups[_group(stock, subject)].append(subject)
+    found: dict[str, tuple[tuple[str, int], ...]] = {}
+    for group, subjects in groups.items():
+        there = Counter(spec.category for spec in _models_for(stock, group))
+        found |= balanced(recipe.seed, {name: _size(recipe, name) for name in subjects}, there, repeat)
+    return found
+
+
+def scene_split(stock: Stock, subject: str) -> str:
+    """The split of a scene where splits are by model: it draws its split first, then models of this split; shares follow from
+    the numbers of models where some of these are listed.
+    """
+    return drawn_split(_shares(stock.root), stock.recipe.lasting_seed, (subject,))
+
+
+def scene_laid(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
+    """The models of a scene as its layout places them; the last ones are kept, whatever the tries of frames."""
+    return _laid(stock.root, stock.redraw, subject, pose, box_of)
+
+
+@lru_cache(maxsize=4)
+def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
+    stock, recipe, entry = root.redrawn(redraw), root.recipe, scenes_entry(root.recipe)
+    models = (*scene_cast(stock, subject), *_distractors(stock, subject))
+    stand = surface(stock, subject, pose)
+    if stand is None:
+        free = None if stock.composition is None else stock.composition.free_floor(subject, pose, redraw)
+    else:
+        free = footprint(
+            box_vertices((-stand.size[0] / 2, -stand.size[1] / 2, 0), (stand.size[0] / 2, stand.size[1] / 2, 0)), IDENTITY
+        )
+    world_from_room = IDENTITY if stand is None else stand.world_from_surface
+    built = None if stock.composition is None else stock.composition.built(subject, pose, redraw, world_from_room)
+    again = redraw_names(redraw)
+    names = ("scene", subject, *again) if pose is None else ("scene", subject, pose, *again)
+    roads = None if stand is not None else stock.composition
+    room = Room(
+        free,
+        entry.gap,
+        entry.spots,
+        field="scenes",
+        below=0.0 if stand is None else stand.world_from_surface[2][3],
+        clearance=None if stand is None else stand.clearance,
+        memory=partial(stock.memory, remembered_as(entry, models, names)),
+        moves=recipe.time is not None,
+        built=built,
+        lanes=roads.lanes(subject, pose, redraw) if roads else (),
+        bays=roads.bays(subject, pose, redraw) if roads else (),
+        pavements=roads.pavements(subject, pose, redraw) if roads else (),
+        furniture=roads.furniture(subject, pose, redraw) if roads else None,
+    )
+    rng = partial(generator, recipe.seed, "layout", subject, *again)
+    return laid(entry.layout, entry.orientation, models, room, box_of, rng, world_from_room)
+
+
+def scene_things(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+    """The models of a scene where they stand; raises RecipeError where there is no room."""
+    made, cast = scene_laid(stock, subject, pose, box_of), scene_cast(stock, subject)
+    return still(cast, made.poses[: len(cast)])
+
+
+def scene_distractors(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+    """The models of a scene that are not labelled, where they stand."""
+    made, count = scene_laid(stock, subject, pose, box_of), len(scene_cast(stock, subject))
+    placed = zip(made.members[count:], made.poses[count:], strict=True)
+    return tuple(Thing(id=0, model=spec, motion=Motion.still(at), scenery=True) for spec, at in placed)
+
+
+def _distractors(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
+    entry, models = scenes_entry(stock.recipe), [spec for spec, _ in stock.distractors]
+    if not models:
+        return ()
+    count = drawn(entry.distractors, lambda path: generator(stock.recipe.seed, *path, subject), ("scenes", "distractors"))
+    names = (subject, "distractors", *redraw_names(stock.redraw, SAME_MODELS))
+    return mixed(stock.recipe.seed, models, count, names, repeat=True)
+
+
+def scene_around(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+    """What the models of a scene stand on or in that comes with their layout: background."""
+    pieces = list(scene_laid(stock, subject, pose, box_of).around)
+    on, seed = scenes_entry(stock.recipe).surface, stock.recipe.seed
+    if isinstance(on, SurfaceEntry):
+        pieces.append(Piece("plain_table", (on.size[0], on.height, on.size[1]), IDENTITY))
+    return tuple(
+        Thing(id=0, model=_spec(piece, seed, subject), motion=Motion.still(piece.world_from_piece), scenery=True)
+        for piece in pieces
+    )
+
+
+def _spec(piece: Piece, seed: int, subject: str) -> ModelSpec:
+    """The model of a piece of scenery, one of a few looks that are drawn for the scene."""
+    look = int(generator(seed, "piece", subject, piece.family).integers(LOOKS))
+    return ModelSpec(
+        key=scenery_key(piece.family, f"{piece.size} {look}"),
+        source=ZOO + piece.family,
+        seed=look,
+        category=piece.family,
+        category_id=0,
+        centring="as_is",
+        size=piece.size,
+    )
+
+
+def check_surface(recipe: Recipe) -> None:
+    """Raise RecipeError where models are to stand on a surface that no draw of the place has."""
+    on, place = scenes_entry(recipe).surface, recipe.scene.place
+    if isinstance(on, str):
+        names = () if place is None else draw_names(place.draw, "scene-000000", "")
+        draws = limits.MAX_REDRAWS if redraws_place(recipe) else 1
+        surfaces: dict[str, Surface] = {}
+        for redraw in range(draws):
+            if on not in surfaces:
+                surfaces |= {one.name: one for one in place_surfaces(recipe, place, (*names, *redraw_names(redraw)))}
+        _named(on, tuple(surfaces.values()))
+
+
+def surface(stock: Stock, subject: str, pose: str | None) -> Surface | None:
+    """What the models of a scene stand on, world axes; None for the floor. Raises RecipeError for one that is not there."""
+    on = scenes_entry(stock.recipe).surface
+    if on is None:
+        return None
+    if isinstance(on, SurfaceEntry):
+        return Surface("on", ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, on.height), (0, 0, 0, 1)), on.size)
+    return _named(on, () if stock.composition is None else stock.composition.surfaces(subject, pose, stock.redraw))
+
+
+def _named(name: str, found: Sequence[Surface]) -> Surface:
+    names = {one.name: one for one in found}
+    if not names:
+        raise RecipeError(
+            f"scenes.surface: expected a scene.place that has surfaces, or {{size: [1.2, 0.8], height: 0.75}}; found {name!r}"
+        )
+    if name not in names:
+        raise RecipeError(f"scenes.surface: {one_of(name, tuple(names))}")
+    return names[name]
+
+
+def scene_views(stock: Stock, subject: str) -> Sequence[int]:
+    """Numbers of the viewpoints that a scene is taken from, ascending: where they are drawn, those of the lowest hashes."""
+    if not are_views_drawn(stock):
+        return range(len(stock.views))
+    hashed = shares(stock.recipe.seed, "scene's views", subject, each=stock.view_names)
+    return sorted(sorted(range(len(hashed)), key=hashed.__getitem__)[: scenes_entry(stock.recipe).views])
+
+
+def are_views_drawn(stock: Stock) -> bool:
+    """Whether scenes are taken from some of the viewpoints each, rather than from all."""
+    count = scenes_entry(stock.recipe).views
+    return count is not None and count < len(stock.views)
+
+
+def check_scene_models(stock: Stock) -> None:
+    """Raise RecipeError where a scene may ask for more models than there are, of one split where splits are by model."""
+    entry = scenes_entry(stock.recipe)
+    groups, names = {"": stock.models}, [""]
+    if stock.recipe.splits.by == "model":
+        groups, names = Counter(stock.dealt_splits.values()), list(_shares(stock))
+    for name in names:
+        if groups[name] < (1 if entry.repeat else entry.most_objects):
+            raise RecipeError(f"scenes.objects: {_too_few(entry, groups[name], stock.models, name)}")
+
+
+def _too_few(entry: ScenesEntry, there: int, models: int, split: str) -> str:
+    """The problem of scenes that need more models than there are, and what mends it."""
+    wanted = "at least one model" if entry.repeat else f"up to {quantity(entry.most_objects, 'model')}"
+    if not split:
+        return (
+            f"a scene needs {wanted}, and the recipe has {quantity(there, 'model')}. Add models, ask for fewer, or set "
+            "`scenes.repeat: true`."
+        )
+    others = ("set `scenes.repeat: true`", "ask for fewer") if there and not entry.repeat else ()
+    remedies = ", ".join(("Set `splits: {by: scene}`", *others, "or add models"))
+    return (
+        f"splits are by model, so a scene of split {split!r} needs {wanted} of that split, which has {there} of "
+        f"{quantity(models, 'model')}. {remedies}."
+    )
+
+
+@lru_cache(maxsize=2)
+def _shares(stock: Stock) -> dict[str, float]:
+    """The share of the scenes that each split has, where splits are by model."""
+    splits = stock.recipe.splits
+    if not any(isinstance(part, tuple) for part in splits.shares.values()):
+        return shared(splits)
+    return {name: count / stock.models for name, count in sorted(Counter(stock.dealt_splits.values()).items())}

@@ -1,0 +1,165 @@
+"""Shots as a file lists them: each with its camera, and with models where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from viewsphere.composing.composition import BoxOf
+from viewsphere.composing.time_steps import is_animated
+from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics
+from viewsphere.composing.viewpoints.poses import ListedPoses, placed, pose_file, world_turn
+from viewsphere.errors import RecipeError, each
+from viewsphere.model.listed import ListedObject
+from viewsphere.model.mistakes import nearest, one_of
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
+from viewsphere.model.rig import Rig
+from viewsphere.model.scene import IDENTITY
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
+from viewsphere.planning.samplers import Standing, Stock
+from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.viewpoints import PoseList
+from viewsphere.store import Block
+
+
+def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
+    """The shots' names. Raises RecipeError, a line a mistake, for shots of models and splits that the recipe does not have."""
+    _check(recipe)
+    path, shots = _file(recipe)
+    keys = {spec.key for spec in specs}
+    say_splits = any(shot.said.split for shot in shots)
+    if recipe.splits.by == "model" or (recipe.splits.by == "scene" and say_splits):
+        how = "frame, as shots say their splits" if say_splits else "scene, pose, place or frame beside sampler: listed"
+        raise RecipeError(f"splits.by: expected {how}; found {recipe.splits.by}: set splits: {{by: frame}}")
+
+    def name(shot: Arranged) -> str:
+        where, split = f"{path}:{shot.line}", shot.said.split
+        if split is not None and split not in recipe.splits.shares:
+            known = tuple(recipe.splits.shares)
+            raise RecipeError(f"{where}: split: {one_of(split, known)}")
+        for i, one in enumerate(shot.said.objects):
+            if one.model not in keys:
+                raise RecipeError(
+                    f"{where}: objects[{i}].model: expected the key of a model of the recipe; found {one.model!r}"
+                    f"{nearest(one.model, keys)}"
+                )
+        return shot.name
+
+    return tuple(each(name, shots))
+
+
+def factors(stock: Stock) -> str:
+    """The number of shots."""
+    return f"{quantity(len(stock.subjects), 'listed shot')} of {quantity(stock.models, 'model')}"
+
+
+def blocks(stock: Stock) -> tuple[Block, ...]:
+    """Every shot from its own camera, in the file's order."""
+    return tuple(Block((name,), ((i, i + 1),)) for i, name in enumerate(stock.subjects))
+
+
+def most_objects(recipe: Recipe) -> int:
+    """Most models in a shot."""
+    return max(len(shot.places) for shot in _file(recipe)[1])
+
+
+def cast(stock: Stock, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+    """The models of a shot, in the order of their ids."""
+    return tuple(stock.spec(one.model) for one in _shots(stock)[subject].said.objects)
+
+
+def split(stock: Stock, subject: str, pose: int) -> str:
+    """The shot's own, else what its name draws."""
+    if stock.recipe.splits.by == "scene":
+        return stock.dealt_splits[subject]
+    return _shots(stock)[subject].said.split or stock.hashed_split(subject, pose)
+
+
+def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+    """Nothing: where a listed camera is, is meant so."""
+    return iter(())
+
+
+def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+    """The models of a shot where the file has them, and what stands around them, seen by its camera."""
+    (pose,) = poses
+    things = _things(stock, _shots(stock)[subject])
+    if stock.composition is not None:
+        things = stock.composition.things(subject, things, stock.scene_pose(pose), box_of)
+    view, number = stock.view(stock.pose_list, pose), first // len(stock.rig.sensors)
+    now = stock.instant(subject, view, view.target, (0.0, 0.0, 0.0), split(stock, subject, pose), number)
+    scene = stock.scene(subject, stock.pose_list.name(pose))
+    things, own = stock.repainted(things, subject, pose), now.intrinsics
+    if stock.own_rig is not None or own is None:
+        return stock.finished(key, first, things, scene, [now])
+    made = stock.finished(key, first, things, scene, [now.model_copy(update={"intrinsics": None})])
+    return made.model_copy(update={"rig": Rig.of(own)})
+
+
+def _things(stock: Stock, shot: Arranged) -> tuple[Thing, ...]:
+    """The objects of a shot, with the motions that the recipe's viewpoints make of their file's world."""
+    entry, file = _listed(stock).viewpoints, _listed(stock).file
+    turn = world_turn(entry, file)
+
+    def thing(number: int, one: ListedObject, place: Extrinsics) -> Thing:
+        a, b, c = ((x, y, z, w) for x, y, z, w in placed(place, turn, entry)[:3].tolist())
+        motion = Motion.still((a, b, c, IDENTITY[3]))
+        return Thing(id=number, model=stock.spec(one.model), motion=motion, scenery=one.scenery)
+
+    pairs = zip(shot.said.objects, shot.places, strict=True)
+    return tuple(thing(number, one, place) for number, (one, place) in enumerate(pairs, 1))
+
+
+def _listed(stock: Stock) -> ListedPoses:
+    assert isinstance(stock.pose_list, ListedPoses)
+    return stock.pose_list
+
+
+@lru_cache(maxsize=2)
+def _shots(stock: Stock) -> dict[str, Arranged]:
+    """The shots by their names."""
+    return {shot.name: shot for shot in _listed(stock).file.shots}
+
+
+def _file(recipe: Recipe) -> tuple[Path, tuple[Arranged, ...]]:
+    """The file of shots, and those that are taken. Raises RecipeError where the viewpoints are no such file."""
+    entry = recipe.viewpoints
+    if isinstance(entry, PoseList):
+        path = recipe.folder / Path(entry.path).expanduser()
+        found = pose_file(path, entry)
+        if found.shots:
+            return path, found.shots
+    raise RecipeError(
+        "viewpoints: expected a file of shots beside sampler: listed; found another kind of viewpoints: set viewpoints: "
+        "{kind: file, path: shots.jsonl}"
+    )
+
+
+def _check(recipe: Recipe) -> None:
+    """Raise RecipeError for what has no place beside listed shots."""
+    if recipe.time is not None:
+        raise RecipeError("time: expected none beside sampler: listed, whose shots are still pictures; found one: leave it out")
+    if is_animated(recipe):
+        raise RecipeError("models: expected models that stand still beside sampler: listed; found frames: leave frames out")
+    if recipe.scene.company is not None:
+        raise RecipeError("scene.company: expected none beside sampler: listed, which says what is there; found one")
+    lenses = [repr(shot.said.camera) for shot in _file(recipe)[1]] if recipe.rig and recipe.camera.of_viewpoints else []
+    if len(set(lenses)) > 1:
+        raise RecipeError("rig: expected shots of one lens beside a rig and camera: {of_viewpoints: true}; found several")
+
+
+SAMPLER = SamplerSpec(
+    subjects=subjects,
+    factors=factors,
+    blocks=blocks,
+    most_objects=most_objects,
+    cast=cast,
+    split=split,
+    standing=standing,
+    shot=shot,
+    of_any_size=True,
+)

@@ -1,0 +1,132 @@
+"""Random scenes: in each some models are drawn and placed, and the camera goes around the middle of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import groupby
+
+import numpy as np
+
+from viewsphere.composing.composition import BoxOf, center_of_all
+from viewsphere.composing.layouts import is_slow
+from viewsphere.composing.time_steps import is_animated
+from viewsphere.composing.viewpoints.pose_numbers import as_ranges
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
+from viewsphere.model.scene import Floor
+from viewsphere.model.shot import Shot
+from viewsphere.planning.samplers import Standing, Stock
+from viewsphere.planning.samplers._random import (
+    are_views_drawn,
+    check_scene_models,
+    scene_around,
+    scene_cast,
+    scene_distractors,
+    scene_names,
+    scene_split,
+    scene_things,
+    scene_views,
+    scenes_entry,
+)
+from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.store import Block
+from viewsphere.store.index import Ranges, numbers
+
+IN_THE_AIR = 1e-3
+"""Metres between the floor and models that do not stand on it."""
+
+
+def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
+    """The scenes' names."""
+    if is_animated(recipe):
+        raise RecipeError("scenes: expected models and a scene that stand still; found frames of a file: leave frames out")
+    if recipe.splits.by == "sequence":
+        raise RecipeError(
+            "splits.by: expected model, scene, pose, place or frame beside still pictures; found sequence: set time"
+        )
+    return scene_names(recipe)
+
+
+def factors(stock: Stock) -> str:
+    """Scenes, and the poses of each."""
+    entry = scenes_entry(stock.recipe)
+    views = len(stock.pose_list) if entry.views is None else min(entry.views, len(stock.pose_list))
+    return f"{quantity(len(stock.subjects), 'scene')} of {quantity(stock.models, 'model')} x {quantity(views, 'pose')}"
+
+
+def blocks(stock: Stock) -> tuple[Block, ...]:
+    """All poses of every scene, or those that are drawn for each. Raises RecipeError where too few models may meet."""
+    check_scene_models(stock)
+    if not are_views_drawn(stock):
+        return (Block(stock.subjects, ((0, len(stock.pose_list)),)),)
+    taken = groupby(stock.subjects, partial(_poses, stock))
+    return tuple(Block(tuple(names), poses) for poses, names in taken)
+
+
+def most_objects(recipe: Recipe) -> int:
+    """Most models in a scene."""
+    return scenes_entry(recipe).most_objects
+
+
+def cast(stock: Stock, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+    """The models of a scene."""
+    return scene_cast(stock, subject)
+
+
+def split(stock: Stock, subject: str, pose: int) -> str:
+    """The scene's, or what its pose, place or name draw; by model, what the scene draws before its models."""
+    match stock.recipe.splits.by:
+        case "scene":
+            return stock.dealt_splits[subject]
+        case "model":
+            return scene_split(stock, subject)
+        case _:
+            return stock.hashed_split(subject, pose)
+
+
+def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+    """The models of a scene; nothing where the place they stand in is drawn for each frame."""
+    if not stock.recipe.scene.is_moved_each_frame and not is_slow(scenes_entry(stock.recipe).layout):
+        things = scene_things(stock, subject, None, box_of)
+        views, poses = stock.pose_list.of(subject), tuple(numbers(_poses(stock, subject)))
+        yield Standing(things, center_of_all(things, box_of), views, poses)
+
+
+def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+    """The models of a scene, and what stands around them; cameras look at the middle of the models."""
+    pose = stock.scene_pose(poses[0])
+    targets = things = scene_things(stock, subject, pose, box_of)
+    middle = center_of_all(things, box_of)
+    if stock.composition is not None:
+        things = stock.composition.things(subject, things, pose, box_of, redraw=stock.redraw)
+    things += scene_distractors(stock, subject, pose, box_of) + scene_around(stock, subject, pose, box_of)
+    views = stock.pose_list.of(subject)
+    instants = [
+        stock.instant(subject, stock.view(views, pose), middle, middle, split(stock, subject, pose), i)
+        for i, pose in enumerate(poses, first // len(stock.rig.sensors))
+    ]
+    scene = stock.scene(subject, stock.pose_list.name(poses[0]))
+    if min(float(transform(thing.world_from_object, box_of(thing.model))[:, 2].min()) for thing in targets) > IN_THE_AIR:
+        scene = scene.model_copy(update={"floor": Floor(height=0.0)})
+    return stock.finished(key, first, stock.repainted(things, subject, poses[0]), scene, instants)
+
+
+def _poses(stock: Stock, subject: str) -> Ranges:
+    """Numbers of the poses that a scene is taken from."""
+    return as_ranges(np.array(scene_views(stock, subject), np.int64))
+
+
+SAMPLER = SamplerSpec(
+    subjects=subjects,
+    factors=factors,
+    blocks=blocks,
+    most_objects=most_objects,
+    cast=cast,
+    split=split,
+    standing=standing,
+    shot=shot,
+)

@@ -1,0 +1,190 @@
+"""Worlds over time: every model with its company, or every random scene, is one sequence from each viewpoint that stands still.
+
+A sequence's things, and what its camera does, follow from its names alone, and an instant from its number: shots may cut it
+anywhere. Shots carry the instants that labels of theirs need, too.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence, Set
+from dataclasses import replace
+
+from viewsphere.composing.composition import BoxOf
+from viewsphere.composing.layouts import is_slow
+from viewsphere.composing.seeds import generator
+from viewsphere.composing.time_steps import is_animated
+from viewsphere.composing.trajectories import instant as instant_of
+from viewsphere.composing.trajectories import is_still
+from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
+from viewsphere.errors import RecipeError
+from viewsphere.labels import labels
+from viewsphere.model.instant import Instant
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.quantity import quantity
+from viewsphere.model.scene import Floor, Matrix4
+from viewsphere.model.shot import Shot
+from viewsphere.model.tracks import Tracks
+from viewsphere.planning.samplers import Standing, Stock
+from viewsphere.planning.samplers._course import Course, course, middle, placed_targets, time_of
+from viewsphere.planning.samplers._exposing import exposures
+from viewsphere.planning.samplers._random import (
+    check_scene_models,
+    scene_cast,
+    scene_names,
+    scene_split,
+    scene_views,
+    scenes_entry,
+)
+from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scenes import ScenesEntry
+from viewsphere.store import Block
+
+FLOOR = Floor(height=0.0, is_fixed=True)
+"""The floor of all sequences: what moves may be above it or below."""
+
+
+def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
+    """The models' keys, or the scenes' names."""
+    if is_animated(recipe):
+        raise RecipeError(
+            "time: expected models and a scene without frames of their files, which are still pictures; found frames: leave "
+            "frames out, and give the model a motion of kind clip"
+        )
+    if recipe.scenes is not None:
+        return scene_names(recipe)
+    if recipe.splits.by == "scene":
+        raise RecipeError("splits.by: expected model, sequence, pose, place or frame without scenes; found scene: set scenes")
+    return tuple(spec.key for spec in specs)
+
+
+def factors(stock: Stock) -> str:
+    """Models or scenes, viewpoints and instants."""
+    subjects = quantity(len(stock.subjects), "model" if stock.recipe.scenes is None else "scene")
+    views = sum(len(names) for names in _taken(stock).values())
+    return f"{subjects}, {quantity(views, 'sequence')} x {quantity(time_of(stock).count, 'instant')}"
+
+
+def blocks(stock: Stock) -> tuple[Block, ...]:
+    """Viewpoint by viewpoint, all subjects that are taken from it, instant by instant."""
+    if stock.recipe.scenes is not None:
+        check_scene_models(stock)
+    count = time_of(stock).count
+    return tuple(Block(tuple(names), ((view * count, (view + 1) * count),)) for view, names in _taken(stock).items())
+
+
+def most_objects(recipe: Recipe) -> int:
+    """The model and its company, or most models in a scene."""
+    if recipe.scenes is not None:
+        return scenes_entry(recipe).most_objects
+    return 1 + (recipe.scene.company.number if recipe.scene.company else 0)
+
+
+def cast(stock: Stock, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+    """The recipe's models in a sequence; only the model itself where company is drawn for each sequence and none is named."""
+    if stock.recipe.scenes is not None:
+        return scene_cast(stock, subject)
+    return stock.with_company(subject, pose)
+
+
+def split(stock: Stock, subject: str, pose: int) -> str:
+    """The model's, the scene's or the sequence's, or what its pose, place or name draw."""
+    by = stock.recipe.splits.by
+    if by == "sequence":
+        return stock.dealt_splits[stock.sequence(subject, pose)]
+    if by == "model" and stock.recipe.scenes is not None:
+        return scene_split(stock, subject)
+    return stock.dealt_splits[subject] if by in ("model", "scene") else stock.hashed_split(subject, pose)
+
+
+def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+    """The things as they are placed, seen by cameras that stand still; nothing where they are drawn for each sequence."""
+    if not stock.recipe.scene.is_moved_each_frame and is_still(stock.recipe.viewpoints) and not _is_slow(stock.recipe):
+        things = placed_targets(stock, subject, None, box_of)
+        count, views = time_of(stock).count, stock.sequences_of(subject)
+        poses = [view * count for view, names in _taken(stock).items() if subject in names]
+        yield Standing(things, middle(things, box_of), views, poses)
+
+
+def _is_slow(recipe: Recipe) -> bool:
+    """Whether where things are placed is not asked before frames are rendered."""
+    company, scenes = recipe.scene.company, recipe.scenes
+    layout = company.layout if company is not None else scenes.layout if isinstance(scenes, ScenesEntry) else None
+    return layout is not None and is_slow(layout)
+
+
+def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+    """Some instants of a sequence, and those that their labels need."""
+    start = poses[0] - poses[0] % time_of(stock).count
+    taken = {pose - start for pose in poses}
+    own = course(stock, subject, start, box_of)
+    numbers = sorted(taken | _needed(stock, taken))
+    instants = [_instant(stock, own, subject, start + i, box_of).model_copy(update={"recorded": i in taken}) for i in numbers]
+    scene = stock.scene(subject, stock.scene_name(start)).model_copy(update={"floor": FLOOR})
+    made = stock.finished(key, first, own.things_during(numbers), scene, instants)
+
+    def rig_at(instant: int) -> Matrix4:
+        return _instant(stock, own, subject, start + instant, box_of).world_from_rig
+
+    blurred = exposures(own, [i if i in taken else None for i in numbers], time_of(stock), rig_at)
+    more = {"sequence": stock.sequence(subject, start), "tracks": _tracks(stock, subject, start)}
+    return made.model_copy(update=more | {"shutter": time_of(stock).shutter, "exposures": blurred})
+
+
+def _tracks(stock: Stock, subject: str, start: int) -> Tracks | None:
+    """The points that sensors follow through a sequence."""
+    if stock.tracks is None or stock.tracks.count is None:
+        return stock.tracks
+    rng = generator(stock.recipe.seed, "tracks", subject, stock.pose_list.place(start))
+    return stock.tracks.model_copy(update={"seed": int(rng.integers(2**63))})
+
+
+def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) -> Instant:
+    """The instant of a pose."""
+    time, part = time_of(stock), split(stock, subject, pose)
+    i = pose % time.count
+    if own.rig is None:
+        view, at = stock.sequences_of(subject)[pose], own.focus_at(i, stock.recipe.viewpoints.target == "follow", box_of)
+        return stock.instant(subject, view, at, at, part, i).model_copy(update={"seconds": time.at(i)})
+    finish, now = stock.finish(subject, pose), own.rig[i]
+    if not stock.recipe.camera.of_viewpoints:
+        now = replace(now, intrinsics=stock.drawn_lens(subject, pose))
+    return instant_of(now, i, time.at(i), pose, stock.recipe.viewpoints.bins, split=part, finish=finish)
+
+
+def _needed(stock: Stock, taken: Set[int]) -> set[int]:
+    """The instants that labels of those that are taken need besides."""
+    known = labels()
+    names = {name for sensor in stock.rig.sensors for name in sensor.kept(stock.recipe.channels)}
+    names.update(stock.recipe.annotations)
+    offsets = {offset for name in names if name in known for offset in (*known[name].needs.instants, *known[name].needs.poses)}
+    offsets |= {-1, 1} if any(sensor.lidar and sensor.lidar.sweep for sensor in stock.rig.sensors) else set()
+    count = time_of(stock).count
+    compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
+    return compared if stock.tracks is None else compared | set(stock.tracks.at)
+
+
+def _taken(stock: Stock) -> dict[int, list[str]]:
+    """The subjects that are taken from each viewpoint, by the viewpoint's number."""
+    assert isinstance(stock.pose_list, SequencePoses)
+    base = stock.pose_list.base
+    if stock.recipe.scenes is None:
+        return {view: list(stock.subjects) for view in range(len(base))}
+    found: defaultdict[int, list[str]] = defaultdict(list)
+    for subject in stock.subjects:
+        for view in scene_views(stock, subject):
+            found[view].append(subject)
+    return dict(sorted(found.items()))
+
+
+SAMPLER = SamplerSpec(
+    subjects=subjects,
+    factors=factors,
+    blocks=blocks,
+    most_objects=most_objects,
+    cast=cast,
+    split=split,
+    standing=standing,
+    shot=shot,
+)

@@ -1,0 +1,58 @@
+"""Which split a frame is in: it follows from the seed and the names of what is kept together, and nothing else."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping
+from itertools import accumulate
+
+from viewsphere.composing.seeds import share
+from viewsphere.recipe.recipe import Splits
+
+
+def shared(splits: Splits) -> dict[str, float]:
+    """The splits that have a share of what is not listed, in the recipe's order."""
+    return {name: part for name, part in splits.shares.items() if not isinstance(part, tuple) and part}
+
+
+def hashed(splits: Splits, seed: int, names: tuple[str, ...]) -> str:
+    """The split of what has these names: each split gets about its share of all names, and no name minds the others."""
+    return drawn_split(shared(splits), seed, names)
+
+
+def drawn_split(shares: Mapping[str, float], seed: int, names: tuple[str, ...]) -> str:
+    """The same, of splits with these shares."""
+    edges = tuple(accumulate(shares.values()))
+    return tuple(shares)[min(bisect_right(edges, share(seed, "split", *names)), len(shares) - 1)]
+
+
+def dealt(splits: Splits, seed: int, keys: Iterable[str], kept: Mapping[str, str]) -> dict[str, str]:
+    """The split of each model or scene: the one it has in `kept`, or where it is listed; the others are dealt out by quotas.
+
+    Quotas are each split's share of those others, rounded so that they add up, the largest remainders up; none is 0 where
+    there are as many of them as splits. They come in the order of their hashes, so that no list's order matters.
+    """
+    shares = shared(splits)
+    listed = {key: name for name, some in splits.shares.items() if isinstance(some, tuple) for key in some}
+    found = {key: kept.get(key) or listed.get(key, "") for key in keys}
+    rest = sorted((share(seed, "split", key), key) for key, name in found.items() if not name)
+    names = (name for name, count in quotas(shares, len(rest)).items() for _ in range(count))
+    return found | {key: name for (_, key), name in zip(rest, names, strict=True)}
+
+
+def quotas(shares: Mapping[str, float], count: int) -> dict[str, int]:
+    """How many of `count` each share gets, by largest remainders; none gets 0 where there are as many as shares."""
+    exact = {name: share * count for name, share in shares.items()}
+    found = {name: int(number + 1e-9) for name, number in exact.items()}
+    by_remainder = sorted(exact, key=lambda name: found[name] - exact[name])
+    for name in by_remainder[: count - sum(found.values())]:
+        found[name] += 1
+    for name in [name for name, number in found.items() if not number and count >= len(found)]:
+        found[max(found, key=lambda other: found[other])] -= 1
+        found[name] = 1
+    return found
+
+
+def expected(splits: Splits, count: int) -> dict[str, int]:
+    """About how many of `count` hashed names are in each split; of all together as many."""
+    return quotas(shared(splits), count)

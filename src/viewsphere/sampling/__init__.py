@@ -1,1 +1,0 @@
-"""From a recipe to a plan: models, viewpoints, splits, backgrounds; recipe + index -> shot."""
