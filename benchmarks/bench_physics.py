@@ -20,7 +20,7 @@ from viewsphere.composing.physics import STEP_S, World
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.planning.samplers._random import scene_laid
+from viewsphere.planning.samplers.shared.random import scene_laid
 from viewsphere.zoo import build_zoo_model
 
 MODELS = [

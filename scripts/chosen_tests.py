@@ -119,7 +119,7 @@ class Modules:
         homes = {*(seam.package for seam in SEAMS.values()), "viewsphere.zoo", "viewsphere.zoo.places"}
         for module in self.all:
             package, _, name = module.rpartition(".")
-            if package in homes and not name.startswith("_"):
+            if package in homes and not name.startswith("_") and name != "shared":
                 self.plugins[name].add(module)
         self._needs = {module: graph.find_modules_directly_imported_by(module) | self._named(module) for module in self.all}
 

@@ -129,7 +129,7 @@ ALLOWED = {
     "codecs/npz.py": "a member of an archive in memory",
     "codecs/size.py": "behind open_file",
     "files.py": "the opener",
-    "formats/_archives.py": "writes",
+    "formats/shared/archives.py": "writes",
     "formats/native/poses.py": "a database in memory",
     "kernels/entries.py": "regular files of its own folder, none behind links",
     "recipe/starts": "the package's own recipes",

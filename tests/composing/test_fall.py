@@ -136,7 +136,7 @@ def test_a_box_that_is_too_small_says_so():
 
 
 def test_what_does_not_fit_on_a_table_is_told_with_the_best_that_was_found(monkeypatch):
-    from viewsphere.composing.placing import _dropping
+    from viewsphere.composing.placing.shared import dropping as _dropping
 
     monkeypatch.setattr(_dropping, "TRIES", 1)
     monkeypatch.setattr(_dropping, "ROUNDS", 1)

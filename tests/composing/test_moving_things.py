@@ -5,7 +5,7 @@ from test_motion import LANES, WALK, entries, start
 
 from viewsphere.composing.motion import Mover, mover
 from viewsphere.model.thing import Motion
-from viewsphere.planning.samplers._moving import Moving
+from viewsphere.planning.samplers.shared.moving import Moving
 from viewsphere.recipe.sequence import TimeEntry
 
 TIME = TimeEntry(frames=60, fps=25)

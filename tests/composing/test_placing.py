@@ -18,10 +18,10 @@ from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.composing import placing
 from viewsphere.composing.placing import Footprint, Room, Shape, checked, footprint, standing
-from viewsphere.composing.placing._crowd import Crowd, TakenMap, inner_class
-from viewsphere.composing.placing._footprint import Outline, first_crowded, outline
-from viewsphere.composing.placing._spot import Others
 from viewsphere.composing.placing.scatter import _roomy
+from viewsphere.composing.placing.shared.crowd import Crowd, TakenMap, inner_class
+from viewsphere.composing.placing.shared.footprint import Outline, first_crowded, outline
+from viewsphere.composing.placing.shared.spot import Others
 from viewsphere.composing.seeds import generator
 from viewsphere.errors import MissingExtraError, RecipeError
 from viewsphere.geometry.box import box_vertices

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.formats._contents import Coded
-from viewsphere.formats._tree import File
+from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.tree import File
 
 
 def with_channels(sample, **channels):

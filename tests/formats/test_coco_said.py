@@ -9,7 +9,7 @@ from PIL import Image
 from viewsphere import Dataset
 from viewsphere.check import check
 from viewsphere.errors import StoreError
-from viewsphere.formats._upright import shown_size, upright
+from viewsphere.formats.shared.exif import shown_size, upright
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.merging import merge

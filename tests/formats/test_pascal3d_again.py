@@ -15,7 +15,7 @@ from test_pascal3d_reading import FACES, KIT, SIZE, VERTICES, data_set, record, 
 from viewsphere import Dataset
 from viewsphere.errors import RecipeError, StoreError
 from viewsphere.formats import pascal3d
-from viewsphere.formats._viewpoint_mat import off_bytes
+from viewsphere.formats.shared.viewpoint_mat import off_bytes
 from viewsphere.planning.plan import plan
 from viewsphere.run.again import make_again
 from viewsphere.run.importing import import_dataset

@@ -135,7 +135,7 @@ def _mat(path: Path) -> None:
 
 @cache
 def mats() -> Pack:
-    from viewsphere.formats._viewpoint_mat import mat, structs
+    from viewsphere.formats.shared.viewpoint_mat import mat, structs
 
     inner = structs([{"text": "d'été", "numbers": np.eye(3), "cell": np.array([["a", 1.5]], object)}] * 2)
     return (Sample("record.mat", mat(record=inner), "mat"),)

@@ -10,7 +10,7 @@ from targets import CAMERAS, COLMAP, FILED, OPENCV, ORBITS, PLY, ROS, SEQUENCE, 
 from sealing import seal_again
 from viewsphere.check import check
 from viewsphere.errors import ViewsphereError
-from viewsphere.formats._paper import json_bytes
+from viewsphere.formats.shared.paper import json_bytes
 from viewsphere.planning.rig_files import read_rig
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset

@@ -15,7 +15,7 @@ from viewsphere.composing.scene.draws import Scenes
 from viewsphere.errors import RecipeError
 from viewsphere.limits import limits
 from viewsphere.planning.plan import plan
-from viewsphere.planning.samplers import _stock
+from viewsphere.planning.samplers.shared import stock as _stock
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.merging import merge

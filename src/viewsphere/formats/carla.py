@@ -37,13 +37,13 @@ from numpy.typing import NDArray
 
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats import Scope
-from viewsphere.formats import _refusals as refusals
-from viewsphere.formats._contents import Coded
-from viewsphere.formats._numbered import Numbered
-from viewsphere.formats._paper import json_bytes
-from viewsphere.formats._pictures import picture
-from viewsphere.formats._sequences import scene
-from viewsphere.formats._tree import File, Piece, Tree, functions, item
+from viewsphere.formats.shared import refusals
+from viewsphere.formats.shared.class_table import Numbered
+from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.paper import json_bytes
+from viewsphere.formats.shared.pictures import picture
+from viewsphere.formats.shared.sequences import scene
+from viewsphere.formats.shared.tree import File, Piece, Tree, functions, item
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec

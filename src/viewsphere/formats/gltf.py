@@ -32,9 +32,9 @@ from viewsphere.aside import temporary
 from viewsphere.assets.exporting.glb import Looking, Placed, scene_glb_bytes
 from viewsphere.files import read_bytes, read_text
 from viewsphere.formats import Scope
-from viewsphere.formats._cameras import opengl_pose
-from viewsphere.formats._contents import check_files
-from viewsphere.formats._refusals import any_camera
+from viewsphere.formats.shared.cameras import opengl_pose
+from viewsphere.formats.shared.export_files import check_files
+from viewsphere.formats.shared.refusals import any_camera
 from viewsphere.model.camera import Distortion
 from viewsphere.model.classes import thing_class
 from viewsphere.model.sample import ObjectAnnotation, Sample

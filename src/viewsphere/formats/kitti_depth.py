@@ -22,13 +22,13 @@ from functools import partial
 import numpy as np
 
 from viewsphere.formats import Scope
-from viewsphere.formats import _refusals as refusals
-from viewsphere.formats._contents import Coded
-from viewsphere.formats._flow_files import steps_png
-from viewsphere.formats._kitti import rectified
-from viewsphere.formats._pictures import picture
-from viewsphere.formats._sequences import Eyes, check_whole, instants, number, scene, two_eyes
-from viewsphere.formats._tree import File, Tree, functions
+from viewsphere.formats.shared import refusals
+from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.flow_files import steps_png
+from viewsphere.formats.shared.kitti import rectified
+from viewsphere.formats.shared.pictures import picture
+from viewsphere.formats.shared.sequences import Eyes, check_whole, instants, number, scene, two_eyes
+from viewsphere.formats.shared.tree import File, Tree, functions
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -26,7 +26,7 @@ from collections.abc import Iterator
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._kitti import (
+from viewsphere.formats.shared.kitti import (
     Car,
     calibration,
     calibration_text,
@@ -35,11 +35,11 @@ from viewsphere.formats._kitti import (
     printed,
     velodyne,
 )
-from viewsphere.formats._mounting import Float, mounted, unmoved
-from viewsphere.formats._pictures import picture
-from viewsphere.formats._refusals import pinhole, sequences
-from viewsphere.formats._timeline import Timeline, unknown_shots
-from viewsphere.formats._tree import File, Piece, Tree, functions, line
+from viewsphere.formats.shared.mounting import Float, mounted, unmoved
+from viewsphere.formats.shared.pictures import picture
+from viewsphere.formats.shared.refusals import pinhole, sequences
+from viewsphere.formats.shared.timeline import Timeline, unknown_shots
+from viewsphere.formats.shared.tree import File, Piece, Tree, functions, line
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot

@@ -36,10 +36,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats._globe import compass, earth, globe
-from viewsphere.formats._pictures import picture
-from viewsphere.formats._refusals import known_views, lenses, pinhole
-from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.geodesy import compass, earth, globe
+from viewsphere.formats.shared.pictures import picture
+from viewsphere.formats.shared.refusals import known_views, lenses, pinhole
+from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample

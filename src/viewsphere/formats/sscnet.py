@@ -37,12 +37,12 @@ from numpy.typing import NDArray
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats import _refusals as refusals
-from viewsphere.formats._contents import Coded
-from viewsphere.formats._numbered import Numbered
-from viewsphere.formats._pictures import depth_steps
-from viewsphere.formats._sequences import scene
-from viewsphere.formats._tree import File, Tree, functions
+from viewsphere.formats.shared import refusals
+from viewsphere.formats.shared.class_table import Numbered
+from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.pictures import depth_steps
+from viewsphere.formats.shared.sequences import scene
+from viewsphere.formats.shared.tree import File, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import Sample

@@ -33,12 +33,12 @@ from pydantic import Field
 from viewsphere.codecs.pictures import encode_picture
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats import _refusals as refusals
-from viewsphere.formats._archives import archive, pickled
-from viewsphere.formats._contents import Coded
-from viewsphere.formats._pictures import JPEG_QUALITY, opaque
-from viewsphere.formats._sequences import check_whole, scene
-from viewsphere.formats._tree import File, Tree, functions
+from viewsphere.formats.shared import refusals
+from viewsphere.formats.shared.archives import archive, pickled
+from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.pictures import JPEG_QUALITY, opaque
+from viewsphere.formats.shared.sequences import check_whole, scene
+from viewsphere.formats.shared.tree import File, Tree, functions
 from viewsphere.geometry.rotation import rigid
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample

@@ -17,8 +17,8 @@ Remark = tuple[int | None, str]
 
 class FormatSpec(SpecWithOptions):
     """Functions that write data sets in one format, and facts about the format. Most formats are trees of files
-    (`viewsphere.formats._tree`), whose functions follow from a class. Functions take the format's options, if it has any, as
-    their last value.
+    (`viewsphere.formats.shared.tree`), whose functions follow from a class. Functions take the format's options, if it has any,
+    as their last value.
     """
 
     KIND: ClassVar[Kind] = "formats"

@@ -98,7 +98,7 @@ def _entry(kind: Kind, name: str) -> metadata.EntryPoint | None:
 
 
 def _shipped(kind: Kind) -> tuple[str, ...]:
-    return tuple(name for name, _ in _listed(SEAMS[kind].package) if not name.startswith("_"))
+    return tuple(name for name, _ in _listed(SEAMS[kind].package) if not name.startswith("_") and name != "shared")
 
 
 def _module_of(kind: Kind, name: str) -> Any:

@@ -9,7 +9,7 @@ from itertools import chain, islice
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._refusals import lacking_labels
+from viewsphere.formats.shared.refusals import lacking_labels
 from viewsphere.labels import Needs, channel_labels, labels, on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from viewsphere.composing.motion._heading import Heading, headed, to_the_right
-from viewsphere.composing.motion._made import Mover, check_motion, check_motions, mover
-from viewsphere.composing.motion._start import Origin, Pose, Start
-from viewsphere.composing.motion._way import curve_through
+from viewsphere.composing.motion.shared.heading import Heading, headed, to_the_right
+from viewsphere.composing.motion.shared.made import Mover, check_motion, check_motions, mover
+from viewsphere.composing.motion.shared.start import Origin, Pose, Start
+from viewsphere.composing.motion.shared.way import curve_through
 from viewsphere.model.numbers import Strength
 from viewsphere.recipe.draws import Drawn
 from viewsphere.zoo.places import Lane

@@ -11,11 +11,11 @@ from typing import Protocol
 
 import numpy as np
 
-from viewsphere.composing.placing._footprint import Footprint, Outline, footprint, outline, standing
-from viewsphere.composing.placing._obstacles import Obstacles, obstacles
-from viewsphere.composing.placing._room import Memory, Room, Spot, checked, forgetful
-from viewsphere.composing.placing._shape import Shape
-from viewsphere.composing.placing._way import Way
+from viewsphere.composing.placing.shared.footprint import Footprint, Outline, footprint, outline, standing
+from viewsphere.composing.placing.shared.obstacles import Obstacles, obstacles
+from viewsphere.composing.placing.shared.room import Memory, Room, Spot, checked, forgetful
+from viewsphere.composing.placing.shared.shape import Shape
+from viewsphere.composing.placing.shared.way import Way
 from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import RngOf
 

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from viewsphere.composing.physics import Board, body_of
 from viewsphere.composing.placing import Draws, Piece, Room, Shape, Way, draws_of, footprint
-from viewsphere.composing.placing._dropping import Drop, Ground, Matter, poses_of, ways_of
+from viewsphere.composing.placing.shared.dropping import Drop, Ground, Matter, poses_of, ways_of
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.model.camera import Camera

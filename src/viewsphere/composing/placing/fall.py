@@ -11,7 +11,7 @@ from pydantic import Field
 
 from viewsphere.composing.physics import Board
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, Way, draws_of, footprint
-from viewsphere.composing.placing._dropping import Drop, Ground, Matter, poses_of, ways_of
+from viewsphere.composing.placing.shared.dropping import Drop, Ground, Matter, poses_of, ways_of
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from viewsphere.composing.placing import Draws, Room, Shape
-from viewsphere.composing.placing._scattered import Gaps, scattered
-from viewsphere.composing.placing._spot import free_spot
+from viewsphere.composing.placing.shared.scattered import Gaps, scattered
+from viewsphere.composing.placing.shared.spot import free_spot
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, draws_of
-from viewsphere.composing.placing._scattered import Gaps, scattered
-from viewsphere.composing.placing._spot import Cover, Others, free_spot, spread_spot
+from viewsphere.composing.placing.shared.scattered import Gaps, scattered
+from viewsphere.composing.placing.shared.spot import Cover, Others, free_spot, spread_spot
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length

@@ -14,8 +14,8 @@ from pydantic import Field
 
 from viewsphere.composing.physics import Touch, World, body_of
 from viewsphere.composing.placing import Draws, Room, Shape, draws_of, footprint, standing
-from viewsphere.composing.placing._dropping import MOST_OVERLAP, Matter, poses_of
-from viewsphere.composing.placing._spot import Others, free_spot
+from viewsphere.composing.placing.shared.dropping import MOST_OVERLAP, Matter, poses_of
+from viewsphere.composing.placing.shared.spot import Others, free_spot
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import transform

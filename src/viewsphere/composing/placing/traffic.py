@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, draws_of, footprint, standing
-from viewsphere.composing.placing._crowd import Crowd
+from viewsphere.composing.placing.shared.crowd import Crowd
 from viewsphere.composing.scene.scenery import composed
 from viewsphere.errors import RecipeError
 from viewsphere.model.camera import Camera

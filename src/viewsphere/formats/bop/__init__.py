@@ -49,11 +49,6 @@ from typing import Any
 from viewsphere.codecs import tar
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._contents import Coded, Content
-from viewsphere.formats._paper import json_bytes
-from viewsphere.formats._pictures import picture, suffix_of
-from viewsphere.formats._refusals import known_cameras, lacking_labels, pinhole
-from viewsphere.formats._tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item, member
 from viewsphere.formats.bop.again import again
 from viewsphere.formats.bop.entries import (
     Entry,
@@ -69,6 +64,11 @@ from viewsphere.formats.bop.entries import (
 from viewsphere.formats.bop.models import facts, ply
 from viewsphere.formats.bop.options import Options
 from viewsphere.formats.bop.reading import read
+from viewsphere.formats.shared.export_files import Coded, Content
+from viewsphere.formats.shared.paper import json_bytes
+from viewsphere.formats.shared.pictures import picture, suffix_of
+from viewsphere.formats.shared.refusals import known_cameras, lacking_labels, pinhole
+from viewsphere.formats.shared.tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item, member
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from viewsphere.errors import StoreError
-from viewsphere.formats._again import pose_of
-from viewsphere.formats._listed import MISTAKES, one_line
 from viewsphere.formats.bop.cads import model_files, model_folder, symmetries_of
 from viewsphere.formats.bop.entries import MM
 from viewsphere.formats.bop.pixels import Shift, fit, shifted
 from viewsphere.formats.bop.reading import Frame, categories, object_pose, scene_frames
+from viewsphere.formats.shared.again import pose_of
+from viewsphere.formats.shared.image_lists import MISTAKES, one_line
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.store.again import Again, AgainModel, refuse_any

@@ -12,10 +12,10 @@ from pydantic import ValidationError
 
 from viewsphere.assets.cache import load_normalised
 from viewsphere.errors import StoreError, UserError
-from viewsphere.formats._cads import foreign_model
-from viewsphere.formats._listed import one_line
 from viewsphere.formats.bop.entries import MM
 from viewsphere.formats.bop.texts import load
+from viewsphere.formats.shared.image_lists import one_line
+from viewsphere.formats.shared.source_models import foreign_model
 from viewsphere.model.mistakes import first_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.symmetries import RIGID, Symmetries

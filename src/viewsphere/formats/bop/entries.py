@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
-from viewsphere.formats._contents import Coded
-from viewsphere.formats._pictures import depth_steps
+from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.pictures import depth_steps
 from viewsphere.geometry.mask import decode_rle, rle_area, rle_box, rle_runs
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.sample import ObjectAnnotation, Rle, Sample

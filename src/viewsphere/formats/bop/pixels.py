@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.cache import load_normalised
 from viewsphere.codecs.size import opened
-from viewsphere.formats._again import pose_of
 from viewsphere.formats.bop.cads import model_spec
 from viewsphere.formats.bop.reading import Frame, object_pose
+from viewsphere.formats.shared.again import pose_of
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.store.again import AgainModel

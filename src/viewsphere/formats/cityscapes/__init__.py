@@ -46,15 +46,15 @@ from pydantic import Field
 
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats import Scope
-from viewsphere.formats import _refusals as refusals
-from viewsphere.formats._contents import Coded
-from viewsphere.formats._paper import json_bytes
-from viewsphere.formats._pictures import picture, png
-from viewsphere.formats._sequences import Eyes, two_eyes
-from viewsphere.formats._timeline import Timeline
-from viewsphere.formats._tree import FOLDER_SIZE, File, Tree, functions
 from viewsphere.formats.cityscapes.classes import COLORS, LABELS, labels_of
 from viewsphere.formats.cityscapes.instances import EACH, Region, regions
+from viewsphere.formats.shared import refusals
+from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.paper import json_bytes
+from viewsphere.formats.shared.pictures import picture, png
+from viewsphere.formats.shared.sequences import Eyes, two_eyes
+from viewsphere.formats.shared.timeline import Timeline
+from viewsphere.formats.shared.tree import FOLDER_SIZE, File, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec

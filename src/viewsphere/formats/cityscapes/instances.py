@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.formats._rings import one_ring
 from viewsphere.formats.cityscapes.classes import INSTANCES
+from viewsphere.formats.shared.polygons import one_ring
 from viewsphere.geometry.mask import mask_polygons
 
 Ring = NDArray[np.int64]

@@ -32,13 +32,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from viewsphere.errors import UserError
-from viewsphere.formats._contents import put
 from viewsphere.formats.coco.categories import keeps_ids, notes
 from viewsphere.formats.coco.entries import Entries, Entry, files, seen
 from viewsphere.formats.coco.instances import instances
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.proving import verify
 from viewsphere.formats.coco.reading import read
+from viewsphere.formats.shared.export_files import put
 from viewsphere.model.channel import missing
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec

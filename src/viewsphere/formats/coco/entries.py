@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.formats._contents import Expected
-from viewsphere.formats._paper import faces, json_bytes, transformation_matrix
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.points import Names, object_points, point_names
 from viewsphere.formats.coco.said import Licences
+from viewsphere.formats.shared.export_files import Expected
+from viewsphere.formats.shared.paper import faces, json_bytes, transformation_matrix
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.labels.captions import MOST
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample

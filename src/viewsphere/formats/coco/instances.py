@@ -9,12 +9,12 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from viewsphere.formats._paper import json_bytes, vehicles
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.entries import CAPTIONS, Entry
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.points import category_points, has_label, point_names
 from viewsphere.formats.coco.said import Licences, imported_categories, imported_info, imported_info_of_parts
+from viewsphere.formats.shared.paper import json_bytes, vehicles
 from viewsphere.store import Dataset
 from viewsphere.store.credits import credited
 

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.aside import temporary
-from viewsphere.formats._contents import Expected, check_files, models
-from viewsphere.formats._json_proof import check_json
-from viewsphere.formats._json_rows import Where
 from viewsphere.formats.coco.entries import Entries, Entry, files, seen
 from viewsphere.formats.coco.instances import file_name, file_names, instances
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.witness import testify
+from viewsphere.formats.shared.export_files import Expected, check_files, models
+from viewsphere.formats.shared.json_proof import check_json
+from viewsphere.formats.shared.json_rows import Where
 from viewsphere.plugins.format import Remark
 from viewsphere.store import Dataset
 

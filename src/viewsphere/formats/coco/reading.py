@@ -15,10 +15,10 @@ import numpy as np
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
-from viewsphere.formats._upright import shown_size, upright
 from viewsphere.formats.coco.places import annotation_files, picture_file
 from viewsphere.formats.coco.points import KEYPOINTS, named_points
 from viewsphere.formats.coco.said import licences_by_id, licensed, said
+from viewsphere.formats.shared.exif import shown_size, upright
 from viewsphere.geometry.mask import rle_of_polygons, rle_of_runs, rle_runs
 from viewsphere.model.sample import Box, Sample
 from viewsphere.store import Category

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from viewsphere.aside import temporary
 from viewsphere.errors import ViewsphereError
-from viewsphere.formats._json_rows import rows
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.points import Names, object_points, point_names
+from viewsphere.formats.shared.json_rows import rows
 from viewsphere.geometry.mask import encode_rle, mask_box
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import Remark

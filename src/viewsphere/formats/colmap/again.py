@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewsphere.formats._again import cameras_again, nearest_up, pose_of
-from viewsphere.formats._listed import MISTAKES, one_line
-from viewsphere.formats._posed import camera_of
 from viewsphere.formats.colmap.reading import read_model
+from viewsphere.formats.shared.again import cameras_again, nearest_up, pose_of
+from viewsphere.formats.shared.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.posed import camera_of
 from viewsphere.model.listed import ListedShot
 from viewsphere.store.again import Again, refuse_any
 

@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.formats._cameras import points_of
 from viewsphere.formats.colmap.records import SEEN, Point
+from viewsphere.formats.shared.cameras import points_of
 from viewsphere.labels.tracks import positions
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset

@@ -49,11 +49,11 @@ from collections import Counter
 from collections.abc import Iterator
 
 from viewsphere.formats import Scope
-from viewsphere.formats._kitti import other_cars
-from viewsphere.formats._refusals import pinhole, plain_names, sequences
-from viewsphere.formats._tree import functions
 from viewsphere.formats.kitti.reading import read
 from viewsphere.formats.kitti.writing import Kitti, Options, type_of
+from viewsphere.formats.shared.kitti import other_cars
+from viewsphere.formats.shared.refusals import pinhole, plain_names, sequences
+from viewsphere.formats.shared.tree import functions
 from viewsphere.plugins.format import FormatSpec
 
 

@@ -11,11 +11,11 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.errors import UserError
-from viewsphere.formats._kitti import DONT_CARE, Car, calibration, calibration_text, car_in, nobody_cares, row, velodyne
-from viewsphere.formats._mounting import Float
-from viewsphere.formats._pictures import picture
-from viewsphere.formats._timeline import Timeline
-from viewsphere.formats._tree import File, Piece, Tree, line
+from viewsphere.formats.shared.kitti import DONT_CARE, Car, calibration, calibration_text, car_in, nobody_cares, row, velodyne
+from viewsphere.formats.shared.mounting import Float
+from viewsphere.formats.shared.pictures import picture
+from viewsphere.formats.shared.timeline import Timeline
+from viewsphere.formats.shared.tree import File, Piece, Tree, line
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import CAMERA, Rig
 from viewsphere.model.sample import Sample

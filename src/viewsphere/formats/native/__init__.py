@@ -18,12 +18,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from viewsphere.formats import Scope
-from viewsphere.formats._contents import put
-from viewsphere.formats._refusals import any_view
 from viewsphere.formats.native.entries import Entry, entries_of, files
 from viewsphere.formats.native.poses import poses
 from viewsphere.formats.native.proving import verify
 from viewsphere.formats.native.reading import read
+from viewsphere.formats.shared.export_files import put
+from viewsphere.formats.shared.refusals import any_view
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

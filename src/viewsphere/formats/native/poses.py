@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
-from viewsphere.formats._paper import json_bytes, vehicles
 from viewsphere.formats.native.entries import Entry
+from viewsphere.formats.shared.paper import json_bytes, vehicles
 from viewsphere.store import Dataset
 
 FILE_NAME = "dataset1.json"

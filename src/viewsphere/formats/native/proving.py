@@ -6,11 +6,11 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
 from viewsphere.aside import temporary
-from viewsphere.formats._contents import Expected, check_files, models
-from viewsphere.formats._json_proof import check_json
-from viewsphere.formats._json_rows import Where
 from viewsphere.formats.native.entries import Entry, entries_of, files
 from viewsphere.formats.native.poses import FILE_NAME, poses
+from viewsphere.formats.shared.export_files import Expected, check_files, models
+from viewsphere.formats.shared.json_proof import check_json
+from viewsphere.formats.shared.json_rows import Where
 from viewsphere.plugins.format import Remark
 from viewsphere.store import Dataset
 

@@ -41,15 +41,15 @@ from viewsphere.codecs.ply import ply_head
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats import _refusals as refusals
-from viewsphere.formats._cameras import Rigs, measured_png, opengl_pose, points_of, world_of
-from viewsphere.formats._contents import Coded
-from viewsphere.formats._pictures import picture, suffix_of
-from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, item
 from viewsphere.formats.nerfstudio.again import again
 from viewsphere.formats.nerfstudio.lenses import SYNTHETIC, lens_problem, model_of, said_of
 from viewsphere.formats.nerfstudio.reading import read
 from viewsphere.formats.nerfstudio.synthetic import SPLITS, synthetic_files, synthetic_layout
+from viewsphere.formats.shared import refusals
+from viewsphere.formats.shared.cameras import Rigs, measured_png, opengl_pose, points_of, world_of
+from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.pictures import picture, suffix_of
+from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions, item
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec

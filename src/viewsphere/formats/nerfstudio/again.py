@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from viewsphere.formats._again import cameras_again, pose_of
-from viewsphere.formats._listed import MISTAKES, one_line
-from viewsphere.formats._posed import camera_of, picture_inside
 from viewsphere.formats.nerfstudio.reading import lens_of, name_of, pose_said, said_frames, split_of, transforms_files
+from viewsphere.formats.shared.again import cameras_again, pose_of
+from viewsphere.formats.shared.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.posed import camera_of, picture_inside
 from viewsphere.model.listed import ListedShot
 from viewsphere.store.again import Again, refuse_any
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
-from viewsphere.formats._cameras import opengl_pose
-from viewsphere.formats._contents import Coded, Content
-from viewsphere.formats._pictures import picture
-from viewsphere.formats._tree import File, Layout, Piece, item
+from viewsphere.formats.shared.cameras import opengl_pose
+from viewsphere.formats.shared.export_files import Coded, Content
+from viewsphere.formats.shared.pictures import picture
+from viewsphere.formats.shared.tree import File, Layout, Piece, item
 from viewsphere.model.sample import Sample
 
 SPLITS = ("train", "val", "test")

@@ -40,16 +40,16 @@ from pydantic import Field
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._mounting import pointless
-from viewsphere.formats._paper import json_bytes
-from viewsphere.formats._pictures import picture
-from viewsphere.formats._refusals import pinhole, sequences
-from viewsphere.formats._timeline import Timeline, unknown_shots
-from viewsphere.formats._tree import LIST, File, Layout, Piece, Tree, functions, item
 from viewsphere.formats.nuscenes import records
 from viewsphere.formats.nuscenes.names import LOG, MAP, alike, category_of, channels_of, modalities, token
 from viewsphere.formats.nuscenes.story import story_of
 from viewsphere.formats.nuscenes.view import KINDS, View, points
+from viewsphere.formats.shared.mounting import pointless
+from viewsphere.formats.shared.paper import json_bytes
+from viewsphere.formats.shared.pictures import picture
+from viewsphere.formats.shared.refusals import pinhole, sequences
+from viewsphere.formats.shared.timeline import Timeline, unknown_shots
+from viewsphere.formats.shared.tree import LIST, File, Layout, Piece, Tree, functions, item
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec

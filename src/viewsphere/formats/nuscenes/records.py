@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.formats._mounting import CAMERA_FROM_LIDAR, Float, centred, mounted, unmoved
 from viewsphere.formats.nuscenes.names import category_of, token
 from viewsphere.formats.nuscenes.story import neighbours
+from viewsphere.formats.shared.mounting import CAMERA_FROM_LIDAR, Float, centred, mounted, unmoved
 from viewsphere.geometry.rotation import compose, product, quaternion_from_matrix
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Rig

@@ -9,12 +9,12 @@ from functools import partial
 
 import numpy as np
 
-from viewsphere.formats._mounting import measured
-from viewsphere.formats._pictures import suffix_of
-from viewsphere.formats._timeline import Course
 from viewsphere.formats.nuscenes import records
 from viewsphere.formats.nuscenes.names import LOG, modalities, token
 from viewsphere.formats.nuscenes.story import Story
+from viewsphere.formats.shared.mounting import measured
+from viewsphere.formats.shared.pictures import suffix_of
+from viewsphere.formats.shared.timeline import Course
 from viewsphere.model.lidar import LIDAR
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot

@@ -10,13 +10,13 @@ from itertools import chain, count
 from pathlib import Path
 
 from viewsphere.errors import StoreError
-from viewsphere.formats._again import pose_of
-from viewsphere.formats._listed import MISTAKES, one_line
-from viewsphere.formats._viewpoint_mat import off_bytes
 from viewsphere.formats.pascal3d.cads import read_shapes
 from viewsphere.formats.pascal3d.pictures import FILES_KEPT, Told, objects_of, picture_of, told_pictures
 from viewsphere.formats.pascal3d.posed import Posed, pinhole, posed
 from viewsphere.formats.pascal3d.records import Record, read_record
+from viewsphere.formats.shared.again import pose_of
+from viewsphere.formats.shared.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.viewpoint_mat import off_bytes
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.listed import ListedObject, ListedShot

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from viewsphere.formats._listed import MISTAKES, TRAIN, VAL, lists, one_line
-from viewsphere.formats._posed import picture_inside
-from viewsphere.formats._viewpoint_mat import KIT
 from viewsphere.formats.pascal3d.records import Record, Seen
+from viewsphere.formats.shared.image_lists import MISTAKES, TRAIN, VAL, lists, one_line
+from viewsphere.formats.shared.posed import picture_inside
+from viewsphere.formats.shared.viewpoint_mat import KIT
 from viewsphere.store.paths import file_inside, is_name
 
 SUFFIXES = (".jpg", ".JPEG", ".jpeg", ".JPG", ".png")

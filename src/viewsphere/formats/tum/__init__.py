@@ -32,10 +32,10 @@ from pydantic import Field
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._cameras import Rigs, measured_png, world_from_camera, world_of
-from viewsphere.formats._pictures import picture
-from viewsphere.formats._refusals import known_cameras, lenses, no_skew, pinhole
-from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, line
+from viewsphere.formats.shared.cameras import Rigs, measured_png, world_from_camera, world_of
+from viewsphere.formats.shared.pictures import picture
+from viewsphere.formats.shared.refusals import known_cameras, lenses, no_skew, pinhole
+from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions, line
 from viewsphere.formats.tum.reading import read
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.camera import Distortion, Intrinsics

@@ -21,7 +21,7 @@ Ultralytics' documentation, https://docs.ultralytics.com/datasets/.
 
 from __future__ import annotations
 
-from viewsphere.formats._tree import functions
+from viewsphere.formats.shared.tree import functions
 from viewsphere.formats.yolo.reading import read
 from viewsphere.formats.yolo.writing import Options, Yolo
 from viewsphere.plugins.format import FormatSpec

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.errors import StoreError
-from viewsphere.formats._listed import MISTAKES, SPLITS, TRAIN, one_line, text_of
+from viewsphere.formats.shared.image_lists import MISTAKES, SPLITS, TRAIN, one_line, text_of
 
 NAMES = "obj.names"
 """Darknet's file of classes, a line each (https://github.com/AlexeyAB/darknet#how-to-train-to-detect-your-custom-objects)."""

@@ -15,8 +15,8 @@ import yaml
 
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
-from viewsphere.formats._listed import MISTAKES, Listed, listed_dataset, one_line, text_of, unposed
-from viewsphere.formats._upright import shown_size
+from viewsphere.formats.shared.exif import shown_size
+from viewsphere.formats.shared.image_lists import MISTAKES, Listed, listed_dataset, one_line, text_of, unposed
 from viewsphere.formats.yolo.describing import DARKNET, NAMES, darknet, unsaid
 from viewsphere.formats.yolo.lines import Kind, Row, coco_of, kind_of, parsed_line
 from viewsphere.geometry.mask import rle_of_polygons

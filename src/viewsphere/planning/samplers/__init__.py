@@ -14,7 +14,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import read_options
 from viewsphere.model.scene import Vector
 from viewsphere.model.thing import Thing
-from viewsphere.planning.samplers._stock import Stock, lens
+from viewsphere.planning.samplers.shared.stock import Stock, lens
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import SamplerEntry
 

@@ -19,7 +19,7 @@ from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
 from viewsphere.planning.samplers import Standing, Stock
-from viewsphere.planning.samplers._random import (
+from viewsphere.planning.samplers.shared.random import (
     are_views_drawn,
     check_scene_models,
     scene_around,

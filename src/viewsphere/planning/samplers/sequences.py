@@ -26,9 +26,9 @@ from viewsphere.model.scene import Floor, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
 from viewsphere.planning.samplers import Standing, Stock
-from viewsphere.planning.samplers._course import Course, course, middle, placed_targets, time_of
-from viewsphere.planning.samplers._exposing import exposures
-from viewsphere.planning.samplers._random import (
+from viewsphere.planning.samplers.shared.course import Course, course, middle, placed_targets, time_of
+from viewsphere.planning.samplers.shared.exposing import exposures
+from viewsphere.planning.samplers.shared.random import (
     check_scene_models,
     scene_cast,
     scene_names,

@@ -74,6 +74,7 @@ class Footprint:
 
     @cached_property
     def sides(self) -> Sides:
+        """Its sides, as numbers that are quick to compare."""
         (ax, ay), (bx, by) = self.axes.tolist()
         (x, y), (h, k) = self.center.tolist(), self.half.tolist()
         return Sides(x, y, math.hypot(h, k), ((ax, ay), (bx, by)), (h, k))

@@ -15,7 +15,7 @@ from viewsphere.codecs.png_tiff import decode_png, encode_png
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
-from viewsphere.formats._cameras import world_from_camera
+from viewsphere.formats.shared.cameras import world_from_camera
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import viewpoint_of

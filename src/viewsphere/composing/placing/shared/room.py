@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.composing.placing._crowd import Crowd
-from viewsphere.composing.placing._footprint import Footprint, Outline, first_crowded, footprint
-from viewsphere.composing.placing._obstacles import Obstacles
-from viewsphere.composing.placing._shape import Shape
+from viewsphere.composing.placing.shared.crowd import Crowd
+from viewsphere.composing.placing.shared.footprint import Footprint, Outline, first_crowded, footprint
+from viewsphere.composing.placing.shared.obstacles import Obstacles
+from viewsphere.composing.placing.shared.shape import Shape
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4

@@ -10,7 +10,7 @@ import numpy as np
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._mounting import CAMERA_FROM_LIDAR, Float, centred, measured, mounted, pointless, unmoved
+from viewsphere.formats.shared.mounting import CAMERA_FROM_LIDAR, Float, centred, measured, mounted, pointless, unmoved
 from viewsphere.geometry.rotation import compose, product, transform
 from viewsphere.labels.occlusion_level import LARGELY, PARTLY, UNKNOWN
 from viewsphere.labels.truncation_level import LARGELY as LARGELY_TRUNCATED

@@ -8,8 +8,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Final, cast
 
-from viewsphere.formats._contents import same_bytes
-from viewsphere.formats._json_rows import Row, Where, rows
+from viewsphere.formats.shared.export_files import same_bytes
+from viewsphere.formats.shared.json_rows import Row, Where, rows
 from viewsphere.plugins.format import Remark
 
 ABSENT: Final = object()

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewsphere.composing.motion._start import Pose
+from viewsphere.composing.motion.shared.start import Pose
 
 Float = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, footprint, outline
-from viewsphere.composing.placing._crowd import TakenMap, inner_class
-from viewsphere.composing.placing._spot import Cover, Others
+from viewsphere.composing.placing.shared.crowd import TakenMap, inner_class
+from viewsphere.composing.placing.shared.spot import Cover, Others
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.hull import convex_hull
 from viewsphere.model.frozen import Frozen

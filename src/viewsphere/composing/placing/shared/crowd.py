@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.composing.placing._footprint import Footprint, Outline
+from viewsphere.composing.placing.shared.footprint import Footprint, Outline
 
 Float = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from viewsphere.composing.physics import LONGEST_S, Board, Body, Touch, World, body_of
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, Way, draws_of
-from viewsphere.composing.placing._parts import convex_parts
+from viewsphere.composing.placing.shared.parts import convex_parts
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen

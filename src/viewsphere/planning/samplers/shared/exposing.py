@@ -9,8 +9,8 @@ import numpy as np
 from viewsphere.model.exposure import Exposure, Sweep, beyond
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion
-from viewsphere.planning.samplers._course import Course
-from viewsphere.planning.samplers._moving import Moving
+from viewsphere.planning.samplers.shared.course import Course
+from viewsphere.planning.samplers.shared.moving import Moving
 from viewsphere.recipe.sequence import TimeEntry
 
 NODES = 5

@@ -22,9 +22,9 @@ from viewsphere.model.mistakes import nearest
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.planning.samplers._moving import Moving
-from viewsphere.planning.samplers._random import scene_around, scene_distractors, scene_laid, scene_things
-from viewsphere.planning.samplers._stock import Stock
+from viewsphere.planning.samplers.shared.moving import Moving
+from viewsphere.planning.samplers.shared.random import scene_around, scene_distractors, scene_laid, scene_things
+from viewsphere.planning.samplers.shared.stock import Stock
 from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.sequence import TimeEntry
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.composing.placing._crowd import Crowd, TakenMap
-from viewsphere.composing.placing._footprint import Footprint, Outline, standing
-from viewsphere.composing.placing._room import Room
+from viewsphere.composing.placing.shared.crowd import Crowd, TakenMap
+from viewsphere.composing.placing.shared.footprint import Footprint, Outline, standing
+from viewsphere.composing.placing.shared.room import Room
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 TRIES = 2000

@@ -24,7 +24,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.planning.samplers._stock import Stock
+from viewsphere.planning.samplers.shared.stock import Stock
 from viewsphere.planning.splits import drawn_split, shared
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.layout import SurfaceEntry

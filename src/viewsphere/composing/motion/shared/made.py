@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from viewsphere import plugins
-from viewsphere.composing.motion._start import Pose, Start
+from viewsphere.composing.motion.shared.start import Pose, Start
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import one_of, read_options
 from viewsphere.model.scene import Matrix4

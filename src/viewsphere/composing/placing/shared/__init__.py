@@ -1,0 +1,1 @@
+"""What several placers need: rooms, footprints, spots."""
