@@ -72,9 +72,11 @@ def test_other_dependencies_are_installed_and_the_dev_group_stays(clone):
 
 def test_pip_where_there_is_no_uv(clone):
     lines, said = installed(clone, "runtime", programs="pip")
-    assert [line.split()[2] for line in lines] == ["venv", "pip", "pip"]
+    assert [line.split()[2] for line in lines] == ["venv", "pip"]
     assert lines[-1].endswith("--editable .[check]")
     assert "with pip" in said
+    lines, _ = installed(clone, "dev", programs="pip")
+    assert [line.rpartition(" ")[2] for line in lines] == ["pip>=25.1", "dev"]  # which knows groups
 
 
 def test_a_failure_keeps_its_status_and_words_and_is_tried_again(clone):
