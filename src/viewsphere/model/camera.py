@@ -50,9 +50,7 @@ class Scan(Frozen):
 
     IS_CHOICE = True
     model: Literal["scan"] = "scan"
-    elevations_deg: tuple[Degrees, ...] = Field(
-        min_length=1, description="of each ring above the sensor's level, highest first"
-    )
+    elevations_deg: tuple[Degrees, ...] = Field(min_length=1, description="elevation of each ring, highest first")
     turn_deg: float = Field(default=0.0, ge=-360, le=360, description="azimuth of the picture's middle, to the right")
 
     @model_validator(mode="after")

@@ -28,10 +28,10 @@ def _url(text: str) -> str:
 
 
 CreditText = Annotated[str, Field(min_length=1, max_length=LONGEST_CREDIT), AfterValidator(_one_line)]
-Licence = Annotated[CreditText | None, Field(description="the licence of the models, best as its SPDX identifier: CC-BY-4.0")]
-Attribution = Annotated[CreditText | None, Field(description="who made the models, in the words that their licence asks for")]
+Licence = Annotated[CreditText | None, Field(description="licence of the models, preferably an SPDX identifier: CC-BY-4.0")]
+Attribution = Annotated[CreditText | None, Field(description="maker of the models, in the words that their licence requires")]
 SourceUrl = Annotated[
-    Annotated[CreditText, AfterValidator(_url)] | None, Field(description="where the models come from: https://...")
+    Annotated[CreditText, AfterValidator(_url)] | None, Field(description="origin of the models: https://...")
 ]
 
 

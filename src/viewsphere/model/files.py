@@ -35,26 +35,27 @@ class Files(Frozen):
     )
     rgba: Literal["png", "webp", "qoi", "jxl"] = Field(default="png", description="file of the picture with alpha")
     quality: Annotated[Count, Field(le=100)] | None = Field(
-        default=None, description="1 to 100 for jpeg (default 95), webp and jxl, which are lossless without one"
+        default=None, description="1 to 100 for jpeg (default 95), webp and jxl (lossless without it)"
     )
     depth: Literal["tiff", "exr", "npz", "png16"] = Field(
         default="tiff", description="file of the depth: float32 metres, or whole steps of depth_unit in a 16-bit PNG"
     )
     depth_unit: Positive | None = Field(
-        default=None, description="metres in a step of a png16 depth; default 0.001; 0 is nothing, 65535 all beyond"
+        default=None,
+        description="metres per step of a png16 depth; default 0.001; value 0 is no surface, 65535 this distance or more",
     )
     masks: Literal["png16", "png8"] = Field(
         default="png16",
         description="file of instances, categories, semantic, parts and other ids: 16-bit grey, or a palette of colours",
     )
     geometry: Literal["tiff", "exr", "npz"] = Field(
-        default="tiff", description="file of normals, coordinates, flow, disparity and all else that is exact"
+        default="tiff", description="file of normals, coordinates, flow, disparity and other exact channels"
     )
 
     shots: Literal["files", "tar"] = Field(
         default="files",
-        description="every channel of a frame in a file of its own, or all of a shot in one tar, so that a store of a million "
-        "frames is not millions of files",
+        description="files: a file per channel and frame; tar: one tar per shot, so that a store of a million frames is "
+        "not millions of files",
     )
 
     @model_validator(mode="after")

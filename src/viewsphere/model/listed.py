@@ -47,7 +47,7 @@ class ListedObject(Frozen):
     model: str = Field(min_length=1, max_length=200, description="key of a model of the recipe")
     world_from_object: Pose = Field(description="its pose, 4 x 4, rows, in the file's unit")
     scenery: bool = Field(
-        default=False, strict=True, description="whether it is what others stand in, so that cameras may be inside of its box"
+        default=False, strict=True, description="surroundings of other things, so that cameras may be inside its box"
     )
 
 
@@ -55,17 +55,15 @@ class ListedShot(Frozen):
     """A shot: its camera, and the models in it, in the order of their ids."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=100), AfterValidator(_free)] | None = Field(
-        default=None, description="its name, that of no other; by default shot-, and its place in the file from 000000 on"
+        default=None, description="unique name; by default shot- and its position in the file from 000000 on"
     )
-    split: str | None = Field(
-        default=None, min_length=1, max_length=100, description="its split; by default as the recipe says"
-    )
-    image: str | None = Field(default=None, max_length=1000, description="for readers: which picture it is made after")
+    split: str | None = Field(default=None, min_length=1, max_length=100, description="its split; by default the recipe's")
+    image: str | None = Field(default=None, max_length=1000, description="for readers: the picture that it reproduces")
     world_from_camera: Pose = Field(description="the camera's pose, 4 x 4, rows: x right, y down, z forward")
     camera: Annotated[Intrinsics, AfterValidator(_in_bounds)] | None = Field(
         default=None, description="size and lens in pixels from the picture's corner: width, height, fx, fy, cx, cy, ..."
     )
-    objects: tuple[ListedObject, ...] = Field(default=(), description="the models that are there, and where")
+    objects: tuple[ListedObject, ...] = Field(default=(), description="its models and their poses")
 
     @model_validator(mode="after")
     def _not_too_many(self) -> Self:

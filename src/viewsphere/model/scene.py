@@ -36,11 +36,11 @@ WHITE: Color = (1.0, 1.0, 1.0)
 class Sun(Frozen):
     """A distant light. Azimuth and elevation are those of the direction it stands in, as for cameras."""
 
-    azimuth_deg: Number = Field(default=40.0, description="where it stands, degrees, as for cameras")
+    azimuth_deg: Number = Field(default=40.0, description="azimuth, degrees, as for cameras")
     elevation_deg: float = Field(default=50.0, gt=0, le=90, description="degrees above the horizon")
-    strength: Strength = Field(default=3.0, description="irradiance of what faces it, in the sky's units")
+    strength: Strength = Field(default=3.0, description="irradiance on a surface that faces it, in the sky's units")
     color: Color = Field(default=(1.0, 0.96, 0.9), description="linear [r, g, b]")
-    angle_deg: float = Field(default=0.53, ge=0, le=60, description="how wide it is: wider means softer shadows")
+    angle_deg: float = Field(default=0.53, ge=0, le=60, description="angular width; wider means softer shadows")
 
 
 class Sky(Frozen):
@@ -57,7 +57,7 @@ class Daylight(Frozen):
     """The sky that the sun's place makes, clear to overcast; the sun itself is dimmed and coloured by its air."""
 
     IS_CHOICE = True
-    kind: Literal["daylight"] = Field(default="daylight", description="a sky made by the sun's place")
+    kind: Literal["daylight"] = Field(default="daylight", description="a sky computed from the sun's position")
     turbidity: float = Field(default=3.0, ge=1.8, le=10, description="haze: 2 is very clear, 10 hazy")
     clouds: Portion = Field(default=0.0, description="0 clear, 1 overcast: then there is no sun")
     strength: Strength = Field(default=1.0, description="factor of the sky's light")
@@ -70,7 +70,7 @@ class Environment(Frozen):
     kind: Literal["hdri"] = Field(default="hdri", description="a picture of the whole sphere")
     file: str = Field(description="absolute path of an EXR or HDR file")
     strength: Strength = Field(default=1.0, description="factor of its light")
-    rotation_deg: Number = Field(default=0.0, description="turns it about the vertical, counter-clockwise from above")
+    rotation_deg: Number = Field(default=0.0, description="rotation about the vertical, counter-clockwise from above")
 
 
 AnySky = Annotated[Sky | Daylight | Environment, Field(discriminator="kind")]
@@ -79,7 +79,7 @@ AnySky = Annotated[Sky | Daylight | Environment, Field(discriminator="kind")]
 class Light(Frozen):
     """What all lamps have."""
 
-    strength: Strength = Field(description="irradiance at one metre, facing it; of a hemisphere its radiance")
+    strength: Strength = Field(description="irradiance at one metre, facing it; for a hemisphere its radiance")
     color: Color = Field(default=WHITE, description="linear [r, g, b]")
 
 
@@ -92,7 +92,7 @@ class PlacedLight(Light):
 class AimedLight(PlacedLight):
     """A lamp that points somewhere: two places give the direction."""
 
-    toward: Position = Field(default=(0.0, 0.0, 0.0), description="what it points at, [x, y, z] as for position")
+    toward: Position = Field(default=(0.0, 0.0, 0.0), description="target, [x, y, z] as for position")
 
 
 class PointLight(PlacedLight):
@@ -125,8 +125,8 @@ class HemisphereLight(Light):
     """Even light from above and another from below: radiance `strength` times each colour. It casts no shadow."""
 
     IS_CHOICE = True
-    kind: Literal["hemisphere"] = Field(default="hemisphere", description="even light from above, and other from below")
-    below: Color = Field(default=(0.0, 0.0, 0.0), description="colour of what comes from below: linear [r, g, b]")
+    kind: Literal["hemisphere"] = Field(default="hemisphere", description="even light from above, and another from below")
+    below: Color = Field(default=(0.0, 0.0, 0.0), description="colour of light from below: linear [r, g, b]")
 
 
 AnyLight = Annotated[PointLight | SpotLight | AreaLight | HemisphereLight, Field(discriminator="kind")]
@@ -139,20 +139,20 @@ class Ground(Brief):
     """
 
     color: Srgb = Field(
-        default=(0.62, 0.61, 0.59), description="multiplies the image, beside which the default is white: sRGB [r, g, b]"
+        default=(0.62, 0.61, 0.59), description="multiplies the image (default with an image: white): sRGB [r, g, b]"
     )
     pattern: Literal["slabs", "plain"] = Field(
-        default="slabs", description="slabs of concrete, or plain: what ground without pictures looks like"
+        default="slabs", description="look of ground without pictures: slabs of concrete, or plain"
     )
     image: Picture | None = Field(default=None, description="path of a picture that repeats every `tile` metres")
     roughness: Portion = Field(default=1.0, description="0 a mirror, 1 matt")
     roughness_image: Picture | None = Field(default=None, description="path of a grey picture: 0 smooth, white rough")
     normal_image: Picture | None = Field(default=None, description="path of a normal map (green up)")
     metallic: Portion = Field(default=0.0, description="1: metal")
-    tile: Length = Field(default=2.0, description="metres after which images repeat; a slab is half as wide")
-    catcher: bool = Field(default=False, description="true: only the shadows on it are seen, over the background")
-    labels: bool = Field(default=False, description="whether a catcher has depth and normals; other ground always has")
-    material: Substance | None = Field(default=None, description="what it is made of instead of slabs or pictures")
+    tile: Length = Field(default=2.0, description="width of one repetition of images in metres; a slab is half as wide")
+    catcher: bool = Field(default=False, description="true: shows only the shadows on it, over the background")
+    labels: bool = Field(default=False, description="gives a catcher depth and normals; other ground always has them")
+    material: Substance | None = Field(default=None, description="built-in material instead of slabs or pictures")
 
     UNSAID = ("material",)
 
@@ -178,18 +178,18 @@ class Background(Frozen):
     color: Srgb | None = Field(default=None, description="a plain colour: sRGB [r, g, b]")
     image: Picture | None = Field(default=None, description="path of an image")
     transparent: bool = Field(
-        default=False, description="true: nothing; the channel rgb becomes rgba, red, green, blue and alpha"
+        default=False, description="true: no background; the channel rgb becomes rgba: red, green, blue and alpha"
     )
     fit: Literal["cover", "stretch", "crop"] = Field(
         default="cover",
-        description="of an image: cover (its largest centred part of the frame's proportions), stretch, or crop (a part)",
+        description="for an image: cover (its largest centred part with the frame's proportions), stretch, or crop (a part)",
     )
-    zoom: float = Field(default=1.0, ge=1, le=100, description="fit: crop: how many times smaller than the largest part")
+    zoom: float = Field(default=1.0, ge=1, le=100, description="fit: crop: zoom relative to the largest part")
     place: tuple[Portion, Portion] = Field(
-        default=(0.5, 0.5), description="fit: crop: [x, y], 0 to 1 of the room there is, from the left and the top"
+        default=(0.5, 0.5), description="fit: crop: [x, y], position from 0 (left, top) to 1"
     )
-    flip: bool = Field(default=False, description="whether an image is mirrored")
-    blur: Portion = Field(default=0.0, description="of an image: a Gaussian's sigma, as a share of the frame's width")
+    flip: bool = Field(default=False, description="mirrors an image")
+    blur: Portion = Field(default=0.0, description="for an image: a Gaussian's sigma, as a share of the frame's width")
 
 
 class ViewTransform(Frozen):
@@ -200,7 +200,7 @@ class ViewTransform(Frozen):
         default=6500.0,
         ge=1500,
         le=20000,
-        description="colour temperature of the light that shall look white; 6500 changes nothing",
+        description="colour temperature of the light that appears white; 6500 changes nothing",
     )
     tint: Signed = Field(default=0.0, description="-1 to 1: green to magenta")
     transform: Literal["standard", "filmic", "agx", "raw"] = Field(
@@ -218,11 +218,11 @@ class Smoother(Frozen):
 class Effects(Frozen):
     """What a camera does to its picture; strengths are 0 (nothing) to 1 (as much as ever makes sense). Labels never change."""
 
-    blur: Portion = Field(default=0.0, description="out of focus: a Gaussian")
-    motion_blur: Portion = Field(default=0.0, description="the camera moves")
-    motion_angle_deg: Number = Field(default=0.0, description="which way: counter-clockwise from the right")
-    depth_of_field: Portion = Field(default=0.0, description="what is nearer or farther than focus is blurred")
-    focus: Length | None = Field(default=None, description="metres; default: what the camera looks at")
+    blur: Portion = Field(default=0.0, description="defocus, as a Gaussian")
+    motion_blur: Portion = Field(default=0.0, description="blur from camera motion")
+    motion_angle_deg: Number = Field(default=0.0, description="direction of the motion blur: counter-clockwise from the right")
+    depth_of_field: Portion = Field(default=0.0, description="blur of surfaces nearer or farther than focus")
+    focus: Length | None = Field(default=None, description="metres; default: the distance of the camera's target")
     vignetting: Portion = Field(default=0.0, description="darker corners")
     chromatic_aberration: Portion = Field(default=0.0, description="coloured edges towards the corners")
     brightness: Signed = Field(default=0.0, description="-1 to 1")
@@ -230,10 +230,10 @@ class Effects(Frozen):
     saturation: Signed = Field(default=0.0, description="-1 (grey) to 1")
     hue: Signed = Field(default=0.0, description="-1 to 1: 1 turns colours half way round")
     edge_highlight: Portion = Field(default=0.0, description="brighter edges")
-    shot_noise: Portion = Field(default=0.0, description="noise of the light, more where it is bright")
-    read_noise: Portion = Field(default=0.0, description="noise of the sensor, everywhere alike")
+    shot_noise: Portion = Field(default=0.0, description="shot noise, stronger in bright parts")
+    read_noise: Portion = Field(default=0.0, description="sensor noise, equal everywhere")
     jpeg: Portion = Field(default=0.0, description="traces of compression")
-    seed: int = Field(default=0, ge=0, description="of the noise")
+    seed: int = Field(default=0, ge=0, description="seed of the noise")
 
 
 class Finish(Frozen):

@@ -21,12 +21,10 @@ class Repaint(Brief):
 
     material: str = Field(default="*", min_length=1, description="names of the materials, a pattern such as paint*")
     tint: Color | None = Field(default=None, description="multiplies the colour; white changes nothing: linear [r, g, b]")
-    metallic: Portion | None = Field(default=None, description="instead of what the model says: 1 is metal")
-    roughness: Portion | None = Field(default=None, description="instead of what the model says: 0 a mirror, 1 matt")
-    image: Picture | None = Field(
-        default=None, description="path of a picture: the colour of opaque materials instead of what the model says"
-    )
-    texture: Substance | None = Field(default=None, description="what opaque materials are made of instead")
+    metallic: Portion | None = Field(default=None, description="replaces the model's value: 1 is metal")
+    roughness: Portion | None = Field(default=None, description="replaces the model's value: 0 a mirror, 1 matt")
+    image: Picture | None = Field(default=None, description="path of a picture that replaces the colour of opaque materials")
+    texture: Substance | None = Field(default=None, description="built-in material that replaces opaque materials")
 
 
 class TimeStep(Frozen):

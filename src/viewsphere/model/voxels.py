@@ -54,7 +54,7 @@ class Voxels(Frozen):
     cell: Annotated[Positive, Field(ge=1e-6)] = Field(default=0.02, description="metres, the side of a cell")
     axes: Literal["view", "world"] = Field(
         default="view",
-        description="view: ahead is where the camera looks, kept level; world: ahead is +y, right is +x, as in SSCNet",
+        description="view: ahead is the camera's direction, kept level; world: ahead is +y, right is +x, as in SSCNet",
     )
     distance: Metres = Field(default=3.4, description="metres from the camera, along its axis, to the middle of the grid")
     bottom: Metres = Field(default=-0.05, description="height of the grid's bottom in the world, metres")

@@ -27,10 +27,10 @@ class Fog(Frozen):
     """
 
     visibility: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
-        default=200.0, description="metres at which a black thing keeps 2 % of its contrast"
+        default=200.0, description="distance in metres at which a black thing keeps 2 % of its contrast"
     )
     height: Length | None = Field(
-        default=None, description="metres up to which it is e times thinner: ground fog; by default it has no end"
+        default=None, description="height in metres over which it thins by e: ground fog; by default unlimited"
     )
     color: Light = Field(default=(0.8, 0.8, 0.8), description="radiance of the fog itself: linear [r, g, b]")
 
@@ -44,16 +44,16 @@ class Falling(Frozen):
     """What all that falls has."""
 
     rate: Annotated[float, Field(strict=True, gt=0, le=200)] = Field(default=10.0, description="millimetres of water an hour")
-    wind: tuple[Speed, Speed] = Field(default=(0.0, 0.0), description="[x, y] in metres a second, by which it is carried")
-    exposure: Exposed = Field(default=0.01, description="seconds for which a picture is exposed to it: longer streaks")
-    color: Light = Field(default=(0.8, 0.8, 0.8), description="radiance of what falls: linear [r, g, b]")
-    seed: int = Field(default=0, ge=0, description="of where each drop or flake is")
+    wind: tuple[Speed, Speed] = Field(default=(0.0, 0.0), description="wind [x, y] in metres a second")
+    exposure: Exposed = Field(default=0.01, description="exposure time in seconds; longer gives longer streaks")
+    color: Light = Field(default=(0.8, 0.8, 0.8), description="radiance of drops or flakes: linear [r, g, b]")
+    seed: int = Field(default=0, ge=0, description="seed of the positions of drops or flakes")
 
 
 class Rain(Falling):
     """Drops by Marshall and Palmer 1948, as fast as Garg and Nayar 2007 have them."""
 
-    exposure: Exposed = Field(default=0.004, description="seconds for which a picture is exposed to it: longer streaks")
+    exposure: Exposed = Field(default=0.004, description="exposure time in seconds; longer gives longer streaks")
 
 
 class Snow(Falling):
@@ -63,9 +63,9 @@ class Snow(Falling):
 class Wet(Frozen):
     """Water on what faces up, and in hollows of the ground."""
 
-    amount: Portion = Field(default=1.0, description="0 dry, 1 soaked: darker, and a film that mirrors")
+    amount: Portion = Field(default=1.0, description="0 dry, 1 soaked: darker, with a reflecting film")
     puddles: Portion = Field(default=0.3, description="share of level ground under water")
-    seed: int = Field(default=0, ge=0, description="of where puddles are")
+    seed: int = Field(default=0, ge=0, description="seed of the puddles' positions")
 
 
 class Lamps(Frozen):
@@ -74,6 +74,6 @@ class Lamps(Frozen):
     strength: Amount = Field(default=90.0, description="irradiance at one metre below each")
     color: Light = Field(default=(1.0, 0.74, 0.46), description="linear [r, g, b]")
     most: Annotated[int, Field(strict=True, ge=0, le=32)] = Field(
-        default=8, description="how many are lights, those nearest to the middle of the place; the others only glow"
+        default=8, description="number of lamps that give light, nearest to the middle of the place first; the others only glow"
     )
-    windows: Portion = Field(default=0.35, description="share of windows that are lit from inside")
+    windows: Portion = Field(default=0.35, description="share of lit windows")

@@ -21,8 +21,8 @@ FULLEST = 4.0
 
 DISTANCE = "from the target to the camera, metres"
 FILL = (
-    "or {fill: 0.6}: so far away that the box around what the camera is for (the frame's model; of random scenes all models) "
-    "is 0.6 of the picture wide or high, whichever is more, parts beyond the picture's edges counted"
+    "or {fill: 0.6}: the distance at which the box around the frame's model (in random scenes, around all models) fills 0.6 of "
+    "the picture's width or height, whichever is more, including parts beyond the edges"
 )
 TILT = "roll of the camera about its axis, clockwise seen from behind"
 
@@ -62,7 +62,7 @@ class Fill(Frozen):
 class FillBetween(Frozen):
     """A distance by how much of the picture is filled at it, drawn."""
 
-    fill: Interval = Field(description="a number or [low, high] (uniform): as of a grid")
+    fill: Interval = Field(description="a number or [low, high] (uniform), as for a grid")
 
     @field_validator("fill")
     @classmethod
@@ -105,18 +105,20 @@ def _divides_turn(value: float) -> float:
 Bins = Annotated[
     Positive,
     AfterValidator(_divides_turn),
-    Field(description="width in degrees of the named pose categories (front, front-left, ...); has to divide 360"),
+    Field(description="width in degrees of the named pose categories (front, front-left, ...); must divide 360"),
 ]
 
 
 class Shake(Frozen):
     """How much a camera is shaken by the hand that holds it: smooth noise about and along each of its axes."""
 
-    degrees: Annotated[Number, Field(ge=0, le=90)] = Field(default=0.0, description="most that it turns about each of its axes")
-    mm: Annotated[Number, Field(ge=0, le=1e5)] = Field(
-        default=0.0, description="most millimetres that it moves along each of its axes"
+    degrees: Annotated[Number, Field(ge=0, le=90)] = Field(
+        default=0.0, description="largest rotation about each of its axes, degrees"
     )
-    hertz: Annotated[Number, Field(gt=0, le=100)] = Field(default=4.0, description="no part of it is faster than this")
+    mm: Annotated[Number, Field(ge=0, le=1e5)] = Field(
+        default=0.0, description="largest movement along each of its axes, millimetres"
+    )
+    hertz: Annotated[Number, Field(gt=0, le=100)] = Field(default=4.0, description="highest frequency, hertz")
 
 
 SHAKE = "under time: a hand that is not still: degrees and mm at most, nothing faster than hertz"
@@ -129,8 +131,8 @@ class Aimed(Frozen):
         Annotated[Literal["center", "follow"], Tag("text")] | Annotated[Point, Tag("list")], Discriminator(shape_of)
     ] = Field(
         default="center",
-        description="what the camera looks at: the centre of the model's box, or a point [x, y, z] in metres. An animated "
-        "model's centre is that of the first frame; follow goes with it",
+        description="target of the camera: the centre of the model's box, or a point [x, y, z] in metres. For an animated"
+        " model, center is the first frame's; follow moves with the model",
     )
     bins: Bins = 45.0
     shake: Shake | None = Field(default=None, description=SHAKE)

@@ -22,7 +22,7 @@ class LabelRule(Frozen):
     collection: Pattern | None = Field(default=None, description="or of the collections that objects are in")
     property: Pattern | None = Field(default=None, description="or a custom property that objects have")
     category: Annotated[str, Field(min_length=1, max_length=200)] = Field(
-        description="what they are; '*' with a property: what its value says"
+        description="category of these objects; '*' with a property: the property's value"
     )
 
     @model_validator(mode="after")
@@ -40,7 +40,9 @@ class VariantEntry(Frozen):
 
     one_of: Pattern = Field(description="pattern of the objects' names, such as plane*")
     draw: Draw = Field(default="per_frame", description=f"which one: {DRAWS}")
-    order: Literal["random", "in_turn"] = Field(default="random", description="at random, or one after another by their names")
+    order: Literal["random", "in_turn"] = Field(
+        default="random", description="at random, or one after another in the order of their names"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> VariantEntry:
@@ -63,20 +65,19 @@ class BlendEntry(Frozen):
     at: str | None = Field(
         default=None,
         min_length=1,
-        description="an object of the file, such as an empty, where the targets stand, turned as it is; by default the origin",
+        description="object of the file, such as an empty, on which the targets stand, with its rotation; by default the "
+        "origin",
     )
     labels: tuple[LabelRule, ...] = Field(
-        default=(), description="which of its objects are labelled: the first rule that fits counts; all others are background"
+        default=(), description="rules for labelled objects; the first matching rule applies, and all others are background"
     )
     variants: dict[str, VariantField] = Field(
-        default={}, description="groups of objects of which one is shown, by any name: a pattern, or {one_of, draw, order}"
+        default={}, description="groups of objects, by any name, of which one is shown: a pattern, or {one_of, draw, order}"
     )
-    confined: bool = Field(
-        default=True, strict=True, description="whether its textures and libraries have to stay in its folder"
-    )
+    confined: bool = Field(default=True, strict=True, description="requires its textures and libraries to stay in its folder")
 
     frames: Frames | None = Field(
-        default=None, description="time steps of a file that is animated: all, a list of frames, or {first, last, step}"
+        default=None, description="time steps of an animated file: all, a list of frames, or {first, last, step}"
     )
     poses: Steps = Field(default="each", description=f"with frames: {STEPS}")
 

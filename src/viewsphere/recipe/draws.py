@@ -74,16 +74,16 @@ class Distribution(Brief):
 
     UNSAID = (*KINDS, "weights")
 
-    uniform: tuple[Any, Any] | None = Field(default=None, description="[low, high]; of vectors, each component by itself")
+    uniform: tuple[Any, Any] | None = Field(default=None, description="[low, high]; for vectors, each component separately")
     log_uniform: tuple[Any, Any] | None = Field(
-        default=None, description="[low, high], above 0: as likely between 1 and 2 as between 2 and 4"
+        default=None, description="[low, high], above 0: equal chances between 1 and 2 and between 2 and 4"
     )
     normal: Annotated[Gaussian, BeforeValidator(_gaussian), OrShort({"type": "array", "minItems": 2, "maxItems": 2})] | None = (
         Field(default=None, description="[mean, deviation], or {mean, deviation, min, max}; kept within the field's limits")
     )
     choice: Annotated[tuple[Any, ...], Field(min_length=1)] | None = Field(default=None, description="one of these")
     weights: tuple[Annotated[float, Field(strict=True, ge=0)], ...] | None = Field(
-        default=None, description="of choice: how likely each is, in any unit; by default all alike"
+        default=None, description="for choice: weight of each, in any unit; by default equal"
     )
 
     _limits: tuple[float, float] = PrivateAttr(default=(-math.inf, math.inf))

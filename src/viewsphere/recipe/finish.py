@@ -26,8 +26,8 @@ class PerFrame(Frozen):
 
     draw: Draw = Field(
         default="per_frame",
-        description="what is drawn in it: once for the whole data set (fixed), once a model (per_model), a sequence "
-        "(per_sequence, the default beside time) or a frame (per_frame)",
+        description="when it is drawn: once for the data set (fixed), once a model (per_model), a sequence (per_sequence,"
+        " the default with time) or a frame (per_frame)",
     )
 
 
@@ -97,7 +97,7 @@ class ViewEntry(entry_of(ViewTransform), PerFrame):
     """From light to a picture."""
 
     exposure: Stops = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
-        default="auto", description="stops: 1 is twice as bright; auto: 0, and in rooms as much as shows them by day"
+        default="auto", description="stops: 1 is twice as bright; auto: 0, or in rooms a daylight exposure"
     )
 
 
@@ -119,11 +119,11 @@ class JitterEntry(PerFrame):
         default=0.0, description="as a share: 0.1 is a tenth farther away"
     )
     tilt_deg: Coordinate = Field(default=0.0, description="degrees")
-    target: PointDrawn = Field(default=(0.0, 0.0, 0.0), description="metres, [x, y, z]: added to what the camera looks at")
+    target: PointDrawn = Field(default=(0.0, 0.0, 0.0), description="metres, [x, y, z]: added to the camera's target")
     off_center: Drawn[tuple[Coordinate, Coordinate]] = Field(
         default=(0.0, 0.0),
-        description="[x, y]: how far right of the picture's middle, and below it, that is which the camera looks at, as "
-        "shares of the picture's width and height; at 0.5 it is at the edge",
+        description="[x, y]: offset of the target to the right of and below the picture's middle, as shares of the "
+        "picture's width and height; 0.5 is the edge",
     )
 
 

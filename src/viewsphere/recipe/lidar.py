@@ -45,9 +45,9 @@ CurveField = Annotated[
 class LidarEntry(Frozen):
     """The rays of a LiDAR, and how it measures along them; angles in its axes: x ahead, y left, z up."""
 
-    rings: Count | None = Field(default=None, description="how many rings there are, spread evenly over `elevation`")
+    rings: Count | None = Field(default=None, description="number of rings, spread evenly over `elevation`")
     elevation: Annotated[tuple[Angle, Angle], AfterValidator(_rising)] | None = Field(
-        default=None, description="[low, high] in degrees: of the lowest and the highest ring"
+        default=None, description="[low, high]: elevation of the lowest and the highest ring, degrees"
     )
     elevations: Annotated[tuple[Angle, ...], Field(min_length=1)] | None = Field(
         default=None, description="instead of both: the elevation of each ring, degrees"
@@ -55,28 +55,28 @@ class LidarEntry(Frozen):
     azimuth: Annotated[tuple[Turn, Turn], AfterValidator(_rising)] = Field(
         default=(-180.0, 180.0), description="[low, high] in degrees, to the left; columns go from high to low, clockwise"
     )
-    azimuth_step: Positive = Field(default=0.2, description="degrees of each column, in whose middle its rays are")
+    azimuth_step: Positive = Field(default=0.2, description="width of each column in degrees; rays are in its middle")
     range: Annotated[tuple[Annotated[Metres, Field(ge=0)], Length], AfterValidator(_rising)] = Field(
         default=(0.5, 120.0), description="[least, most] in metres: nearer and farther points do not return"
     )
     reference_range: Positive | None = Field(
         default=10.0,
-        description="metres at which a white surface seen straight on has intensity 1; null: intensity does not depend on the "
-        "range",
+        description="distance in metres at which a white surface seen straight on has intensity 1; null: intensity does "
+        "not depend on the range",
     )
     sigma: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="standard deviation of measured ranges, metres")
     dropout: Portion = Field(default=0.0, description="probability that a point does not return")
     dropout_by_range: CurveField | None = Field(
-        default=None, description="the same by range, besides: [[metres, probability], ...], linear in between"
+        default=None, description="additional probability by range: [[metres, probability], ...], linear in between"
     )
     dropout_by_intensity: CurveField | None = Field(
-        default=None, description="the same by intensity, besides: [[intensity, probability], ...], linear in between"
+        default=None, description="additional probability by intensity: [[intensity, probability], ...], linear in between"
     )
 
     sweep: Annotated[Number, Field(ge=0)] = Field(
         default=0.0,
-        description="seconds in which the columns are measured one after another, with the instant in the middle: at most "
-        "those between two instants; 0: all at once",
+        description="seconds to measure the columns one after another, with the instant in the middle; at most the time "
+        "between two instants; 0: all at once",
     )
 
     @model_validator(mode="after")

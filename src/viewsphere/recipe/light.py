@@ -66,9 +66,9 @@ ANGLES = ("azimuth_deg", "elevation_deg")
 class SunEntry(entry_of(Sun, optional=ANGLES)):
     """The sun: where it stands, by angles or by date, time and place, and how it shines."""
 
-    date: Drawn[Day] | None = Field(default=None, description="or by the day, '2026-06-21'; north is +Y")
+    date: Drawn[Day] | None = Field(default=None, description="or from a date, '2026-06-21'; north is +Y")
     time: Drawn[Hours] | None = Field(
-        default=None, description="with date: '14:30+02:00', with the distance from UTC, or hours of the day in UTC"
+        default=None, description="with date: '14:30+02:00', with the offset from UTC, or hours of the day in UTC"
     )
     latitude: Drawn[Annotated[float, Field(strict=True, ge=-90, le=90)]] | None = Field(
         default=None, description="with date: degrees north"
@@ -111,24 +111,24 @@ class DaylightEntry(entry_of(Daylight, without=("kind",))):
 class DaylightSky(Frozen):
     """A sky made by the sun's place."""
 
-    daylight: DaylightEntry = Field(description="a sky made by the sun's place: turbidity, clouds, strength")
+    daylight: DaylightEntry = Field(description="sky computed from the sun's position: turbidity, clouds, strength")
 
 
 class NightEntry(Frozen):
     """A sky without the sun, as a long exposure shows it."""
 
-    moon: Drawn[Strength] = Field(default=0.1, description="irradiance of what faces the moon, in the sky's units")
-    azimuth_deg: Drawn[Number] = Field(default=-60.0, description="where the moon stands, degrees, as for cameras")
+    moon: Drawn[Strength] = Field(default=0.1, description="irradiance on a surface that faces the moon, in the sky's units")
+    azimuth_deg: Drawn[Number] = Field(default=-60.0, description="azimuth of the moon, degrees, as for cameras")
     elevation_deg: Drawn[Annotated[float, Field(strict=True, gt=0, le=90)]] = Field(
         default=45.0, description="degrees above the horizon"
     )
-    glow: Drawn[Strength] = Field(default=0.05, description="radiance of the lights of towns at the horizon")
+    glow: Drawn[Strength] = Field(default=0.05, description="radiance of town lights at the horizon")
 
 
 class NightSky(Frozen):
     """A sky of night."""
 
-    night: NightEntry = Field(description="a sky of night: moon and glow")
+    night: NightEntry = Field(description="night sky: moon and glow")
 
 
 class HdriSky(entry_of(Environment, without=("kind", "file"))):
@@ -189,7 +189,7 @@ class At(Frozen):
 class _Lamp(entry_of(Light)):
     """What all lamps have."""
 
-    count: Drawn[Annotated[Natural, Field(le=64)]] = Field(default=1, description="how many of them, each drawn by itself")
+    count: Drawn[Annotated[Natural, Field(le=64)]] = Field(default=1, description="number of such lamps, each drawn separately")
 
 
 class _Placed(entry_of(PlacedLight, optional=("position",)), _Lamp):
@@ -248,7 +248,7 @@ class AreaEntry(entry_of(AreaLight), _Aimed):
 class HemisphereEntry(entry_of(HemisphereLight), _Lamp):
     """Even light from above and from below, without shadows."""
 
-    kind: Literal["hemisphere"] = Field(description="even light from above, and other from below")
+    kind: Literal["hemisphere"] = Field(description="even light from above, and another from below")
 
 
 def _kind_of_lamp(value: Any) -> Any:

@@ -97,80 +97,79 @@ class ModelEntry(Brief):
         OrShort({"type": "string"}),
     ] = Field(
         min_length=1,
-        description="a file, a pattern such as cars/*.obj, a folder, or zoo:<family>; or a list of them. zoo:any draws among "
-        "all families of things. Paths are relative to the recipe",
+        description="a file, a pattern such as cars/*.obj, a folder, zoo:<family>, or a list of these. zoo:any draws "
+        "among all families of things. Paths are relative to the recipe",
     )
     category: str = Field(
         default="",
         max_length=200,
         validate_default=False,
-        description="what the models are; needed for files, for the zoo by default its family",
+        description="category of the models; needed for files; for the zoo, the default is its family",
     )
-    supercategory: str = Field(default="", max_length=200, description="a wider name, such as vehicle")
+    supercategory: str = Field(default="", max_length=200, description="a broader category, such as vehicle")
     count: CountDrawn | None = Field(
         default=None,
-        description="zoo: how many models to draw (default 1), a number, [low, high] or a distribution; files: how many there "
-        "have to be",
+        description="zoo: number of models to draw (default 1), a number, [low, high] or a distribution; files: required "
+        "number of files",
     )
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)] | None = Field(
         default=None,
-        description="begins the models' keys: <name>_<file name>, or <name>_000, <name>_001, ... for the zoo",
+        description="prefix of the models' keys: <name>_<file name>, or <name>_000, <name>_001, ... for the zoo",
     )
     frames: Frames | None = Field(
         default=None,
-        description="time steps of zoo:person or an animated file (abc, blend, fbx, glb, gltf, usd): all, a list of frames, or "
-        "{first, last, step}. Without it, the file as at its first frame",
+        description="time steps of zoo:person or an animated file (abc, blend, fbx, glb, gltf, usd): all, a list of "
+        "frames, or {first, last, step}. Without it, the file's first frame",
     )
     clip: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
-        description="with frames or the motion clip: the animation to play, where the file has several (actions, takes); by "
-        "default its first",
+        description="with frames or the motion clip: the animation to play, if the file has several (actions, takes); by "
+        "default the first",
     )
     fps: Rate | None = Field(default=None, description=f"with frames or the motion clip: {RATE}")
     poses: Steps = Field(default="each", description=f"with frames: {STEPS}")
     motion: MotionField = Field(default=None, description=MOTION)
-    up: Axis | None = Field(default=None, description="the file's axis that points up; by default what its format says")
+    up: Axis | None = Field(default=None, description="the file's axis that points up; by default the format's")
     forward: Axis | None = Field(default=None, description="the file's axis that the model's front faces")
     unit: Unit | None = Field(default=None, description="the file's unit: m, cm, mm, in, ft or the metres in one unit")
     centring: Literal["box", "area", "floor", "as_is"] = Field(
         default="box",
-        description="what lands on the origin: the box's centre, the surface's centroid, the centre of the box's bottom, or "
-        "as_is the file's own origin",
+        description="point at the origin: the box's centre, the surface's centroid, the centre of the box's bottom, or "
+        "as_is, the file's own origin",
     )
     real_size: RealSize | None = Field(
         default=None,
-        description="the true size: {width, height, length} in metres, a CSV file of name, width, height and length "
-        "(its path, or {csv, unit}), or file: the size the file has. The default for the zoo is file",
+        description="the true size: {width, height, length} in metres, a CSV file of name, width, height and length (its "
+        "path, or {csv, unit}), or file: the file's size. The default for the zoo is file",
     )
-    scale: Scale = Field(default="as_is", description="as_is, real_size, or {length: 1.8}: metres to scale the model to")
+    scale: Scale = Field(
+        default="as_is", description="as_is, real_size, or {length: 1.8}: length of the scaled model in metres"
+    )
     sidecar: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
-        description="a file that says symmetries, keypoints and body_parts of the models; by default, of each model the file "
-        "beside it, such as mug.glb.viewsphere.yaml",
+        description="file with symmetries, keypoints and body_parts of the models; by default the file beside each model,"
+        " such as mug.glb.viewsphere.yaml",
     )
     symmetries: Literal["declared", "found"] | None = Field(
         default=None,
-        description="found: of models that declare none, those of the surface; declared (the default): none of these",
+        description="found: detects the symmetries of models that declare none; declared (the default): detects none",
     )
     keypoints: Annotated[Count, Field(le=MOST_POINTS)] | None = Field(
-        default=None, description="of models that name none, so many points that lie far apart on the surface"
+        default=None, description="number of far-apart surface points, for models that name no points"
     )
     faces: Literal["both", "as_file"] | None = Field(
         default=None,
-        description="as_file: cameras do not see the backs of surfaces that the file has single-sided (glTF, COLLADA, USD, "
-        "Blender's materials); both (the default): all surfaces are seen from both sides",
+        description="as_file: hides the backs of the file's single-sided surfaces from cameras (glTF, COLLADA, USD, "
+        "Blender's materials); both (the default): all surfaces are visible from both sides",
     )
-    color: Word | None = Field(
-        default=None, description="what captions call the models' colour, instead of what their surfaces say"
-    )
-    material: Word | None = Field(default=None, description="what captions call the models' material: wooden")
+    color: Word | None = Field(default=None, description="word for the models' colour in captions, instead of the surface's")
+    material: Word | None = Field(default=None, description="word for the models' material in captions: wooden")
     labels: Literal["own", "background"] | None = Field(
         default=None,
-        description="own (the default), or background: models that scenes.distractors puts among the others, drawn and not "
-        "labelled",
+        description="own (the default), or background: unlabelled models that scenes.distractors puts among the others",
     )
     confined: bool = Field(
-        default=True, strict=True, description="whether paths inside model files have to stay in the model's folder"
+        default=True, strict=True, description="requires paths inside model files to stay in the model's folder"
     )
     licence: Licence = None
     attribution: Attribution = None

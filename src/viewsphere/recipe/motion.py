@@ -29,8 +29,8 @@ class MotionEntry(Frozen):
     kind: str = Field(
         min_length=1, description="keyframes, spline, constant, random, oscillate, path, clip, fall, or one of your own"
     )
-    enter: Drawn[Number] | None = Field(default=None, description="seconds: before, the thing is not there")
-    leave: Drawn[Number] | None = Field(default=None, description="seconds: from then on the thing is not there")
+    enter: Drawn[Number] | None = Field(default=None, description="seconds: the thing is absent before")
+    leave: Drawn[Number] | None = Field(default=None, description="seconds: the thing is absent from then on")
 
     @model_validator(mode="after")
     def _check(self) -> MotionEntry:
@@ -60,7 +60,7 @@ MotionsField = Annotated[
 
 MotionField = MotionsField | None
 
-MOTION = "under time, how it moves: {kind: constant, velocity: [0, -1, 0]}, or a list of motions, one upon another"
+MOTION = "motion under time: {kind: constant, velocity: [0, -1, 0]}, or a list of motions to combine"
 
 
 def listed(motions: Motions | None, field: str) -> Iterator[tuple[str, MotionEntry]]:

@@ -93,7 +93,7 @@ class Splits(Frozen):
     __pydantic_extra__: dict[str, Share] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
     by: Literal["model", "scene", "sequence", "pose", "frame", "place"] = Field(
-        default="model", description="what is kept together in one split"
+        default="model", description="unit that stays together in one split"
     )
 
     @model_validator(mode="before")
@@ -148,81 +148,81 @@ class Recipe(Shown, Frozen):
     """
 
     name: str = Field(default="dataset", min_length=1, max_length=200, description="name of the data set")
-    seed: Natural = Field(default=0, description="every random choice follows from it")
-    models: tuple[ModelEntry, ...] = Field(min_length=1, description="the models to place, each entry of one category")
-    viewpoints: Viewpoints = Field(description="where the camera stands, or how it moves; kind: grid (default), sphere, ...")
+    seed: Natural = Field(default=0, description="seed of every random choice")
+    models: tuple[ModelEntry, ...] = Field(min_length=1, description="models to place, each entry with one category")
+    viewpoints: Viewpoints = Field(description="positions or motion of the camera; kind: grid (default), sphere, ...")
     scenes: ScenesField | None = Field(
         default=None,
-        description="how many random scenes to make of the models, or a mapping of count, objects, layout and more; by default "
-        "each model is taken alone, or with its company",
+        description="number of random scenes to make of the models, or a mapping of count, objects, layout and more; by "
+        "default each model appears alone, or with its company",
     )
     time: TimeEntry | None = Field(
         default=None,
-        description="sequences instead of still pictures: {frames: 50, fps: 25}, or seconds; every model (or scene) is one, "
-        "from each viewpoint that stands still",
+        description="sequences instead of still pictures: {frames: 50, fps: 25}, or seconds; every model (or scene) is "
+        "one sequence from each static viewpoint",
     )
     camera: CameraEntry = Field(default=CameraEntry(fov_deg=40.0), description="image size and lens")
     rig: RigField | None = Field(
         default=None,
-        description="several sensors that move together: {kind: stereo, baseline}, {kind: surround, count}, {sensors: {...}} "
-        "or {file: calibration}; the viewpoint is the first one's. By default one camera",
+        description="sensors that move together: {kind: stereo, baseline}, {kind: surround, count}, {sensors: {...}} or "
+        "{file: calibration}; the viewpoint is the first sensor's. By default one camera",
     )
     tracks: TracksEntry | None = Field(
         default=None,
-        description="points that are followed through each sequence: {grid: 16}, {count: 1024, on: objects}, or {points: file}",
+        description="points to follow through each sequence: {grid: 16}, {count: 1024, on: objects}, or {points: file}",
     )
-    scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
+    scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects and surroundings")
     variations: Variations | None = Field(
         default=None,
-        description="conditions under each of which all shots are rendered, with the same labels: names, and the fields of "
-        "scene that each changes, drawn on its own unless paired: true: {morning: {sun: {elevation_deg: 9}}, "
-        "overcast: {sky: {daylight: {clouds: 1}}}}",
+        description="conditions, such as weather; every shot is rendered under each, with the same labels. Each name has "
+        "the fields of scene that it changes, drawn separately unless paired: true: {morning: {sun: "
+        "{elevation_deg: 9}}, overcast: {sky: {daylight: {clouds: 1}}}}",
     )
     min_visibility: Annotated[Number, Field(gt=0, le=1)] | None = Field(
         default=None,
-        description="least visibility of the frame's model (of random scenes: of each model); where it is less, the random "
-        "viewpoint, and company that is drawn per_frame, are drawn again",
+        description="least visibility of the frame's model (in random scenes, of each model). Redraws random viewpoints, "
+        "and company with draw: per_frame, up to 32 times until it is met",
     )
     wanted: WantedEntry | None = Field(
         default=None,
-        description="{visibility: [0.3, 0.6], truncation: [0.2, 0.5]}: between which shares these labels of the frame's model "
-        "shall lie; where they do not, what is random in the frame is drawn again",
+        description="range of these labels for the frame's model: {visibility: [0.3, 0.6], truncation: [0.2, 0.5]}. "
+        "Redraws the frame's random values until they are in range",
     )
     keep_annotations_above: Annotated[Number, Field(ge=0, lt=1)] | None = Field(
-        default=None, description="exports leave out annotations of objects whose visibility is not above this; by default none"
+        default=None, description="exports omit annotations of objects with at most this visibility; by default none"
     )
     empty: Annotated[Number, Field(gt=0, lt=1)] | None = Field(
         default=None,
-        description="chance of each frame to be empty, without its models, as a negative example; drawn by the frame's name, "
-        "so that no frame changes when others are appended",
+        description="chance of each frame to be empty, without models, as a negative example; drawn by the frame's name, "
+        "so that appending frames changes no other",
     )
     engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
         default=EngineEntry(),
-        description="what paints the pictures: a name, or a mapping of name and the engine's options",
+        description="the renderer: a name, or a mapping of name and the engine's options",
     )
     channels: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
-        default=DEFAULT_CHANNELS, min_length=1, validate_default=True, description="what to keep of every frame"
+        default=DEFAULT_CHANNELS, min_length=1, validate_default=True, description="channels to keep of every frame"
     )
     annotations: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
-        default=(), description="labels of objects and of whole pictures to compute beside those that every data set has"
+        default=(), description="labels of objects and pictures to compute in addition to those of every data set"
     )
     labels: dict[str, dict[str, JsonValue]] = Field(
-        default={}, description="options of labels that the recipe names, by their names: {captions: {count: 5}}"
+        default={}, description="options of the recipe's labels, by name: {captions: {count: 5}}"
     )
     files: Files = Field(default=Files(), description="how each channel is written: lossless PNG and TIFF by default")
     formats: Annotated[tuple[FormatField, ...], AfterValidator(_distinct_formats)] = Field(
         default=(FormatEntry(name="native"), FormatEntry(name="coco")),
-        description="formats to write when all is rendered, by name or with options: {coco: {category_ids: coco}}",
+        description="formats to write after rendering, by name or with options: {coco: {category_ids: coco}}",
     )
     splits: Splits = Field(
         default=Splits(),
         description="shares of train, val, ... by model, scene, pose, place or frame; 70/30 train/val by model by default",
     )
-    shot_frames: Count | None = Field(default=None, description="most frames that are rendered and resumed as one unit")
+    shot_frames: Count | None = Field(default=None, description="most frames rendered and resumed as one unit")
     label_alpha: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.01, description="a blended texel is surface, and labelled, where its alpha is at least this"
+        default=0.01, description="least alpha at which a blended texel is labelled as surface"
     )
-    max_frames: Count = Field(default=1_000_000, description="planning more frames than this is taken for a typing mistake")
+    max_frames: Count = Field(default=1_000_000, description="refuses larger plans, which are usually typos")
 
     _folder: Path = PrivateAttr()
     _marks: Marks = PrivateAttr()

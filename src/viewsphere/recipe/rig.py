@@ -40,12 +40,10 @@ class SensorEntry(Frozen):
     position: Place = Field(default=(0.0, 0.0, 0.0), description=f"[x, y, z] in metres; {AXES}")
     rotation: Rotation | None = Field(
         default=None,
-        description="[x, y, z] in degrees: y turns it to the right, then x up, then z clockwise seen from behind; or the 3x3 "
-        "matrix that turns the sensor's axes to the rig's",
+        description="[x, y, z] in degrees: y turns it to the right, then x up, then z clockwise seen from behind; or the "
+        "3x3 matrix from the sensor's axes to the rig's",
     )
-    look: Place | None = Field(
-        default=None, description=f"instead of rotation: the point [x, y, z] that it looks at, metres, {AXES}"
-    )
+    look: Place | None = Field(default=None, description=f"instead of rotation: the point [x, y, z] to look at, metres, {AXES}")
     size: PictureSize | None = Field(default=None, description="[width, height] in pixels; default: the camera's")
     fov_deg: Annotated[Number, Field(gt=0, lt=180)] | None = Field(default=None, description="as in camera")
     fov_axis: Literal["horizontal", "vertical"] | None = Field(default=None, description="as in camera")
@@ -54,14 +52,12 @@ class SensorEntry(Frozen):
     )
     K: CameraMatrix | None = Field(default=None, description="as in camera")
     distortion: Distortion | None = Field(
-        default=None, description="as in camera, whose own is left out where a sensor has a lens of its own"
+        default=None, description="as in camera; a sensor with its own lens does not inherit the camera's"
     )
-    lidar: LidarEntry | None = Field(
-        default=None, description="instead of a lens: a LiDAR, its rings and columns of rays, and how it measures"
-    )
+    lidar: LidarEntry | None = Field(default=None, description="instead of a lens: a LiDAR, with its rings, columns and noise")
     channels: Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
         default=None,
-        description="those of the recipe's channels that this sensor keeps; default: all but lidar, of a LiDAR lidar alone",
+        description="channels of the recipe that this sensor keeps; default: all but lidar, for a LiDAR only lidar",
     )
 
     @model_validator(mode="after")
@@ -113,7 +109,7 @@ class SensorEntry(Frozen):
 class SensorList(Frozen):
     """Sensors by name. The first is the rig's origin: where it stands elsewhere, all are moved and turned with it there."""
 
-    kind: Literal["sensors"] = Field(default="sensors", description="listed by name")
+    kind: Literal["sensors"] = Field(default="sensors", description="a mapping of sensors by name")
     sensors: Annotated[dict[SensorName, SensorEntry], Field(min_length=1, max_length=MOST_SENSORS)] = Field(
         description="each sensor by its name; the viewpoint is the first one's"
     )
@@ -144,7 +140,7 @@ class SurroundRig(Frozen):
     """Equal cameras that look all around: `camera0` ahead, each next one turned on to the right."""
 
     kind: Literal["surround"] = Field(description="equal cameras all around: camera0 ahead, camera1 turned to the right, ...")
-    count: Annotated[Count, Field(ge=2, le=MOST_SENSORS)] = Field(description="how many cameras")
+    count: Annotated[Count, Field(ge=2, le=MOST_SENSORS)] = Field(description="number of cameras")
     radius: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="metres from the rig's middle to each camera")
 
 
@@ -153,14 +149,12 @@ class RigFile(Frozen):
 
     kind: Literal["file"] = Field(default="file", description="from calibrations")
     path: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1)] = Field(
-        description="the file, or files: camera_info has one for each camera, OpenCV may have one for lenses and one for R, T"
+        description="the file, or files: camera_info has one per camera, OpenCV can have one for lenses and one for R, T"
     )
     format: Literal["auto", "opencv", "kalibr", "camera_info"] = Field(
-        default="auto", description="auto: by what the file holds"
+        default="auto", description="auto: detected from the file's content"
     )
-    rectified: bool = Field(
-        default=False, strict=True, description="the rectified pictures instead of the raw ones: pinholes, as P says"
-    )
+    rectified: bool = Field(default=False, strict=True, description="rectified pictures instead of raw ones: the pinholes of P")
 
     @field_validator("path", mode="before")
     @classmethod

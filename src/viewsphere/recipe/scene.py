@@ -92,10 +92,10 @@ class CameraEntry(Frozen):
     size: PictureSize = Field(default=(640, 480), description="[width, height] of the image in pixels")
     fov_deg: Drawn[Annotated[Number, Field(gt=0, lt=180)]] | None = Field(
         default=None,
-        description="angle of view in degrees, across the image's width unless fov_axis says otherwise; a number, [low, high] "
-        "or a distribution, drawn for each picture, or sequence, as all of the lens",
+        description="angle of view in degrees, across the image's width or as set by fov_axis; a number, [low, high] or a"
+        " distribution, drawn for each picture or sequence like the rest of the lens",
     )
-    fov_axis: Literal["horizontal", "vertical"] = Field(default="horizontal", description="what fov_deg measures")
+    fov_axis: Literal["horizontal", "vertical"] = Field(default="horizontal", description="direction of fov_deg")
     focal_px: FocalField | None = Field(
         default=None, description="focal length in pixels: a number, [fx, fy], or a distribution over numbers"
     )
@@ -111,12 +111,12 @@ class CameraEntry(Frozen):
     )
     principal_point: Drawn[tuple[Drawn[Number], Drawn[Number]]] | None = Field(
         default=None,
-        description="[cx, cy] in pixels, origin at the image's corner, each of them a number or a distribution; by default the "
-        "centre, or what K says",
+        description="[cx, cy] in pixels, origin at the image's corner, each a number or a distribution; by default the "
+        "centre, or from K",
     )
     distortion: Distortion | None = Field(default=None, description="lens distortion with OpenCV's coefficients")
     of_viewpoints: Literal[True] | None = Field(
-        default=None, description="true: size and lens as the viewpoints' file says (nerfstudio, COLMAP)"
+        default=None, description="true: size and lens from the viewpoints' file (nerfstudio, COLMAP)"
     )
 
     @model_validator(mode="before")
@@ -180,30 +180,31 @@ class SceneEntry(Frozen):
 
     draw: Draw = Field(
         default="per_model",
-        description="when sun, sky, lights, ground and materials are drawn, as far as there is something to draw: once for the "
-        "whole data set (fixed), once a model (per_model), a sequence (per_sequence) or a frame (per_frame, which builds the "
-        "scene anew for each)",
+        description="when random sun, sky, lights, ground and materials are drawn: once for the data set (fixed), once a "
+        "model (per_model), a sequence (per_sequence) or a frame (per_frame, which rebuilds the scene each "
+        "time)",
     )
     place: PlaceField = Field(
-        default=None, description="where the targets stand: zoo:neighbourhood, a model file, or a mapping of source and more"
+        default=None,
+        description="place where the targets stand: zoo:neighbourhood, a model file, or a mapping of source and more",
     )
     blend: BlendField = Field(
         default=None,
-        description="a .blend file around the targets, rendered as it is by engine: cycles, eevee or workbench: its path, or a "
+        description="a .blend file around the targets, for the engines cycles, eevee and workbench: its path, or a "
         "mapping of file, at, labels, variants and more",
     )
     company: CompanyField = Field(
-        default=None, description="how many other models of the same split stand beside each, or a mapping of count and layout"
+        default=None, description="number of other models of the same split beside each, or a mapping of count and layout"
     )
     planes: PlanesField = Field(default=(), description="upright planes with pictures")
     sun: Drawn[SunField] = Field(
         default="auto",
-        description="on, off, auto (on, but off under an hdri), or where it stands and how it shines: azimuth_deg, "
-        "elevation_deg, strength, color, angle_deg",
+        description="on, off, auto (on, but off under an hdri), or position and light: azimuth_deg, elevation_deg, "
+        "strength, color, angle_deg",
     )
     sky: Drawn[SkyField] = Field(
         default=GradientEntry(),
-        description="light from all around: zenith, horizon and strength of a gradient, daylight, or an EXR or HDR file",
+        description="ambient light: zenith, horizon and strength of a gradient, daylight, night, or an EXR or HDR file",
     )
     lights: LightsField = Field(default=(), description="lamps: point, spot, area, hemisphere")
     ground: Drawn[GroundField] = Field(
@@ -217,22 +218,22 @@ class SceneEntry(Frozen):
         description="sky, environment, transparent, a colour, {image: path}, or {images: folder, draw: per_frame}",
     )
     smoother: SmootherField = Field(
-        default=SmootherEntry(), description="none, box, gaussian or poisson, or a mapping: what softens the models' border"
+        default=SmootherEntry(), description="softening of the models' border: none, box, gaussian or poisson, or a mapping"
     )
     view: ViewField = Field(
         default=ViewEntry(), description="exposure, temperature_k, tint and transform; or the transform alone"
     )
-    effects: EffectsEntry = Field(default=EffectsEntry(), description="blur, noise and more of what cameras do to pictures")
-    jitter: JitterEntry = Field(default=JitterEntry(), description="what is added to every viewpoint's numbers")
+    effects: EffectsEntry = Field(default=EffectsEntry(), description="camera effects such as blur and noise")
+    jitter: JitterEntry = Field(default=JitterEntry(), description="random offsets added to every viewpoint")
     fog: Drawn[FogField] = Field(default="off", description="off, visibility in metres, or a mapping of visibility and height")
     rain: Drawn[RainField] = Field(
         default="off", description="off, millimetres an hour, or a mapping of rate, wind, exposure and clouds"
     )
     snow: Drawn[SnowField] = Field(
-        default="off", description="snow that falls: off, millimetres of water an hour, or a mapping as of rain"
+        default="off", description="falling snow: off, millimetres of water an hour, or a mapping as for rain"
     )
     wet: Drawn[WetField] = Field(
-        default="auto", description="off, auto (as rain makes it), how wet from 0 to 1, or a mapping of amount and puddles"
+        default="auto", description="off, auto (follows the rain), wetness from 0 to 1, or a mapping of amount and puddles"
     )
 
     lamps: Drawn[LampsField] = Field(

@@ -33,24 +33,27 @@ class PlaceEntry(Brief):
     UNSAID = ("parked", "walkers", "motion")
 
     source: str = Field(min_length=1, description="zoo:<place>, such as zoo:neighbourhood, or a model file")
-    draw: Draw = Field(default="fixed", description=f"of a zoo's place and of the turn: {DRAWS}")
+    draw: Draw = Field(default="fixed", description=f"for a zoo place and turn: {DRAWS}")
     labels: Labels = Field(default="background", description=LABELS)
-    turn: Drawn[Number] = Field(default=0.0, description="degrees the place is turned about the vertical through the targets")
-    origin: Point = Field(default=(0.0, 0.0, 0.0), description="of a file: the point where the targets stand, metres")
-    up: Axis | None = Field(default=None, description="of a file: its axis that points up; by default what its format says")
-    forward: Axis | None = Field(default=None, description="of a file: its axis that becomes -Y")
-    unit: Unit | None = Field(default=None, description="of a file: m, cm, mm, in, ft or the metres in one unit")
-    category: str = Field(default="", max_length=200, description="of a file with labels: own")
+    turn: Drawn[Number] = Field(
+        default=0.0, description="rotation of the place about the vertical through the targets, degrees"
+    )
+    origin: Point = Field(default=(0.0, 0.0, 0.0), description="for a file: the point where the targets stand, metres")
+    up: Axis | None = Field(default=None, description="for a file: its axis that points up; by default the format's")
+    forward: Axis | None = Field(default=None, description="for a file: its axis that becomes -Y")
+    unit: Unit | None = Field(default=None, description="for a file: m, cm, mm, in, ft or the metres in one unit")
+    category: str = Field(default="", max_length=200, description="for a file with labels: own")
     parked: Drawn[Portion] | None = Field(
         default=None,
-        description="of a zoo's place with roads: the share of its parking bays and driveways with a car; default: 0.4 in "
+        description="for a zoo place with roads: share of parking bays and driveways with a car; default: 0.4 in "
         "zoo:town, 0 in zoo:neighbourhood",
     )
     walkers: CountOrNone | None = Field(
-        default=None, description="of a zoo's place with roads: how many people are on its pavements, none by default"
+        default=None, description="for a zoo place with roads: number of people on its pavements; default: 0"
     )
     motion: Annotated[dict[Annotated[str, Field(min_length=1)], MotionsField], Field(min_length=1)] | None = Field(
-        default=None, description="under time, how pieces move, by patterns of their names: {tree_*: {kind: oscillate, ...}}"
+        default=None,
+        description="motion of its pieces under time, by patterns of their names: {tree_*: {kind: oscillate, ...}}",
     )
 
     @property
@@ -104,13 +107,13 @@ class CompanyEntry(Brief):
     UNSAID = ("motion",)
 
     count: CountDrawn | None = Field(
-        default=None, description="how many, a number, [low, high] or a distribution; not needed where layout is a list"
+        default=None, description="number of models, a number, [low, high] or a distribution; not needed if layout is a list"
     )
     layout: Layout = Field(default="scatter", description=LAYOUT)
-    gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
-    draw: Draw = Field(default="per_model", description=f"how many, who and where: {DRAWS}")
+    gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="least distance between two of them, metres")
+    draw: Draw = Field(default="per_model", description=f"when number, models and places are drawn: {DRAWS}")
     orientation: Orientation = Field(default="upright", description=ORIENTATION)
-    motion: MotionField = Field(default=None, description=f"{MOTION}; of distractors")
+    motion: MotionField = Field(default=None, description=f"{MOTION}; for distractors")
 
     @model_validator(mode="after")
     def _check(self) -> CompanyEntry:
@@ -142,7 +145,7 @@ class Around(Frozen):
 
     distance: Interval = Field(description="metres from the origin")
     azimuth: Interval = Field(
-        default=(0.0, 360.0), description="degrees: the direction it stands in, as for cameras; 180 is behind the model"
+        default=(0.0, 360.0), description="direction from the origin, degrees, as for cameras; 180 is behind the model"
     )
 
     @model_validator(mode="after")
@@ -159,10 +162,10 @@ class PlaneEntry(Frozen):
     images: str | None = Field(default=None, min_length=1, description="folder of pictures to draw from")
     height: Length = Field(description="metres; the width follows from the picture")
     at: Spot | None = Field(default=None, description="[x, y, azimuth in degrees that the picture faces]")
-    around: Around | None = Field(default=None, description="or anywhere around the origin: {distance, azimuth}")
-    count: CountDrawn = Field(default=1, description="how many planes, a number, [low, high] or a distribution")
-    share: Annotated[Number, Field(ge=0, le=1)] = Field(default=1.0, description="chance of each to be there")
-    draw: Draw = Field(default="fixed", description=f"which picture, whether and where: {DRAWS}")
+    around: Around | None = Field(default=None, description="or a random position around the origin: {distance, azimuth}")
+    count: CountDrawn = Field(default=1, description="number of planes, a number, [low, high] or a distribution")
+    share: Annotated[Number, Field(ge=0, le=1)] = Field(default=1.0, description="chance of each plane to appear")
+    draw: Draw = Field(default="fixed", description=f"when picture, presence and position are drawn: {DRAWS}")
     labels: Labels = Field(default="background", description=LABELS)
     category: str = Field(default="", max_length=200, description="with labels: own")
 

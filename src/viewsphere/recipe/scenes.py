@@ -16,27 +16,26 @@ from viewsphere.recipe.values import OrShort
 class ScenesEntry(Frozen):
     """Random scenes: in each some of the recipe's models are drawn and placed, none of them more than another."""
 
-    sampler: Literal["scenes"] = Field(default="scenes", description="scenes, or another sampler's name, beside its options")
-    count: Count = Field(description="how many scenes")
+    sampler: Literal["scenes"] = Field(default="scenes", description="scenes, or another sampler, beside its options")
+    count: Count = Field(description="number of scenes")
     objects: CountDrawn = Field(
         default=cast(int, Distribution(uniform=(2, 5))),
-        description="how many models stand in each: a number, [low, high] or a distribution",
+        description="number of models in each: a number, [low, high] or a distribution",
     )
     distractors: CountOrNone = Field(
         default=0,
-        description="how many models with labels: background are put among them, each any number of times: a number, "
-        "[low, high] or a distribution",
+        description="number of models with labels: background among them, each any number of times: a number, [low, high]"
+        " or a distribution",
     )
-    repeat: bool = Field(default=False, description="whether a model may be there more than once")
-    views: Count | None = Field(
-        default=None, description="how many of the viewpoints each scene is taken from, drawn for each; by default all"
-    )
+    repeat: bool = Field(default=False, description="allows a model more than once in a scene")
+    views: Count | None = Field(default=None, description="number of viewpoints drawn for each scene; by default all")
     layout: Layout = Field(default="scatter", description=LAYOUT)
-    gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
+    gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="least distance between two of them, metres")
     balance: Literal["models", "category"] = Field(
         default="models",
-        description="models: none is drawn more than another; category: each category has as many objects as any other, to "
-        "one, over all scenes (of a split, where splits are by model), as far as it has models enough for a scene",
+        description="models: draws all models equally often; category: gives all categories equal numbers of objects, to "
+        "within one, over all scenes (of a split, with splits by model), as far as each category has enough "
+        "models for a scene",
     )
     orientation: Orientation = Field(default="upright", description=ORIENTATION)
     surface: OnField = Field(default=None, description=ON)

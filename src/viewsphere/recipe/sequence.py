@@ -16,12 +16,12 @@ class TimeEntry(Frozen):
     """How many pictures a sequence has, and how fast they follow one another."""
 
     frames: Annotated[Count, Field(le=MOST_INSTANTS)] | None = Field(
-        default=None, description="instants of every sequence; or give seconds"
+        default=None, description="number of instants in each sequence; or set seconds"
     )
-    seconds: Positive | None = Field(default=None, description="length of every sequence; or give frames")
-    fps: Annotated[Positive, Field(le=1e6)] = Field(default=25.0, description="instants a second")
+    seconds: Positive | None = Field(default=None, description="length of each sequence in seconds; or set frames")
+    fps: Annotated[Positive, Field(le=1e6)] = Field(default=25.0, description="instants per second")
     shutter: Annotated[Number, Field(ge=0, le=1)] = Field(
-        default=0.0, description="how long the shutter is open, as a share of the time from one instant to the next"
+        default=0.0, description="exposure time, as a share of the time between two instants"
     )
 
     @model_validator(mode="after")

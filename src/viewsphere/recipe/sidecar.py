@@ -35,21 +35,21 @@ class Sidecar(Frozen):
 
     axes: Literal["file", "object"] = Field(
         default="file",
-        description="what its numbers are in: the model file's own axes, origin and unit; or the object's: metres, +Z up, "
-        "front -Y, the origin where `centring` puts it",
+        description="axes of its numbers: the model file's own axes, origin and unit; or the object's: metres, +Z up, "
+        "front -Y, the origin from `centring`",
     )
     symmetries: Annotated[Symmetries | None, AfterValidator(_all_of_them)] = Field(
-        default=None, description="rigid motions that leave the model as it is; {} says that there are none"
+        default=None, description="rigid motions that leave the model unchanged; {} declares that there are none"
     )
     keypoints: Keypoints | None = Field(default=None, description="named points")
     body_parts: dict[PointName, Annotated[tuple[PointName, ...], Field(min_length=1)]] | None = Field(
         default=None,
         min_length=1,
-        description="names of parts of its body, each with the bones of its skin that move it: `{head: [Head, Neck], ...}`; "
-        "bones that none of them names are no part. Without it each bone is one",
+        description="names of body parts, each with the bones of its skin: `{head: [Head, Neck], ...}`; other bones "
+        "belong to no part. Without it, each bone is a part",
     )
-    color: Word | None = Field(default=None, description="what captions call its colour")
-    material: Word | None = Field(default=None, description="what captions call its material")
+    color: Word | None = Field(default=None, description="word for its colour in captions")
+    material: Word | None = Field(default=None, description="word for its material in captions")
 
     @model_validator(mode="after")
     def _check(self) -> Sidecar:

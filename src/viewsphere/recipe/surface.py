@@ -69,7 +69,7 @@ class GroundEntry(entry_of(Ground, optional=("color",), fixed=("catcher", "label
     UNSAID = ("material",)
 
     material: MaterialNames | None = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
-        default=None, description="what it is made of: wood, a list of names to draw from, or any; its grain is drawn, too"
+        default=None, description="built-in material: wood, a list of names to draw from, or any; its grain is random"
     )
 
     @model_validator(mode="after")
@@ -110,12 +110,11 @@ class MaterialEntry(entry_of(Repaint, fixed=("material",)), Brief):
 
     UNSAID = ("image", "images", "texture")
 
-    models: str = Field(default="*", min_length=1, description="keys of the models it is for, a pattern such as car_*")
+    models: str = Field(default="*", min_length=1, description="keys of its models, a pattern such as car_*")
     images: Picture | None = Field(default=None, description="or a folder of pictures to draw from")
     texture: MaterialNames | None = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
         default=None,
-        description="what opaque materials are made of instead: wood, a list of names to draw from, or any; its "
-        "grain is drawn, too",
+        description="built-in material for opaque materials: wood, a list of names to draw from, or any; its grain is random",
     )
 
     @model_validator(mode="after")

@@ -19,8 +19,8 @@ FrameNumber = Annotated[int, Field(strict=True, ge=-1_000_000, le=1_000_000)]
 Rate = Annotated[Positive, Field(ge=1, le=1000)]
 
 RATE = (
-    "frames in a second; by default what the file says. Files of times (glTF, Alembic) are cut into such frames, of all others "
-    "the frames last as long"
+    "frames per second; by default the file's. Files with times (glTF, Alembic) are divided into such frames; in other files, "
+    "frames have this duration"
 )
 
 
@@ -28,7 +28,7 @@ class FrameRange(Frozen):
     """Every `step`-th frame from `first` to `last`."""
 
     first: FrameNumber | None = Field(default=None, description="by default the file's own first frame")
-    last: FrameNumber | None = Field(default=None, description="not passed; by default the file's own last frame")
+    last: FrameNumber | None = Field(default=None, description="upper limit; by default the file's own last frame")
     step: Count = Field(default=1, description="frames from one time step to the next")
 
     @model_validator(mode="after")
@@ -67,8 +67,8 @@ Frames = Annotated[
 Steps = Literal["each", "moving"]
 
 STEPS = (
-    "each: every pose at every time step; moving: the k-th pose at the k-th time step, so the camera moves as the model does, "
-    "which takes as many poses as time steps"
+    "each: every pose at every time step; moving: the k-th pose at the k-th time step, so that camera and model move "
+    "together; needs as many poses as time steps"
 )
 
 

@@ -24,15 +24,15 @@ At = Annotated[
 class TracksEntry(Frozen):
     """Points that are followed through every sequence, by each sensor."""
 
-    grid: Count | None = Field(default=None, description="pixels from one point to the next, across the whole picture")
-    count: Count | None = Field(default=None, description="how many points are drawn at each instant of `at`")
+    grid: Count | None = Field(default=None, description="pixels between points, across the whole picture")
+    count: Count | None = Field(default=None, description="number of points drawn at each instant of `at`")
     points: str | None = Field(
         default=None, min_length=1, description="a CSV file of instant, x, y: pixels, the picture's corner is (0, 0)"
     )
     on: Literal["objects", "all"] = Field(
-        default="objects", description="of count: where points are drawn: on what objects show, or all over the picture"
+        default="objects", description="for count: draw points on objects, or on all of the picture"
     )
-    at: At = Field(default=(0,), description="of grid and count: at which instants points are picked: a list, or each")
+    at: At = Field(default=(0,), description="for grid and count: instants at which points are picked: a list, or each")
 
     @model_validator(mode="before")
     @classmethod

@@ -58,25 +58,25 @@ class Moving(Frozen):
     bins: Bins = 45.0
     shake: Shake | None = Field(default=None, description=SHAKE)
     follow: bool = Field(
-        default=True, strict=True, description="whether it goes on looking at a thing that moves, or at where it was at first"
+        default=True, strict=True, description="true: keeps looking at a moving thing; false: at its first position"
     )
 
 
 class OrbitPath(Moving):
     """A circle, or a part of one, around what the camera looks at."""
 
-    kind: Literal["orbit"] = Field(description="a circle around what it looks at")
-    look: Look = Field(default="center", description=f"what it goes around: {LOOK}; not ahead")
+    kind: Literal["orbit"] = Field(description="a circle around its target")
+    look: Look = Field(default="center", description=f"the centre of its circle: {LOOK}; not ahead")
     azimuth: Drift = Field(default=0.0, description=f"degrees, a number or [from, to]; {AZIMUTH}")
     elevation: Drift = Field(default=20.0, description=f"degrees {ELEVATION}; a number or [from, to]")
     distance: Drift = Field(description=f"{DISTANCE}; a number or [from, to]")
     tilt: Drift = Field(default=0.0, description=f"degrees, a number or [from, to]; {TILT}")
     turns: Number | None = Field(
         default=None,
-        description="whole turns over the sequence, counter-clockwise from above: the instant after the last would be the "
-        "first again; 1 by default where azimuth is a number",
+        description="turns over the sequence, counter-clockwise from above; after a whole turn, the next instant would "
+        "repeat the first; 1 by default if azimuth is a number",
     )
-    speed_deg: Number | None = Field(default=None, description="instead of turns: degrees a second")
+    speed_deg: Number | None = Field(default=None, description="instead of turns: degrees per second")
 
     @field_validator("look")
     @classmethod
@@ -118,14 +118,14 @@ class SplinePath(Moving):
 
     kind: Literal["spline"] = Field(description="a smooth path through points")
     points: Annotated[tuple[Place, ...], Field(min_length=2, max_length=MOST_POINTS)] = Field(
-        description="[x, y, z] in metres, two or more: the camera passes through all of them"
+        description="[x, y, z] in metres, two or more, that the camera passes through"
     )
-    closed: bool = Field(default=False, strict=True, description="whether the last point is followed by the first")
+    closed: bool = Field(default=False, strict=True, description="closes the path from the last point to the first")
     speed: Positive | None = Field(
-        default=None, description="metres a second; it stops at the end. Default: the whole path over the sequence"
+        default=None, description="metres a second, up to the end; default: the whole path over the sequence"
     )
     times: Annotated[tuple[Number, ...], Field(min_length=2)] | None = Field(
-        default=None, description="instead of speed: seconds at which it passes each point, ascending"
+        default=None, description="instead of speed: time of each point in seconds, ascending"
     )
     look: Look = Field(default="ahead", description=LOOK)
 
@@ -162,7 +162,7 @@ class DrivePath(Moving):
 
     kind: Literal["drive"] = Field(description="along a lane of the place")
     lane: Annotated[str, Field(min_length=1)] | None = Field(default=None, description="its name; default: the place's first")
-    speed: Positive = Field(default=10.0, description="metres a second; it stops at the lane's end, and goes on around a ring")
+    speed: Positive = Field(default=10.0, description="metres a second; it stops at the lane's end, or repeats a closed lane")
     height: Length = Field(default=1.5, description="metres above the lane")
     offset: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="metres along the lane at the first instant")
     side: Metres = Field(default=0.0, description="metres to the right of the lane's middle; below 0 to the left")
@@ -172,7 +172,7 @@ class DrivePath(Moving):
 class Turn(Frozen):
     """A turn of a walk."""
 
-    at: Annotated[Number, Field(ge=0)] = Field(description="seconds from the sequence's first instant at which it begins")
+    at: Annotated[Number, Field(ge=0)] = Field(description="start in seconds from the sequence's first instant")
     degrees: Number = Field(description="to the left; negative: to the right")
 
 
@@ -180,21 +180,21 @@ class WalkPath(Moving):
     """At eye height over the floor, straight on with turns, or through points, with a gentle bob."""
 
     kind: Literal["walk"] = Field(description="at eye height over the floor")
-    start: Spot | None = Field(default=None, description="[x, y] in metres where it begins")
-    heading: Number = Field(default=0.0, description="degrees at first: 0 walks along +Y, 90 along -X")
+    start: Spot | None = Field(default=None, description="start [x, y] in metres")
+    heading: Number = Field(default=0.0, description="initial direction in degrees: 0 walks along +Y, 90 along -X")
     turns: Annotated[tuple[Turn, ...], Field(max_length=MOST_TURNS)] = Field(
-        default=(), description="when it turns by how much: a list of {at, degrees}"
+        default=(), description="a list of turns {at, degrees}"
     )
-    turn_rate: Positive = Field(default=45.0, description="degrees a second while it turns")
+    turn_rate: Positive = Field(default=45.0, description="degrees a second during a turn")
     points: Annotated[tuple[Spot, ...], Field(min_length=2, max_length=MOST_POINTS)] | None = Field(
-        default=None, description="instead of start: [x, y] in metres, two or more, that it walks through"
+        default=None, description="instead of start: [x, y] in metres, two or more, to walk through"
     )
     speed: Positive = Field(default=1.4, description="metres a second; through points it stops at the last")
     eye_height: Length = Field(default=1.6, description="metres above the floor, z = 0")
     bob: Annotated[Metres, Field(ge=0, le=1)] = Field(
-        default=0.02, description="metres up and down from the middle, two a stride"
+        default=0.02, description="vertical movement of the eyes from the middle in metres, twice a stride"
     )
-    stride: Length = Field(default=1.5, description="metres of two steps")
+    stride: Length = Field(default=1.5, description="length of two steps in metres")
     look: Look = Field(default="ahead", description=LOOK)
 
     @model_validator(mode="after")
@@ -221,9 +221,11 @@ class MastPost(Moving):
     kind: Literal["mast"] = Field(description="a fixed place, or straight overhead")
     position: Place | None = Field(default=None, description="[x, y, z] in metres")
     overhead: Length | None = Field(
-        default=None, description="instead of position: metres straight above what it looks at; it goes with a thing that moves"
+        default=None, description="instead of position: metres straight above its target; follows a moving thing"
     )
-    heading: Number = Field(default=0.0, description="straight down: degrees; what points up in the picture: 0 is +Y, 90 is -X")
+    heading: Number = Field(
+        default=0.0, description="for a view straight down: the direction that is up in the picture, degrees; 0 is +Y, 90 is -X"
+    )
     look: Look = Field(default="center", description=f"{LOOK}; not ahead")
 
     @model_validator(mode="after")

@@ -66,7 +66,7 @@ class Range(Frozen):
     """Evenly spaced values from `start` up to `stop`, both included."""
 
     start: Number = Field(description="first value")
-    stop: Number = Field(description="last value, included when a whole number of steps leads to it")
+    stop: Number = Field(description="last value, included if a whole number of steps reaches it")
     step: Positive = Field(description="distance between values, above 0")
 
     @model_validator(mode="after")

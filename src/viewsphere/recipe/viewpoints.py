@@ -139,7 +139,7 @@ Shared = Annotated[
     bool,
     Field(
         strict=True,
-        description="whether all models, or all random scenes, are seen from the same draws; by default each has its own",
+        description="true: one draw for all models or random scenes; by default each has its own",
     ),
 ]
 """True if random viewpoints are drawn once for all."""
@@ -150,7 +150,7 @@ class Jitter(_Axes):
 
     kind: Literal["jitter"] = Field(description="a grid with random offsets")
     plus_minus: Spread = Field(description="the widest offset of each coordinate")
-    count: Count = Field(default=1, description="viewpoints for each one of the grid")
+    count: Count = Field(default=1, description="viewpoints for each grid viewpoint")
     shared: Shared = False
 
     @model_validator(mode="after")
@@ -167,7 +167,7 @@ class Sphere(Aimed):
     """Random viewpoints, uniform by area on the sphere or on a part of it."""
 
     kind: Literal["sphere"] = Field(description="uniform on the sphere")
-    count: Count = Field(description="how many viewpoints of each model, or random scene")
+    count: Count = Field(description="number of viewpoints of each model or random scene")
     shared: Shared = False
     azimuth: Interval = Field(default=(0.0, 360.0), description=f"[low, high] in degrees; {AZIMUTH}")
     elevation: Interval = Field(default=(-90.0, 90.0), description=f"[low, high] in degrees {ELEVATION}")
@@ -194,7 +194,7 @@ class Normal(Aimed):
     """Random viewpoints, normal around one; draws beyond the poles or at no distance are drawn again."""
 
     kind: Literal["normal"] = Field(description="normal around a viewpoint")
-    count: Count = Field(description="how many viewpoints of each model, or random scene")
+    count: Count = Field(description="number of viewpoints of each model or random scene")
     shared: Shared = False
     azimuth: Number = Field(default=0.0, description=f"mean, degrees; {AZIMUTH}")
     elevation: Annotated[Number, Field(ge=-90, le=90)] = Field(default=20.0, description=f"mean, degrees {ELEVATION}")
@@ -221,35 +221,36 @@ class PoseList(Aimed, Brief):
     kind: Literal["file"] = Field(description="from a file")
     path: Annotated[str, Field(min_length=1)] = Field(description="the file, or COLMAP's folder")
     format: Literal["auto", "csv", "view", "tum", "kitti", "nerfstudio", "colmap", "shots", "cameras"] = Field(
-        default="auto", description="auto: by the file's ending, and by the numbers in its first line; cameras: of a 3D file"
+        default="auto", description="auto: from the file's ending and the numbers in its first line; cameras: a 3D file"
     )
-    every: Count = Field(default=1, description="take every n-th pose")
+    every: Count = Field(default=1, description="uses every n-th pose")
     camera: Annotated[str, Field(min_length=1)] | None = Field(
         default=None, description="3D files: name of the camera; by default the scene's, or the only one"
     )
     frames: Frames | None = Field(
-        default=None, description="3D files: when: all, a list of frames, or {first, last, step}; by default the first frame"
+        default=None,
+        description="3D files: time steps: all, a list of frames, or {first, last, step}; by default the first frame",
     )
     clip: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None, description="3D files: the animation to play, where the file has several; by default its first"
+        default=None, description="3D files: the animation to play, if the file has several; by default the first"
     )
     fps: Rate | None = Field(default=None, description=f"3D files: {RATE}")
     at: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
-        description="3D files: an object whose place and turn (at the first frame) become the world's, as scene.blend.at",
+        description="3D files: an object with the pose (at the first frame) that becomes the world's, like scene.blend.at",
     )
     size: tuple[Annotated[Count, Field(le=16384)], Annotated[Count, Field(le=16384)]] | None = Field(
         default=None, description="3D files: [width, height] of the camera's picture in pixels; by default the scene's"
     )
     confined: bool = Field(
-        default=True, strict=True, description="3D files: whether what the file names has to stay in its folder"
+        default=True, strict=True, description="3D files: requires paths inside the file to stay in its folder"
     )
     origin: Point = Field(default=(0.0, 0.0, 0.0), description="motions: where the models stand, in the file's world and unit")
     scale: Positive = Field(default=1.0, description="motions: metres in one unit of the file")
     up: Axis | None = Field(default=None, description="motions: the file's axis that points up; default: the format's")
     forward: Axis | None = Field(
         default=None,
-        description="motions: the file's axis that becomes -Y, where models face; default: -y, or -z if that is up or down",
+        description="motions: the file's axis that becomes -Y, the models' front; default: -y, or -z if that is up or down",
     )
 
     @model_validator(mode="after")

@@ -25,8 +25,8 @@ class WantedEntry(Frozen):
     of which least is seen, and of the one of which most is cut off.
     """
 
-    visibility: Shares | None = Field(default=None, description="how much of it is seen: [0.3, 0.6]")
-    truncation: Shares | None = Field(default=None, description="how much of it lies outside of the picture: [0.2, 0.5]")
+    visibility: Shares | None = Field(default=None, description="visible share: [0.3, 0.6]")
+    truncation: Shares | None = Field(default=None, description="share outside the picture: [0.2, 0.5]")
 
     @model_validator(mode="after")
     def _check(self) -> WantedEntry:

@@ -22,7 +22,7 @@ class FogEntry(entry_of(Fog)):
     """Air that scatters light."""
 
     color: Drawn[Light] | None = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
-        default=None, description="radiance of the fog itself: linear [r, g, b]; by default what sun and sky make it"
+        default=None, description="radiance of the fog itself: linear [r, g, b]; by default from sun and sky"
     )
 
 
@@ -30,9 +30,9 @@ class _FallingEntry(Frozen):
     """What rain and snow have in common besides."""
 
     color: Drawn[Light] | None = Field(
-        default=None, description="radiance of what falls: linear [r, g, b]; by default the sky's"
+        default=None, description="radiance of drops or flakes: linear [r, g, b]; by default the sky's"
     )
-    clouds: Drawn[Portion] = Field(default=1.0, description="share of the sky that it covers: 1 hides the sun")
+    clouds: Drawn[Portion] = Field(default=1.0, description="cloud cover of the sky: 1 hides the sun")
 
 
 class RainEntry(entry_of(Rain, without=("seed",)), _FallingEntry):  # pyright: ignore[reportIncompatibleVariableOverride]

@@ -27,9 +27,9 @@ class Options(Frozen):
     speed: Coordinate = Field(default=1.0, description="seconds of the file a second: 2 is twice as fast, -1 backwards")
     loop: Loop = Field(
         default="loop",
-        description="once: after its end its last frame stays; loop: it begins again; back_and_forth: it runs back, and again",
+        description="once: stops at its last frame; loop: repeats; back_and_forth: alternates forwards and backwards",
     )
-    offset: Drawn[Strength] = Field(default=0.0, description="seconds of the file that it shows at 0 s")
+    offset: Drawn[Strength] = Field(default=0.0, description="time of the file at 0 s, in seconds")
 
 
 def moves(options: Options, start: Start) -> Move:

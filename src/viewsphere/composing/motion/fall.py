@@ -16,8 +16,8 @@ from viewsphere.recipe.draws import Drawn
 class Options(Frozen):
     """The fall by which the layout (fall or container) puts it where it comes to rest; then it lies there."""
 
-    begin: Drawn[Number] = Field(default=0.0, description="seconds: when it is let go; before, it hangs where it is let go")
-    speed: Drawn[Positive] = Field(default=1.0, description="how fast it falls: 0.25 shows it in slow motion")
+    begin: Drawn[Number] = Field(default=0.0, description="release time in seconds; before, the thing hangs in its place")
+    speed: Drawn[Positive] = Field(default=1.0, description="speed factor: 0.25 is slow motion")
 
 
 def moves(options: Options, start: Start) -> Move:

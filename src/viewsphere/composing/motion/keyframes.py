@@ -28,7 +28,7 @@ class Key(Frozen):
     time: Number = Field(description="seconds")
     position: PointDrawn | None = Field(default=None, description="[x, y, z]: metres, world axes")
     rotation_deg: Drawn[tuple[Coordinate, Coordinate, Coordinate]] | None = Field(
-        default=None, description="[x, y, z]: degrees about the thing's own x axis first, then about y, then z as they were"
+        default=None, description="[x, y, z]: degrees about the thing's own x axis first, then about the original y, then z"
     )
     quaternion: Quaternion | None = Field(default=None, description="or the rotation as [w, x, y, z]")
 
@@ -52,8 +52,8 @@ class Options(Frozen):
     keys: Annotated[tuple[Key, ...], Field(min_length=1)] = Field(description="in the order of their times")
     origin: Origin = Field(
         default="placed",
-        description="placed: positions and rotations count from how it was placed; world: x and y are the world's, z is the "
-        "height above where it was placed, rotations are the world's",
+        description="placed: positions and rotations are relative to its placement; world: x and y are the world's, z is "
+        "the height above its placement, rotations are the world's",
     )
     ease: Literal["linear", "smooth"] = Field(
         default="linear", description="linear: evenly from key to key; smooth: slowly away from each and slowly into the next"

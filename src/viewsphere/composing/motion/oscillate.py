@@ -18,14 +18,14 @@ from viewsphere.recipe.draws import Coordinate, Drawn
 class Options(Frozen):
     """To and fro, as the sine of time: at 0 s in the middle, where it is without this motion, unless phase_deg says more."""
 
-    position: Amplitude = Field(
-        default=(0.0, 0.0, 0.0), description="[x, y, z]: metres along the world's axes that it goes to either side"
-    )
+    position: Amplitude = Field(default=(0.0, 0.0, 0.0), description="[x, y, z]: amplitude in metres along the world's axes")
     rotation_deg: Amplitude = Field(
-        default=(0.0, 0.0, 0.0), description="[x, y, z]: degrees it turns to either side, about this vector in its own axes"
+        default=(0.0, 0.0, 0.0), description="[x, y, z]: amplitude in degrees, about this vector in its own axes"
     )
-    period: Drawn[Positive] = Field(default=1.0, description="seconds from one side to the other and back")
-    phase_deg: Coordinate = Field(default=0.0, description="degrees: 90 begins at one side, 180 in the middle, going back")
+    period: Drawn[Positive] = Field(default=1.0, description="period in seconds")
+    phase_deg: Coordinate = Field(
+        default=0.0, description="phase in degrees: 90 begins at one side, 180 in the middle, on the way back"
+    )
 
 
 def moves(options: Options, start: Start) -> Move:

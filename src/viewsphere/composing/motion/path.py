@@ -24,24 +24,24 @@ class Options(Frozen):
     """
 
     lane: Drawn[Annotated[str, Field(min_length=1)]] | None = Field(
-        default=None, description="name of a lane of scene.place, or any: one of them, drawn"
+        default=None, description="name of a lane of scene.place, or any: a random one"
     )
     points: Annotated[tuple[PointDrawn, ...], Field(min_length=2)] | None = Field(
         default=None, description="or [x, y, z] each, metres: points of the world, with a smooth curve through them"
     )
     speed: Drawn[Positive] = Field(description="metres a second")
-    closed: bool = Field(default=False, description="of points: whether the way goes on from the last to the first")
+    closed: bool = Field(default=False, description="for points: closes the path from the last to the first")
     offset: Coordinate = Field(
-        default=0.0, description="metres along its way at 0 s; below 0: it reaches the beginning of an open way later"
+        default=0.0, description="position along the path at 0 s, metres; below 0: reaches the beginning of an open path later"
     )
-    side: Coordinate = Field(default=0.0, description="metres to the right of its way; below 0 to the left")
+    side: Coordinate = Field(default=0.0, description="offset in metres to the right of the path; below 0 to the left")
     heading: Heading = Field(
         default="along",
-        description="along: its front ahead, uphill and downhill, too; level: its front ahead, upright; keep: turned as before",
+        description="along: front ahead, tilted on slopes; level: front ahead, upright; keep: keeps its rotation",
     )
     end: Literal["stay", "leave"] = Field(
         default="stay",
-        description="before the beginning and after the end of an open way: stay: it waits there; leave: it is not there",
+        description="at both ends of an open path: stay: waits there; leave: is absent",
     )
 
     @model_validator(mode="after")

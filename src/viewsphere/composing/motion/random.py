@@ -18,12 +18,12 @@ class Options(Frozen):
     """Smoothly at random around where it is: no faster than the highest frequency, no farther than the amplitudes."""
 
     position: Amplitude = Field(
-        default=(0.0, 0.0, 0.0), description="[x, y, z]: metres along the world's axes that it goes to either side at most"
+        default=(0.0, 0.0, 0.0), description="[x, y, z]: largest amplitude in metres along the world's axes"
     )
     rotation_deg: Amplitude = Field(
-        default=(0.0, 0.0, 0.0), description="[x, y, z]: degrees that the rotation vector in its own axes goes to either side"
+        default=(0.0, 0.0, 0.0), description="[x, y, z]: largest amplitude of the rotation vector in its own axes, degrees"
     )
-    highest_hz: Drawn[Positive] = Field(default=0.5, description="highest frequency, hertz: no movement is faster")
+    highest_hz: Drawn[Positive] = Field(default=0.5, description="highest frequency, hertz")
 
 
 def moves(options: Options, start: Start) -> Move:

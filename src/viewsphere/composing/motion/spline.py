@@ -18,15 +18,15 @@ class Options(Frozen):
 
     points: Annotated[tuple[PointDrawn, ...], Field(min_length=2)] = Field(description="[x, y, z] each: metres, world axes")
     speed: Drawn[Positive] = Field(description="metres a second")
-    closed: bool = Field(default=False, description="whether it goes on from the last point to the first, again and again")
+    closed: bool = Field(default=False, description="closes the path from the last point to the first, and repeats it")
     heading: Heading = Field(
         default="keep",
-        description="keep: turned as before; level: its front ahead, upright; along: its front ahead, uphill and downhill, too",
+        description="keep: keeps its rotation; level: front ahead, upright; along: front ahead, tilted on slopes",
     )
     origin: Origin = Field(
         default="placed",
-        description="placed: points count from where it was placed; world: x and y are the world's, z is the height above "
-        "where it was placed",
+        description="placed: points are relative to its placement; world: x and y are the world's, z is the height above "
+        "its placement",
     )
 
 

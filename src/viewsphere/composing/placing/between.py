@@ -28,11 +28,11 @@ class Options(Frozen):
     """Where in the line of sight."""
 
     stand: Literal["floor", "sight"] = Field(
-        default="floor", description="floor: on the floor; sight: in the air where that is between, as for cameras high above"
+        default="floor", description="floor: on the floor; sight: in the air on the line of sight, for cameras high above"
     )
     aside: Drawn[Strength] = Field(
         default=1.0,
-        description="how far beside the line of sight at most, as a share of both widths together: at 1 it just hides nothing",
+        description="largest offset from the line of sight, as a share of both widths together: at 1 it hides nothing",
     )
 
 

@@ -32,10 +32,10 @@ class Options(Matter):
 
     spread: tuple[Drawn[Length], Drawn[Length]] | None = Field(
         default=None,
-        description="[x, y]: metres of floor over which things are let go; by default twice what their boxes cover",
+        description="[x, y]: floor area in metres above which things are released; by default twice the area of their boxes",
     )
     moment: Literal["rest", "mid"] = Field(
-        default="rest", description="rest: when all lie still; mid: at some moment before the last one lands"
+        default="rest", description="rest: after all lie still; mid: at a random moment before the last one lands"
     )
 
 

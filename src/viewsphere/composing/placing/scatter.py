@@ -33,8 +33,8 @@ class Options(Gaps):
 
     reach: Drawn[Length] | None = Field(
         default=None,
-        description="metres from the middle along and across the floor, at most; default: 10, and farther where the models need"
-        " more room, as cameras look at the middle",
+        description="largest distance from the middle along and across the floor, metres; default: 10, or more if the "
+        "models need more room; cameras look at the middle",
     )
 
 

@@ -40,7 +40,7 @@ class Options(Matter):
 
     high: CountDrawn = Field(
         default=3,
-        description="how many lie on one another, a number, [low, high] or a distribution; fewer where they would not stay",
+        description="number of models in a pile, a number, [low, high] or a distribution; fewer if more would not stay",
     )
 
 

@@ -42,19 +42,21 @@ PAVEMENT = (1.5, 2.2)
 class Options(Frozen):
     """Options of traffic: vehicles that drive or park, and walkers."""
 
-    parked: Drawn[Portion] = Field(default=0.35, description="the chance that a vehicle is parked, if there is room for it")
+    parked: Drawn[Portion] = Field(default=0.35, description="chance of a vehicle to park, if there is room")
     bay: Drawn[Strength] | None = Field(
         default=None,
-        description="metres that a parking bay right of the lane is wide; 0: vehicles park at the lane's edge; default: the "
-        "bays of the place, and the lane's edge in a place without bays",
+        description="width of a parking bay right of the lane, metres; 0: vehicles park at the lane's edge; default: the "
+        "place's bays, or the lane's edge",
     )
     pavement: tuple[Drawn[Strength], Drawn[Strength]] | None = Field(
         default=None,
-        description="[near, far]: metres from the right edge of the lane to where others walk; default: the pavements of the "
-        "place, and [1.5, 2.2] in a place without pavements",
+        description="[near, far]: distance of walkers from the lane's right edge, metres; default: the place's pavements,"
+        " or [1.5, 2.2]",
     )
-    kerb: Drawn[Strength] = Field(default=0.1, description="beside `pavement`: metres that the pavement is above the road")
-    reach: Drawn[Length] = Field(default=15.0, description="metres from the middle, at most: cameras look at the middle")
+    kerb: Drawn[Strength] = Field(default=0.1, description="with `pavement`: height of the pavement above the road, metres")
+    reach: Drawn[Length] = Field(
+        default=15.0, description="largest distance from the middle in metres; cameras look at the middle"
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,9 +35,9 @@ class Options(Frozen):
     """Where in the air things are."""
 
     size: tuple[Drawn[Length], Drawn[Length], Drawn[Length]] | None = Field(
-        default=None, description="[x, y, z] of the box that all are in, metres; by default twelve times their boxes, a cube"
+        default=None, description="[x, y, z]: size of the box around all, metres; by default a cube of twelve times their boxes"
     )
-    height: Drawn[Strength] = Field(default=0.0, description="metres from the floor to the bottom of that box")
+    height: Drawn[Strength] = Field(default=0.0, description="height of that box above the floor, metres")
 
 
 def place(

@@ -56,16 +56,16 @@ RECORDED = 5
 class Matter(Frozen):
     """What things are made of; each is drawn for itself."""
 
-    density: Drawn[Positive] = Field(default=300.0, description="kg in a cubic metre of the thing's hull")
-    mass: Drawn[Positive] | None = Field(default=None, description="kg, instead of what density says")
+    density: Drawn[Positive] = Field(default=300.0, description="density of the thing's hull, kg per cubic metre")
+    mass: Drawn[Positive] | None = Field(default=None, description="mass in kg, instead of density")
     friction: Drawn[Strength] = Field(default=0.8, description="coefficient of sliding friction: 0.1 ice, 0.8 wood, 1 rubber")
-    restitution: Drawn[Portion] = Field(default=0.0, description="share of its speed that a thing has after a bounce")
+    restitution: Drawn[Portion] = Field(default=0.0, description="share of the speed left after a bounce")
     collide: Literal["hulls", "parts"] = Field(
         default="hulls",
-        description="hulls: things touch as their convex hulls do; parts: as convex parts of them, for chairs, mugs and what "
-        "others shall lie in; takes seconds a model once, by coacd",
+        description="hulls: things collide as convex hulls; parts: as convex parts (CoACD, seconds per model once), for "
+        "chairs, mugs and other things that hold things",
     )
-    drop: Drawn[Length] = Field(default=0.05, description="metres of air below each thing when it is let go")
+    drop: Drawn[Length] = Field(default=0.05, description="gap below each thing on release, metres")
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ class Gaps(Frozen):
 
     between: Literal["boxes", "hulls"] = Field(
         default="boxes",
-        description="what the gap is between: boxes, or hulls, as seen from above, which lets models stand closer together",
+        description="gap between boxes, or between hulls as seen from above, which lets models stand closer",
     )
 
 
