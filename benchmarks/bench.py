@@ -30,7 +30,7 @@ from bench_scene import reference_recipe, write_reference
 
 from viewsphere import generate, plan, plugins
 from viewsphere.assets.mesh import Mesh
-from viewsphere.engines import Engine, Stage
+from viewsphere.engines import Stage
 from viewsphere.engines.raster import painting, staging
 from viewsphere.geometry.box import box_vertices
 from viewsphere.labels import annotated, observe, sight_of
@@ -38,6 +38,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import SHOT_FRAMES
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.run.stages import Stages
 from viewsphere.store import Store
@@ -129,7 +130,7 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     stages = Stages()
     shot = next(plan(reference_recipe(frames, antialias, folder), shot_frames=frames).shots(stages.box))
     mesh = stages.model(shot.things[0].model)
-    engine: Engine = plugins.load("engines", "raster")
+    engine = plugins.load(EngineSpec, "raster")
     store = Store(folder / f"store{antialias}")
     (store.root / "store" / "writing").mkdir(parents=True)
     warm_up = engine.stage(shot, lambda spec: mesh)  # compiles, or reads the cache
@@ -147,7 +148,7 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     return clock, len(stage.at(0).triangles)
 
 
-def baked(engine: Engine, shot: Shot, mesh: Mesh) -> Stage:
+def baked(engine: EngineSpec, shot: Shot, mesh: Mesh) -> Stage:
     """The shot's stage, with its first geometry built."""
     stage = engine.stage(shot, lambda spec: mesh)
     stage.at(0)

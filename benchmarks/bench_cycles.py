@@ -21,11 +21,11 @@ from bench_scene import write_reference
 
 from viewsphere import Recipe, plan, plugins
 from viewsphere.blender.interpreter import find_blender
-from viewsphere.engines import Engine
 from viewsphere.engines._blender.staging import CyclesStage
 from viewsphere.geometry.box import box_vertices
 from viewsphere.labels import annotated, observe, sight_of
 from viewsphere.model.shot import Shot
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.rendering.sky.sky import sky_pictures
 from viewsphere.rendering.sky.sun import sun_light
 from viewsphere.run.stages import Stages
@@ -90,7 +90,7 @@ def cpu_of(pid: int) -> float:
 def ours(shot: Shot, stages: Stages, pictures: Path | None = None) -> Costs:
     """Costs of a shot's frames, rendered by the engine that the shot names."""
     mesh = stages.model(shot.things[0].model)
-    engine: Engine = plugins.load("engines", shot.engine)
+    engine = plugins.load(EngineSpec, shot.engine)
 
     def spent() -> float:
         """CPU seconds so far, in this process and in Blender."""

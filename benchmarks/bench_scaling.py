@@ -15,7 +15,6 @@ from bench_scene import texture_set
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.composing.viewpoints.camera import looking
-from viewsphere.engines import Engine
 from viewsphere.labels import observe
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
@@ -24,6 +23,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Ground, Scene, Sun
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.truth.raster.visibility import rasterize
 
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000, 5_000_000)
@@ -91,7 +91,7 @@ def frame_cost(mesh: Mesh, side: tuple[int, int] = (640, 480), copies: int = 1) 
         instants=tuple(looking(p, (0.0, 0.0, 0.5), index=p.index) for p in poses),
         channels=("rgb", "depth", "instances", "normals"),
     )
-    engine: Engine = plugins.load("engines", "raster")
+    engine = plugins.load(EngineSpec, "raster")
     begun = time.process_time()
     stage = engine.stage(shot, lambda spec: mesh)
     geometry = stage.at(0)

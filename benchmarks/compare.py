@@ -29,7 +29,6 @@ from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.composing.viewpoints.camera import looking
-from viewsphere.engines import Engine
 from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
@@ -39,6 +38,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, Scene, Sky, SpotLight, Sun, ViewTransform
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.rendering.ground.material import SLABS, ground_material
 from viewsphere.rendering.ground.slab_picture import laid_with_slabs
 from viewsphere.rendering.view import develop
@@ -209,7 +209,7 @@ def describe(case: Case, folder: Path) -> None:
 def picture(case: Case) -> np.ndarray[Any, Any]:
     """viewsphere's picture of a case, (H, W, 3)."""
     shot, meshes = shot_of(case)
-    engine: Engine = plugins.load("engines", "raster")
+    engine = plugins.load(EngineSpec, "raster")
     stage = engine.stage(shot, lambda spec: meshes[spec.key])
     return stage.paint(0, 0, rasterize(stage.at(0), shot.camera(0)), ("rgb",))["rgb"]
 

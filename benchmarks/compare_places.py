@@ -23,6 +23,7 @@ from viewsphere import Recipe, plan, plugins
 from viewsphere.model.instant import Instant
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.shot import Shot
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.run.stages import Stages
 from viewsphere.truth.raster.visibility import rasterize
 
@@ -97,7 +98,7 @@ def seen_from(shot: Shot, case: Case) -> Shot:
 def picture(shot: Shot, stages: Stages, engine: str, **options: Any) -> np.ndarray[Any, Any]:
     """The first picture of a shot by this engine, (H, W, 3)."""
     shot = shot.model_copy(update={"engine": engine, "engine_options": options})
-    stage = plugins.load("engines", engine).stage(shot, stages.model)
+    stage = plugins.load(EngineSpec, engine).stage(shot, stages.model)
     return stage.paint(0, 0, rasterize(stage.at(0), shot.camera(0)), ("rgb",))["rgb"]
 
 

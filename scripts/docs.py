@@ -39,6 +39,7 @@ from viewsphere.labels import (
 )
 from viewsphere.limits import table
 from viewsphere.model.channel import PASSES, PICTURES
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.material import MaterialSpec
 from viewsphere.plugins.overview import SPECS
@@ -187,7 +188,7 @@ def unit_of(label: Label) -> str:
 
 
 def painted(engine: str) -> tuple[str, ...]:
-    return getattr(plugins.load("engines", engine), "PAINTS", PICTURES)
+    return plugins.load(EngineSpec, engine).paints
 
 
 def error_of(proof: dict[str, Any]) -> str:

@@ -19,7 +19,6 @@ from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.mesh import Mesh
 from viewsphere.composing.viewpoints.camera import looking
-from viewsphere.engines import Engine
 from viewsphere.errors import ViewsphereError
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
@@ -40,6 +39,7 @@ from viewsphere.model.scene import (
 )
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.zoo import build, build_zoo_model
 
@@ -97,7 +97,7 @@ def tile(mesh: Mesh, scene: Scene, azimuth_deg: float = 35, elevation_deg: float
     instants = (looking(pose, (x, y, z), index=0),)
     thing = Thing(id=1, model=SPEC)
     shot = Shot(key="sheet", things=(thing,), rig=Rig.of(LENS), instants=instants, scene=scene, channels=("rgb",))
-    engine: Engine = plugins.load("engines", "raster")
+    engine = plugins.load(EngineSpec, "raster")
     stage = engine.stage(shot, lambda spec: mesh)
     return Image.fromarray(stage.paint(0, 0, rasterize(stage.at(0), shot.camera(0)), ("rgb",))["rgb"])
 

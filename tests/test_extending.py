@@ -159,6 +159,12 @@ def test_an_engine_is_one_file(install):
         next(iter(render(small_recipe(engine={"name": "flat", "gloss": 1}, formats=[]))))
 
 
+def test_a_stage_that_lacks_a_method_is_refused_by_name(install):
+    install("engines", "flat", EXAMPLES["flat"].replace("def paint(", "def color("))
+    with pytest.raises(PluginError, match=r"EngineSpec\.stage: expected a stage with at, paint, of; found no paint"):
+        next(iter(render(small_recipe(engine="flat", formats=[]))))
+
+
 GROUPS = {
     "csv_boxes": ("formats", "One row an object"),
     "lines": ("formats", "One JSON line a picture"),

@@ -12,6 +12,7 @@ from bench_scene import reference_recipe
 from view_loop import opened
 
 from viewsphere import __version__, plan, plugins
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.run.stages import Stages
 from viewsphere.store import Store
@@ -22,7 +23,7 @@ count = len(scene.told["views"])
 stages = Stages()
 shot = next(plan(reference_recipe(count, 4, scene.folder), shot_frames=count).shots(stages.box))
 mesh = stages.model(shot.things[0].model)
-stage = plugins.load("engines", "raster").stage(shot, lambda spec: mesh)
+stage = plugins.load(EngineSpec, "raster").stage(shot, lambda spec: mesh)
 stage.at(0)
 store = Store(scene.folder / "viewsphere")
 (store.root / "store" / "writing").mkdir(parents=True)

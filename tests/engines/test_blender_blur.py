@@ -9,6 +9,7 @@ from blurred_scenes import LENS, SCENES, load, meshes, picture, sharp
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.shot import Shot
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.truth.raster.visibility import rasterize
 
 OPTIONS = {
@@ -29,7 +30,7 @@ def painted(stage) -> np.ndarray:
 
 
 def stage_of(shot: Shot, known):
-    return plugins.load("engines", shot.engine).stage(shot, load(known))
+    return plugins.load(EngineSpec, shot.engine).stage(shot, load(known))
 
 
 @pytest.mark.slow

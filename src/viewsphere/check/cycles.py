@@ -15,6 +15,7 @@ from viewsphere.check.failure import failure
 from viewsphere.formats.blend import StoredModels
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.scene import engine_entry
 from viewsphere.run.scenery import Scenery
 from viewsphere.store import Dataset
@@ -30,7 +31,7 @@ class Compared:
     def __init__(self, dataset: Dataset) -> None:
         """Raises UserError where one of the recipes' Blenders, or the default one, cannot be used."""
         self._dataset, self._scenery = dataset, Scenery(dataset)
-        self._engine = plugins.load("engines", "cycles")
+        self._engine = plugins.load(EngineSpec, "cycles")
         self.frames, self.pixels, self.edges = 0, 0, 0
         self._left_out: Counter[str] = Counter()
         for python in {_own_python(part.recipe) for part in dataset.plan.parts}:
@@ -48,6 +49,7 @@ class Compared:
         if asked is None:
             return
         kept, shot, instant, sensor, load = asked
+        assert self._engine.indices is not None
         seen = self._engine.indices(shot, instant, sensor, load)
         if seen is None:
             self._left_out["whose lens Blender has not"] += 1

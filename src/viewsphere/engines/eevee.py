@@ -7,19 +7,15 @@ from typing import TYPE_CHECKING
 
 from viewsphere.engines import _blender
 from viewsphere.engines._blender import PROGRAMS, stage
+from viewsphere.plugins.engine import EngineSpec
 
 if TYPE_CHECKING:
     from pydantic import JsonValue
-
-__all__ = ["CATCHES_SHADOWS", "OPENS_SCENES", "PROGRAMS", "check", "stage"]
-
-OPENS_SCENES = True
-"""EEVEE renders .blend files that are the scene."""
-
-CATCHES_SHADOWS = False
-"""EEVEE has no shadow catcher."""
 
 
 def check(options: Mapping[str, JsonValue]) -> None:
     """Raise UserError for an option that is not known (with the nearest name), out of range, or without a Blender."""
     _blender.check(options, "eevee")
+
+
+ENGINE = EngineSpec(check=check, stage=stage, opens_scenes=True, catches_shadows=False, programs=PROGRAMS)

@@ -10,6 +10,7 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.files import read_bytes
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.recipe import Recipe
 
 SHARED = tuple(Path(__file__).parents[1] / name for name in ("materials", "rendering", "model/scene.py"))
@@ -20,17 +21,16 @@ says.
 
 @cache
 def engine_digest(name: str) -> str:
-    """A digest of the sources of the engine of this name, of the programs it runs (its `PROGRAMS`, if it has any), and of what
+    """A digest of the sources of the engine of this name, of the programs it runs (its `programs`), and of what
     all engines share.
 
     Two states of a program may carry one version, but only equal sources surely paint alike. Raises UserError for an engine
     that is not there.
     """
-    engine = plugins.load("engines", name)
-    file = getattr(engine, "__file__", None)
-    own = [] if file is None else [Path(file).parent if Path(file).name == "__init__.py" else Path(file)]
+    engine, file = plugins.load(EngineSpec, name), plugins.source("engines", name)
+    own = [] if file is None else [file.parent if file.name == "__init__.py" else file]
     digest = hashlib.sha256()
-    for root in (*own, *getattr(engine, "PROGRAMS", ()), *SHARED):
+    for root in (*own, *engine.programs, *SHARED):
         for source in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
             digest.update(source.name.encode() + b"\0" + read_bytes(source))
     return digest.hexdigest()[:16]

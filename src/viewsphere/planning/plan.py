@@ -58,6 +58,7 @@ from viewsphere.planning.rigs import rig_of
 from viewsphere.planning.samplers import Standing, Stock, lens
 from viewsphere.planning.splits import expected, quotas
 from viewsphere.planning.tracks import tracks_digest, tracks_of
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.light import NightSky
@@ -471,7 +472,7 @@ def _composed(planned: Plan) -> Plan:
 
 def check_engine(recipe: Recipe) -> None:
     """See that the engine takes its options; raises UserError where it does not, or lacks its extra."""
-    engine = plugins.load("engines", recipe.engine.name)
+    engine = plugins.load(EngineSpec, recipe.engine.name)
     with recipe.located():
         engine.check(engine_options(recipe))
 

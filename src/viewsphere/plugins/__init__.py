@@ -14,6 +14,7 @@ from viewsphere.plugins.registry import (
     origin,
     place,
     places,
+    source,
 )
 
 __all__ = [
@@ -30,4 +31,5 @@ __all__ = [
     "origin",
     "place",
     "places",
+    "source",
 ]

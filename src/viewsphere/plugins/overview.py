@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from viewsphere.errors import UserError
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.material import MaterialSpec
 from viewsphere.plugins.motion import MotionSpec
@@ -13,7 +14,7 @@ from viewsphere.plugins.registry import SEAMS, Kind, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.spec import Spec
 
-SPECS: tuple[type[Spec], ...] = (FormatSpec, MaterialSpec, MotionSpec, PlacerSpec, SamplerSpec)
+SPECS: tuple[type[Spec], ...] = (EngineSpec, FormatSpec, MaterialSpec, MotionSpec, PlacerSpec, SamplerSpec)
 """The specs of all kinds."""
 
 

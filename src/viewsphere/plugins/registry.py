@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterable
 from functools import lru_cache
 from importlib import metadata
+from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar, overload
 
 from viewsphere.errors import PluginError, UserError
@@ -91,6 +92,13 @@ def origin(kind: Kind, name: str) -> str:
     entry = _entry(kind, name)
     found = metadata.distribution("viewsphere") if entry is None else entry.dist
     return "" if found is None else f"{found.name} {found.version}"
+
+
+def source(kind: Kind, name: str) -> Path | None:
+    """The file of a plug-in's module; None where it has none."""
+    entry = _entry(kind, name)
+    found = importlib.util.find_spec(f"{SEAMS[kind].package}.{name}" if entry is None else entry.module)
+    return None if found is None or found.origin is None else Path(found.origin)
 
 
 def _entry(kind: Kind, name: str) -> metadata.EntryPoint | None:

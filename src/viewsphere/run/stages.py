@@ -33,6 +33,7 @@ from viewsphere.model.sample import Float, Sample, Taken
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.traits import Traits
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.rendering.ground.material import ground_stamps
 from viewsphere.run.walls import Step, check_rooms, check_way
 from viewsphere.store import ModelInfo, Store
@@ -42,7 +43,7 @@ from viewsphere.truth.sky_visibility import sky_occlusion
 from viewsphere.zoo import build_zoo_model, rooms_of
 
 if TYPE_CHECKING:
-    from viewsphere.engines import Engine, Stage  # which takes a third of a worker's start
+    from viewsphere.engines import Stage  # which takes a third of a worker's start
     from viewsphere.planning.plan import Plan
 
 WARM_BYTES = 400_000_000
@@ -252,12 +253,12 @@ class Stages:
         """The engine's stage for this shot, built anew only when the scene is another one, or a picture in it has changed."""
         key = shot.stage_key, _stamps(shot)
         if self._stage is None or self._stage_key != key:
-            engine: Engine = plugins.load("engines", shot.engine)
-            self._stage = engine.stage(shot, self.model)
+            stage: Stage = plugins.load(EngineSpec, shot.engine).staged(shot, self.model)
             self._stage_key = key
         else:
-            self._stage = self._stage.of(shot)
-        return self._stage
+            stage = self._stage.of(shot)
+        self._stage = stage
+        return stage
 
     def render(self, shot: Shot) -> Iterator[Sample]:
         """The shot's samples in order, channels in memory; `check_shot` says beforehand whether its cameras can stand there."""

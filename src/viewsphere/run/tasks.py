@@ -16,6 +16,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
 from viewsphere.planning.extension import Portion
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.run.composing import Composer
 from viewsphere.run.models import Models
 from viewsphere.run.stages import Stages, StoredBoxes
@@ -90,7 +91,7 @@ class Worker:
         """
         shot = self.composer.shot(row)
         with pause_collection():  # while the engine is imported
-            plugins.load("engines", shot.engine)
+            plugins.load(EngineSpec, shot.engine)
         samples = _counted(self.stages.render(shot), tell)
         scenery = self.composer.scenery(shot)
         return self.store.write_shot(shot.key, samples, scenery, shot.files, shot, again, PAINTER)

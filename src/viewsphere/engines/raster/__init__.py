@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from viewsphere.model.channel import PASSES
+from viewsphere.plugins.engine import EngineSpec
 
 if TYPE_CHECKING:
     from pydantic import JsonValue
@@ -13,9 +14,6 @@ if TYPE_CHECKING:
     from viewsphere.assets.deforming import Load
     from viewsphere.engines.raster.staging import RasterStage
     from viewsphere.model.shot import Shot
-
-PAINTS = tuple(PASSES)
-"""The passes that this engine paints: all."""
 
 
 def check(options: Mapping[str, JsonValue]) -> None:
@@ -33,3 +31,6 @@ def stage(shot: Shot, load: Load) -> RasterStage:
     from viewsphere.engines.raster.staging import build_stage
 
     return build_stage(shot, load)
+
+
+ENGINE = EngineSpec(check=check, stage=stage, paints=tuple(PASSES))

@@ -42,6 +42,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 from viewsphere.urls import here
@@ -53,7 +54,7 @@ ENGINE = "cycles"
 
 def check() -> None:
     """Raise UserError where there is no Blender."""
-    plugins.load("engines", ENGINE).check({})
+    plugins.load(EngineSpec, ENGINE).check({})
 
 
 def refuses(scope: Scope) -> Iterator[str]:
@@ -114,7 +115,9 @@ def _save(dataset: Dataset, folder: Path, groups: Collection[_Group]) -> Iterato
         name = group.model if counts[group.model] == 1 else f"{group.model}-{samples[0].index:06d}"
         own = shots[0].model_copy(update={"instants": instants})
         load = StoredModels.of(dataset, own, samples[0])
-        yield from plugins.load("engines", ENGINE).save(own, samples, load, folder / f"{name}.blend", dataset.name)
+        save = plugins.load(EngineSpec, ENGINE).save
+        assert save is not None
+        yield from save(own, samples, load, folder / f"{name}.blend", dataset.name)
 
 
 @dataclass(eq=False)
@@ -171,7 +174,9 @@ def _alike(shot: Shot) -> bytes:
 
 def _seen(shot: Shot, instant: int, sample: Sample) -> tuple[object, ...]:
     """The properties of a frame, besides the scene, that frames of one file share."""
-    shows_sky = plugins.load("engines", ENGINE).shows_sky(shot, shot.finish(instant))
+    sees_sky = plugins.load(EngineSpec, ENGINE).shows_sky
+    assert sees_sky is not None
+    shows_sky = sees_sky(shot, shot.finish(instant))
     lens = sample.camera.intrinsics
     models = tuple(o.key for o in sample.objects)
     return models, shows_sky, lens.width, lens.height, lens.fx / lens.fy

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
-from typing import TypeVar
 
 from pydantic import JsonValue
 
@@ -15,11 +14,12 @@ from viewsphere.composing.redraws import redraws_frames
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.errors import RecipeError
 from viewsphere.labels import Needs, channels, labels, on_request
-from viewsphere.model.channel import MATERIAL_PASSES, PASSES, PICTURES
+from viewsphere.model.channel import MATERIAL_PASSES, PASSES
 from viewsphere.model.mistakes import nearest, one_of, read_options, shown
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.suggestions import suggestion
 from viewsphere.planning.models import count_models
+from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.light import NightSky
@@ -28,8 +28,6 @@ from viewsphere.recipe.rig import SensorList
 from viewsphere.recipe.scenes import SamplerEntry, ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
 from viewsphere.recipe.weather import FogEntry
-
-Said = TypeVar("Said")
 
 
 def check_redraws(recipe: Recipe) -> None:
@@ -153,7 +151,7 @@ def check_needs(recipe: Recipe, where: str, name: str) -> None:
 
 def _check_painted(recipe: Recipe, where: str, name: str) -> None:
     """A pass needs an engine that paints it, and what surfaces are made of needs materials that viewsphere made."""
-    paints = _engine_says(recipe, "PAINTS", PICTURES)
+    paints = _engine(recipe).paints
     if name in PASSES and name not in paints:
         raise RecipeError(
             f"{where}: expected a label, or what engine: {recipe.engine.name} paints ({', '.join(paints)}); found {name}: "
@@ -168,7 +166,7 @@ def _check_painted(recipe: Recipe, where: str, name: str) -> None:
 
 def check_blend(recipe: Recipe) -> None:
     """A .blend file as the scene needs an engine that renders it."""
-    if recipe.scene.blend is not None and not _engine_says(recipe, "OPENS_SCENES", False):
+    if recipe.scene.blend is not None and not _engine(recipe).opens_scenes:
         raise RecipeError(
             f"scene.blend: expected engine: cycles, eevee or workbench, which render the file; found {recipe.engine.name}: "
             "name one of these, or take the file's meshes alone by scene.place"
@@ -180,15 +178,15 @@ def check_catcher(recipe: Recipe) -> None:
     scene = recipe.scene
     grounds = [scene.automatic_ground if ground == "auto" else ground for ground in alternatives(scene.ground)]
     catches = any(ground == "catcher" or (isinstance(ground, GroundEntry) and ground.catcher) for ground in grounds)
-    if catches and not _engine_says(recipe, "CATCHES_SHADOWS", True):
+    if catches and not _engine(recipe).catches_shadows:
         raise RecipeError(
             f"scene.ground: expected on, off or a material for engine: {recipe.engine.name}; found catcher, which auto is "
             "before background: environment: set it to off, or take engine: cycles or raster"
         )
 
 
-def _engine_says(recipe: Recipe, name: str, default: Said) -> Said:
-    return getattr(plugins.load("engines", recipe.engine.name), name, default)
+def _engine(recipe: Recipe) -> EngineSpec:
+    return plugins.load(EngineSpec, recipe.engine.name)
 
 
 def check_frames(recipe: Recipe, views: Poses) -> None:
