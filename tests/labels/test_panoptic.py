@@ -13,6 +13,7 @@ from viewsphere.labels import Sight, channels
 from viewsphere.labels.panoptic import LABEL, MOST, class_of, compute, object_of, picture, renumbered
 from viewsphere.store import encode
 from viewsphere.store.samples.channel_files import decode
+from viewsphere.truth.raster.triangle_labels import TriangleLabels
 
 NAMES = ("depth", "instances", "semantic", "panoptic")
 
@@ -36,7 +37,8 @@ def test_the_greatest_numbers_decode_exactly_also_from_a_file():
 
 def test_more_than_the_number_has_room_for_is_an_error():
     sample, geometry, visibility = random_sample(0, "pinhole", NAMES)
-    for more in ({"object_count": 65536}, {"triangle_class": geometry.triangle_class + 32768}):
+    higher = TriangleLabels((), (), (lambda: geometry.triangle_class + 32768,))
+    for more in ({"object_count": 65536}, {"labels": higher}):
         with pytest.raises(StoreError, match=r"channel panoptic: expected objects of 0\.\.65535, classes of 0\.\.32767; found"):
             compute(Sight(replace(geometry, **more), sample.camera, visibility))
 

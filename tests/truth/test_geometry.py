@@ -7,6 +7,7 @@ from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.labels import observe
 from viewsphere.truth.raster.alpha_masks import NEVER, SURFACE
+from viewsphere.truth.raster.geometry import moved
 from viewsphere.truth.raster.visibility import rasterize
 
 QUAD = [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]
@@ -229,3 +230,15 @@ def test_cutouts_of_a_mesh_that_many_things_show_are_held_once():
         seen = [rasterize(geometry, camera, object_id=object_id) for geometry in (alike, copies)]
         assert seen[0].triangle.tobytes() == seen[1].triangle.tobytes()
         assert seen[0].inverse_depth.tobytes() == seen[1].inverse_depth.tobytes()
+
+
+def test_instances_hold_no_labels_that_nothing_reads():
+    """A thousand chairs have six million triangles, and each kind of label takes 24 MB of them."""
+    mesh = cube()
+    geometry = placed(mesh, mesh, mesh, ground=True)
+    held = {"things", "meshes", "classes_behind"}
+    rasterize(geometry, orbit_camera(lens(64, 64)))
+    assert set(vars(geometry.labels)) == held
+    assert np.array_equal(geometry.triangle_part, np.tile(mesh.triangle_part + 1, 3))
+    assert set(vars(geometry.labels)) == {*held, "part"}
+    assert moved(geometry, {}).triangle_part is geometry.triangle_part

@@ -16,8 +16,10 @@ from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.raster.geometry import Geometry, build_geometry, present
 from viewsphere.truth.raster.visibility import rasterize
 
-HELD = [field.name for field in dataclasses.fields(Geometry) if field.name not in ("cutouts", "meshes", "facing", "spare")]
-ARRAYS = [*HELD, "vertices", "normals", "triangle_normals", "triangle_side", "triangle_tops"]
+UNLIKE = ("cutouts", "meshes", "labels", "facing", "spare")
+HELD = [field.name for field in dataclasses.fields(Geometry) if field.name not in UNLIKE]
+OF_LABELS = [f"triangle_{name}" for name in ("part", "category", "class", "material", "body_part")]
+ARRAYS = [*HELD, *OF_LABELS, "vertices", "normals", "triangle_normals", "triangle_side", "triangle_tops"]
 
 
 def pose(rng):

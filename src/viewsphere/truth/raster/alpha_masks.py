@@ -92,7 +92,8 @@ def stack_cutouts(parts: Sequence[tuple[Cutouts, NDArray[np.int32]]]) -> tuple[C
             firsts[id(own)] = count
             distinct.append(own)
             count += len(own.corners)
-        rows.append(np.where(own_rows >= 0, own_rows + np.int32(firsts[id(own)]), own_rows))
+        first = np.int32(firsts[id(own)])
+        rows.append(np.where(own_rows >= 0, own_rows + first, own_rows) if len(own.corners) and first else own_rows)
     return _joined(distinct), np.concatenate(rows)
 
 

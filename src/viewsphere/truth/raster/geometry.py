@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from itertools import accumulate, pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.deforming import Load
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.classes import GROUND, stuff_of, thing_class
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.alpha_masks import ENDLESS, NEVER, NO_CUTOUTS, Cutouts, cutouts_of, stack_cutouts
 from viewsphere.truth.raster.sparse import Spare
+from viewsphere.truth.raster.triangle_labels import TriangleLabels, ground_classes, scenery_classes
 
 BACKGROUND = 0
 """Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
@@ -29,15 +28,7 @@ GROUND_REACH = 1000.0
 """Scene sizes from the middle to the ground's corners: as far as a renderer without endless planes has to draw it."""
 
 OF_VERTICES = ("coordinates", "is_used")
-OF_TRIANGLES = (
-    "triangle_object",
-    "triangle_part",
-    "triangle_category",
-    "triangle_class",
-    "triangle_material",
-    "triangle_body_part",
-)
-STACKED = (*OF_VERTICES, *OF_TRIANGLES, "poses", "bounds", "ground")
+STACKED = (*OF_VERTICES, "triangle_object", "poses", "bounds", "ground")
 """Arrays of a geometry that are those of its parts, one after another."""
 
 Corner = NDArray[np.float64]
@@ -51,10 +42,9 @@ class Geometry:
     world from each thing; meshes: theirs; coordinates (V, 3) float32: each vertex in its thing's axes (zero for the ground);
     ground (4, 3) float64: its corners in the world, (0, 3) without one.
 
-    triangles (T, 3) int32; triangle_object (T,) int32: 0 for scenery and ground; triangle_part, triangle_category,
-    triangle_material, triangle_body_part int32: of the objects' triangles alone, which come first, all others have 0;
-    single_sided (n,) int32: the triangles that a camera sees from their fronts alone, see `seen_from`;
-    triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32: -1 all surface, -2 never
+    triangles (T, 3) int32; triangle_object (T,) int32: 0 for scenery and ground; single_sided (n,) int32: the triangles that a
+    camera sees from their fronts alone, see `seen_from`; labels: further numbers of triangles, of the objects' alone, which
+    come first, all others have 0, but for classes of things and stuff; triangle_cutout (T,) int32: -1 all surface, -2 never
     seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
 
     is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
@@ -73,11 +63,6 @@ class Geometry:
     ground: Corner
     triangles: NDArray[np.int32]
     triangle_object: NDArray[np.int32]
-    triangle_part: NDArray[np.int32]
-    triangle_category: NDArray[np.int32]
-    triangle_class: NDArray[np.int32]
-    triangle_material: NDArray[np.int32]
-    triangle_body_part: NDArray[np.int32]
     triangle_cutout: NDArray[np.int32]
     cutouts: Cutouts
     single_sided: NDArray[np.int32]
@@ -87,8 +72,34 @@ class Geometry:
     triangle_start: tuple[int, ...]
     object_count: int
     ground_z: float | None
+    labels: TriangleLabels
     facing: Facing
     spare: Spare
+
+    @property
+    def triangle_part(self) -> NDArray[np.int32]:
+        """Parts of the objects' models; this and the next are made when they are read first."""
+        return self.labels.part
+
+    @property
+    def triangle_category(self) -> NDArray[np.int32]:
+        """Ids of the objects' categories."""
+        return self.labels.category
+
+    @property
+    def triangle_class(self) -> NDArray[np.int32]:
+        """Classes of all triangles."""
+        return self.labels.classes[: len(self.triangles)]
+
+    @property
+    def triangle_material(self) -> NDArray[np.int32]:
+        """Materials of the objects' models."""
+        return self.labels.material
+
+    @property
+    def triangle_body_part(self) -> NDArray[np.int32]:
+        """Parts of the objects' bodies."""
+        return self.labels.body_part
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -308,7 +319,7 @@ def without_ground(geometry: Geometry) -> Geometry:
         return geometry
     vertices, triangles = geometry.vertex_start[-1], geometry.triangle_start[-1]
     kept = {name: getattr(geometry, name)[:vertices] for name in OF_VERTICES}
-    kept |= {name: getattr(geometry, name)[:triangles] for name in (*OF_TRIANGLES, "triangles", "triangle_cutout")}
+    kept |= {name: getattr(geometry, name)[:triangles] for name in ("triangle_object", "triangles", "triangle_cutout")}
     kept["ground"] = geometry.ground[:0]
     return replace(geometry, **kept, ground_z=None)
 
@@ -348,35 +359,27 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
 def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
     vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
     triangle_start = (0, *accumulate(len(m.triangles) for m in meshes))
-    triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], np.int32)
     objects = sum(p.id > 0 for p in things)
-    held = list(zip(things, meshes, strict=True))
-    labels = _joined([_labels(p, m) for p, m in held[:objects]], np.int32, 6)
-    around = [labels[:, 3], *(_classes(p, m) for p, m in held[objects:])]
     cutouts, rows = stack_cutouts(cutouts_of(meshes, label_alpha))
-    is_used = np.zeros(vertex_start[-1], np.bool_)
-    is_used[triangles] = True
     part = Geometry(
         poses=np.array([thing.world_from_object for thing in things]).reshape(-1, 4, 4),
         meshes=meshes,
-        coordinates=_joined([mesh.vertices for mesh in meshes], np.float32),
+        coordinates=np.concatenate([np.empty((0, 3), np.float32), *(mesh.vertices for mesh in meshes)], dtype=np.float32),
         ground=np.empty((0, 3)),
-        triangles=triangles,
-        triangle_object=np.concatenate([labels[:, 0], np.full(len(triangles) - len(labels), BACKGROUND, np.int32)]),
-        triangle_part=labels[:, 1],
-        triangle_category=labels[:, 2],
-        triangle_class=np.concatenate(around),
-        triangle_material=labels[:, 4],
-        triangle_body_part=labels[:, 5],
+        triangles=_offset_triangles([mesh.triangles for mesh in meshes], vertex_start),
+        triangle_object=np.repeat(np.array([thing.id for thing in things], np.int32), np.diff(triangle_start)),
         triangle_cutout=rows,
         cutouts=cutouts,
-        single_sided=_offset([_single_sided(*pair) for pair in held], triangle_start),
-        is_used=is_used,
+        single_sided=_offset([_single_sided(*pair) for pair in zip(things, meshes, strict=True)], triangle_start),
+        is_used=_are_used(meshes),
         bounds=np.empty((len(things), 2, 3)),
         vertex_start=vertex_start,
         triangle_start=triangle_start,
         object_count=objects,
         ground_z=None,
+        labels=TriangleLabels(
+            things[:objects], meshes[:objects], (cache(partial(scenery_classes, things[objects:], meshes[objects:])),)
+        ),
         facing=Facing(),
         spare=Spare(),
     )
@@ -396,7 +399,7 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in STACKED}
     return Geometry(
         **arrays,
-        triangles=np.concatenate([part.triangles + np.int32(first) for part, first in zip(parts, firsts, strict=False)]),
+        triangles=_offset_triangles([part.triangles for part in parts], firsts),
         triangle_cutout=rows,
         cutouts=cutouts,
         single_sided=_offset([part.single_sided for part in parts], first_triangles),
@@ -405,6 +408,11 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
         object_count=sum(part.object_count for part in parts),
         ground_z=parts[-1].ground_z,
         meshes=tuple(mesh for part in parts for mesh in part.meshes),
+        labels=TriangleLabels(
+            tuple(thing for part in parts for thing in part.labels.things),
+            tuple(mesh for part in parts for mesh in part.labels.meshes),
+            tuple(classes for part in parts for classes in part.labels.classes_behind),
+        ),
         facing=Facing(),
         spare=Spare(),
     )
@@ -424,19 +432,24 @@ def _offset(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int]) -> NDArra
     return np.concatenate([np.empty(0, np.int32), *moved])
 
 
-def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
-    """Object, part, category, class, material and part of a body of each triangle of an object, (T, 6)."""
-    labels = np.full((len(mesh.triangles), 6), BACKGROUND, np.int32)
-    labels[:, 0], labels[:, 1], labels[:, 2] = thing.id, mesh.triangle_part + 1, thing.model.category_id
-    labels[:, 3], labels[:, 4] = thing_class(thing.model.category_id), mesh.triangle_material + 1
-    if mesh.triangle_body_part is not None:
-        labels[:, 5] = mesh.triangle_body_part
-    return labels
+def _offset_triangles(parts: Sequence[NDArray[np.int32]], firsts: Sequence[int]) -> NDArray[np.int32]:
+    """Triangles (T, 3) of parts whose vertices begin at `firsts`, written in place: a thousand instances are large."""
+    triangles = np.empty((sum(map(len, parts)), 3), np.int32)
+    stop = 0
+    for part, first in zip(parts, firsts, strict=False):
+        start, stop = stop, stop + len(part)
+        np.add(part, np.int32(first), out=triangles[start:stop], casting="same_kind")
+    return triangles
 
 
-def _classes(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
-    """Class of each triangle of scenery, (T,)."""
-    return np.array([stuff_of(thing.model.category, part) for part in mesh.parts], np.int32)[mesh.triangle_part]
+def _are_used(meshes: Sequence[Mesh]) -> NDArray[np.bool_]:
+    """Of each vertex of these meshes, (V,): whether it is a triangle's corner; a mesh that occurs again is looked at once."""
+    known: dict[int, NDArray[np.bool_]] = {}
+    for mesh in meshes:
+        if id(mesh) not in known:
+            known[id(mesh)] = np.zeros(len(mesh.vertices), np.bool_)
+            known[id(mesh)][mesh.triangles] = True
+    return np.concatenate([np.empty(0, np.bool_), *(known[id(mesh)] for mesh in meshes)])
 
 
 def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
@@ -450,11 +463,6 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         ground=corners,
         triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
         triangle_object=background,
-        triangle_part=none,
-        triangle_category=none,
-        triangle_class=np.full(2, GROUND, np.int32),
-        triangle_material=none,
-        triangle_body_part=none,
         triangle_cutout=np.array(ENDLESS, np.int32),
         cutouts=NO_CUTOUTS,
         single_sided=none,
@@ -464,6 +472,7 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         triangle_start=(0,),
         object_count=0,
         ground_z=float(corners[0, 2]),
+        labels=TriangleLabels((), (), (ground_classes,)),
         facing=Facing(),
         spare=Spare(),
     )
@@ -489,11 +498,6 @@ def _bound(geometry: Geometry, i: int) -> None:
 
     own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
     kernels.bound(geometry.poses[i], geometry.coordinates[own], geometry.is_used[own], geometry.bounds[i])
-
-
-def _joined(arrays: Sequence[NDArray[Any]], dtype: type, width: int = 3) -> NDArray[Any]:
-    """Rows of so many numbers, one after another."""
-    return np.ascontiguousarray(np.concatenate([np.zeros((0, width), dtype), *arrays]), dtype)
 
 
 def read_only(array: NDArray[np.float32]) -> NDArray[np.float32]:
