@@ -52,8 +52,8 @@ NOTE = "<!-- written by scripts/docs; do not edit -->\n\n"
 
 def cli_page() -> str:
     text = NOTE + "# Command line\n\n"
-    text += "Exit status: 0 done, 1 a data set failed its check, 2 a mistake that can be mended, "
-    text += "3 `status` found a data set that is not finished, or a run's worker died, 130 stopped with Ctrl-C or SIGTERM.\n"
+    text += "Exit status: 0 success, 1 a data set failed its check, 2 an error that you can correct, "
+    text += "3 an unfinished data set (`status`) or a dead worker, 130 stopped with Ctrl-C or SIGTERM.\n"
     for command in app.registered_commands:
         function = command.callback
         assert function is not None
@@ -106,29 +106,29 @@ def default(value: Any) -> str:
 
 def channels_page() -> str:
     text = NOTE + (
-        "# Channels and annotations\n\nA recipe's `channels` name what is kept of each frame. Arrays have the image's height "
-        "and width; channels of several components have them last. The files are the default ones, and lossless; a recipe's "
-        "`files` choose others, see [formats.md](formats.md#files). Engines paint those up to `metallic` "
+        "# Channels and annotations\n\nChoose the channels of each frame with your recipe's `channels`. Arrays have the "
+        "image's height and width; components come last. The table has the default files, which are lossless. Set `files` in your "
+        "recipe to change them ([formats.md](formats.md#files)). Engines render the channels up to `metallic` "
         "([pictures.md](pictures.md#light-in-parts)); each of the others is one file in `src/viewsphere/labels/`.\n\n"
-        "| channel | type | components | unit | empty | file | what it is |\n|---|---|---|---|---|---|---|\n"
+        "| channel | type | components | unit | empty | file | meaning |\n|---|---|---|---|---|---|---|\n"
     )
     for c in channels().values():
         file = {"png": "PNG", "png16": "16-bit PNG", "tiff": "TIFF", "npz": "NPZ"}[c.encoding]
         of_what = "rows" if c.components == 0 else np.dtype(c.dtype)
         text += f"| `{c.name}` | {of_what} | {c.components or ''} | {c.unit} | {c.empty:g} | {file} | {c.meaning} |\n"
     text += (
-        "\n## Annotations\n\nEvery object of a frame, seen or not, has these fields. They are computed for every data set. "
-        "Beside its shot and models, the store keeps only what does not follow from them.\n\n"
-        "| field | type | unit | axes | what it is |\n|---|---|---|---|---|\n"
+        "\n## Annotations\n\nEvery object of a frame, visible or not, has these fields, in every data set. The store keeps "
+        "only values that do not follow from the shot and its models.\n\n"
+        "| field | type | unit | axes | meaning |\n|---|---|---|---|---|\n"
     )
     for label in object_labels():
         if not label.on_request:
             text += "".join(f"| {field_row(label, f)}" for f in label.fields)
     text += (
-        "\n## Annotations on request\n\nThese are computed where a recipe's `annotations` name them: "
-        "`annotations: [amodal, occluders]`. A label that nobody asks for costs nothing; those marked * follow from what every "
-        "data set has, and are attributes of its objects in any case. Each is one file in `src/viewsphere/labels/`.\n\n"
-        "| label | of | field | type | unit | axes | what it is |\n|---|---|---|---|---|---|---|\n"
+        "\n## Annotations on request\n\nRequest these with your recipe's `annotations`: `annotations: [amodal, occluders]`. "
+        "Other labels cost nothing. Labels marked * follow from data that every data set has, so you can always read them as "
+        "attributes of its objects. Each is one file in `src/viewsphere/labels/`.\n\n"
+        "| label | of | field | type | unit | axes | meaning |\n|---|---|---|---|---|---|---|\n"
     )
     for name, label in on_request().items():
         follows = "*" if isinstance(label, ObjectLabel) and label.follows else ""
@@ -168,13 +168,13 @@ def proofs_page() -> str:
 LABEL_PICTURES = "images/labels"
 PROOFS = """# Proofs of labels
 
-Each label is compared with something that knows nothing of how it is made. The table has the largest difference that the tests
-find (`benchmarks/measure_labels`); one without a unit is a share, or a number of things that differ. Besides, `viewsphere
-check` computes every label of a data set again from the exported models, and casts Embree's rays at them. Labels are the same,
-byte for byte, on all engines. Passes are what engines paint; their errors are raster's.
+Tests compare each label with an independent computation. The table has the largest difference (`benchmarks/measure_labels`); a
+difference without a unit is a share or a count. `viewsphere check` also recomputes every label of a data set from the exported
+models, and casts Embree's rays at them. Labels are the same, byte for byte, on all engines. Passes are outputs of engines;
+their errors are raster's.
 
-Costs are CPU milliseconds at 640x480 with 20 objects. One of Embree's rays through each pixel takes {:g}; finding what all
-pixels show, which all labels share, takes {:g}. Meanings and axes are in [channels and annotations](channels.md).
+Costs are CPU milliseconds at 640x480 with 20 objects. One of Embree's rays through each pixel takes {:g}; finding each pixel's
+surface, which all labels share, takes {:g}. Meanings and axes are in [channels and annotations](channels.md).
 
 | label | picture | engines | unit | largest error | compared in | CPU ms |
 |---|---|---|---|---|---|---|
@@ -285,10 +285,10 @@ def field_type(field: Field) -> str:
 def limits_page() -> str:
     """All limits and their defaults."""
     text = NOTE + (
-        "# Limits\n\nWhat files may ask for has limits, in memory, time and number. A message gives the "
-        "limit's name, its value and what was found. The variable `VIEWSPHERE_<name>` of the environment sets a limit anew, "
-        "such as `VIEWSPHERE_MAX_TRIANGLES=50000000`; a recipe says itself how many frames it may have (`max_frames`).\n\n"
-        "| Limit | Default | Of what |\n|---|---|---|\n"
+        "# Limits\n\nFiles are limited in memory, time and number, which protects you from bad files. An error gives the "
+        "limit's name, its value and the file's value. Set the environment variable `VIEWSPHERE_<name>` to change a limit, such as "
+        "`VIEWSPHERE_MAX_TRIANGLES=50000000`. Your recipe itself limits its frames (`max_frames`).\n\n"
+        "| Limit | Default | Meaning |\n|---|---|---|\n"
     )
     return text + "".join(f"| `{name}` | {limit.default:,} | {limit.meaning} |\n" for name, limit in table().items())
 
@@ -423,7 +423,7 @@ MATERIALS = re.compile(r"(<!-- materials, written by scripts/docs -->\n).*?(?=\n
 
 def materials_page() -> str:
     """The hand-written page with a table of all materials, as they are unless drawn."""
-    heads = ("material", "what it is", "in sentences", "repeats after, m", "mean linear colour", "roughness", "draws")
+    heads = ("material", "meaning", "in captions", "repeats after, m", "mean linear colour", "roughness", "draws")
     text = f"\n| {' | '.join(heads)} |\n{'|---' * len(heads)}|\n"
     for name in plugins.names("materials"):
         spec = plugins.load(MaterialSpec, name)

@@ -33,7 +33,7 @@ Changes = Annotated[
     typer.Option(
         "--set",
         metavar="FIELD=VALUE",
-        help="Set a field: 'viewpoints.elevation=[10,20]'; several times for several.",
+        help="Set a field: 'viewpoints.elevation=[10,20]'; repeatable.",
         autocompletion=completion.changes,
     ),
 ]
@@ -62,7 +62,7 @@ def _allow_scripts(allowed: bool) -> bool:
 
 
 AllowScripts = Annotated[
-    bool, typer.Option("--allow-scripts", help="Let the recipe's engine.script run: a program.", callback=_allow_scripts)
+    bool, typer.Option("--allow-scripts", help="Allow the recipe's engine.script, a program, to run.", callback=_allow_scripts)
 ]
 
 
@@ -82,7 +82,7 @@ Durability = Annotated[
     typer.Option(
         "--durability",
         metavar="none|fsync",
-        help="fsync: what is finished is whole even after a crash of the machine; slower.",
+        help="fsync: finished work survives a crash of the machine; slower.",
         callback=_keep,
         show_default=False,
     ),
@@ -102,7 +102,7 @@ FormatOptions = Annotated[
     typer.Option(
         "--format-option",
         metavar="FORMAT.OPTION=VALUE",
-        help="Set an option of a format: coco.category_ids=coco; several times for several.",
+        help="Set an option of a format: coco.category_ids=coco; repeatable.",
     ),
 ]
 

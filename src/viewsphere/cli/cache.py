@@ -26,7 +26,7 @@ class Action(StrEnum):
 
 def cache(
     action: Annotated[
-        Action, typer.Argument(help="`info`; `prune` deletes the entries used longest ago; `clear` deletes all entries.")
+        Action, typer.Argument(help="`info`; `prune` deletes the least recently used entries; `clear` deletes all entries.")
     ] = Action.INFO,
     to: Annotated[
         str | None,
@@ -34,11 +34,11 @@ def cache(
     ] = None,
     kind: Annotated[
         list[str] | None,
-        typer.Option(help="With clear: only this kind, such as light; several times for several.", show_default=False),
+        typer.Option(help="With clear: only this kind, such as light; repeatable.", show_default=False),
     ] = None,
     json_: AsJson = False,
 ) -> None:
-    """Show what the cache holds, or delete entries, which viewsphere makes again. Running commands may go on meanwhile."""
+    """Show the content of the cache, or delete entries; viewsphere makes them again. Safe while other commands run."""
     from viewsphere.caches import KINDS, budget, cache_folder
     from viewsphere.limits import limits
 

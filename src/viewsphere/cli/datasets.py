@@ -88,7 +88,7 @@ def export(
 
 
 def formats(json_: AsJson = False) -> None:
-    """List all formats: what each needs, what it holds, and what reads it."""
+    """List all formats with the channels they need, their content and their readers."""
     from viewsphere.run.listing import listed
 
     found = listed()
@@ -99,7 +99,7 @@ def formats(json_: AsJson = False) -> None:
 
 
 def plugins(json_: AsJson = False) -> None:
-    """List all plug-ins: the distribution that each comes from, and why it cannot be loaded, if so."""
+    """List all plug-ins with their distributions, and any reason why they cannot be loaded."""
     from viewsphere.plugins.overview import overview
 
     found = overview()
@@ -110,7 +110,7 @@ def plugins(json_: AsJson = False) -> None:
 
 
 def status(folder: DataFolder, json_: AsJson = False) -> None:
-    """Say how far a data set is: frames finished, under way, left out and missing, the runs at work, those that failed, and the
+    """Report the progress of a data set: finished, active, skipped and missing frames, active and failed runs, and the
     time left. Exit status 0 if nothing is missing, 3 otherwise.
     """
     from viewsphere.run.status import status as found_in
@@ -126,17 +126,17 @@ def status(folder: DataFolder, json_: AsJson = False) -> None:
 
 def check(
     folder: DataFolder,
-    sample: Annotated[int, typer.Option(min=0, help="Frames whose labels are computed again.")] = 50,
-    all_: Annotated[bool, typer.Option("--all", help="Compute the labels of all frames again.")] = False,
+    sample: Annotated[int, typer.Option(min=0, help="Number of frames to recompute labels for.")] = 50,
+    all_: Annotated[bool, typer.Option("--all", help="Recompute the labels of all frames.")] = False,
     fast: Annotated[
-        bool, typer.Option("--fast", help="Compare digests alone, of the store and of exports; no picture is decoded.")
+        bool, typer.Option("--fast", help="Compare only digests, of the store and of exports, without decoding pictures.")
     ] = False,
     mend: Annotated[
         bool, typer.Option("--repair", help="Render damaged shots again, and write damaged models and exports again.")
     ] = False,
     workers: Workers = None,
     against_cycles: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Compare N frames with Cycles' own pass of object indices; needs Blender.")
+        int, typer.Option(min=0, metavar="N", help="Compare N frames with Cycles' pass of object indices; needs Blender.")
     ] = 0,
     repaint: Annotated[
         str | None,
@@ -148,8 +148,8 @@ def check(
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:
-    """Prove a data set: digests of all files, plan, models and shots by the stored recipe, labels by the exported models, rays,
-    exports. Exit status 1 if it fails.
+    """Prove a data set: digests of all files, plan, models and shots from the stored recipe, labels from the exported models,
+    rays, exports. Exit status 1 if it fails.
     """
     from viewsphere.check import check as prove
     from viewsphere.check.repair import repair
@@ -179,11 +179,11 @@ def report(
         Path | None, typer.Option("-o", "--output", help="Page to write; default: report.html in the folder.", callback=at)
     ] = None,
     frames: Annotated[int, typer.Option(min=1, max=2000, help="Frames shown; all are counted.")] = 240,
-    proofs: Annotated[bool, typer.Option("--check/--no-check", help="Show what `check` finds.")] = True,
-    check_frames: Annotated[int, typer.Option(min=1, help="Frames that `check` reads at most, spread evenly.")] = 1000,
+    proofs: Annotated[bool, typer.Option("--check/--no-check", help="Show the findings of `check`.")] = True,
+    check_frames: Annotated[int, typer.Option(min=1, help="Most frames that `check` reads, spread evenly.")] = 1000,
     json_: AsJson = False,
 ) -> None:
-    """Write one HTML page to look at: pictures with their labels, viewpoints, distributions, models, recipe and proofs."""
+    """Write one HTML page with pictures and their labels, viewpoints, distributions, models, recipe and proofs."""
     from viewsphere.report import write_report
     from viewsphere.store import Dataset
 
@@ -204,15 +204,15 @@ def report(
 
 def view(
     folder: DataFolder,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0: any that is free.")] = 8642,
-    host: Annotated[str, typer.Option(help="Address to listen at; only this machine reaches the default.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0: any free port.")] = 8642,
+    host: Annotated[str, typer.Option(help="Address to listen at; the default is for this machine only.")] = "127.0.0.1",
     token: Annotated[
         str | None,
-        typer.Option(help="Token that a browser has to bring; default: a new one.", envvar="VIEWSPHERE_TOKEN"),
+        typer.Option(help="Token that a browser must send; default: a new one.", envvar="VIEWSPHERE_TOKEN"),
     ] = None,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
-    """Show a data set of any size in a browser, also while it is rendered, until Ctrl-C."""
+    """Show a data set of any size in a browser, also during rendering, until Ctrl-C."""
     import webbrowser
 
     from viewsphere.view import Address, Live, Server

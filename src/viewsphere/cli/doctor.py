@@ -24,18 +24,20 @@ LEFT = 12
 def doctor(
     setup_blender: Annotated[
         bool,
-        typer.Option("--setup-blender", help="First make a Python environment with Blender in your data folder (about 1 GB)."),
+        typer.Option(
+            "--setup-blender", help="First create a Python environment with Blender in your data folder (about 1 GB)."
+        ),
     ] = False,
     setup_people: Annotated[
         bool,
         typer.Option(
             "--setup-people",
-            help="First fetch MakeHuman's bodies (CC0; 48 MB, of which 2 stay in the cache), of which zoo:person is made then.",
+            help="First download MakeHuman's bodies for zoo:person (CC0; 48 MB, 2 MB kept in the cache).",
         ),
     ] = False,
     json_: AsJson = False,
 ) -> None:
-    """Say what works on this machine: processor, kernels, optional packages, Blender. What is missing is no error."""
+    """Report features that work on this machine: processor, kernels, optional packages, Blender. Missing ones are no error."""
     if setup_blender:
         _set_up_blender()
     if setup_people:

@@ -27,13 +27,13 @@ def merge(
     folders: Annotated[list[Path], typer.Argument(help="Data sets to join, two or more.", show_default=False)],
     output: NewFolder = None,
     mixed: Annotated[bool, typer.Option(help="Join data sets of different cameras or channels.")] = False,
-    keep_going: Annotated[bool, typer.Option(help="Take what unfinished data sets hold.")] = False,
+    keep_going: Annotated[bool, typer.Option(help="Use the finished frames of unfinished data sets.")] = False,
     format_: Formats = None,
     format_option: FormatOptions = None,
     durability: Durability = None,
     json_: AsJson = False,
 ) -> None:
-    """Join data sets into a new one: categories by name, models by content. The pictures are linked, the sources only read."""
+    """Join data sets into a new one: categories by name, models by content. Links pictures and leaves the sources unchanged."""
     from viewsphere.run.merging import merge as join
 
     target, formats = _needed(output), with_options(asked_formats(format_) or (), format_option)
@@ -55,20 +55,20 @@ def import_(
         str,
         typer.Argument(
             metavar="FORMAT",
-            help="What it is: a format that `viewsphere formats` says can be imported.",
+            help="Format of the data set; `viewsphere formats` lists importable formats.",
             show_default=False,
             autocompletion=completion.formats,
         ),
     ],
     source: Annotated[Path, typer.Argument(help="Folder of the data set, or COCO's JSON file.", show_default=False)],
     output: NewFolder = None,
-    keep_going: Annotated[bool, typer.Option(help="Leave out what is broken.")] = False,
+    keep_going: Annotated[bool, typer.Option(help="Skip broken entries.")] = False,
     format_: Formats = None,
     format_option: FormatOptions = None,
     durability: Durability = None,
     json_: AsJson = False,
 ) -> None:
-    """Open a data set that was made elsewhere, to merge it with others, look at it and export it. The pictures are linked."""
+    """Open a data set made elsewhere, so that you can merge, view and export it. Links the pictures."""
     from viewsphere.run.importing import import_dataset
 
     target, formats = _needed(output), with_options(asked_formats(format_) or (), format_option)
@@ -91,7 +91,7 @@ def convert(
         typer.Option(
             "--from",
             metavar="FORMAT",
-            help="What it is: a format that `viewsphere formats` says can be imported.",
+            help="Format of the data set; `viewsphere formats` lists importable formats.",
             show_default=False,
             autocompletion=completion.formats,
         ),
@@ -104,14 +104,12 @@ def convert(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the formats' folders.", show_default=False, callback=at)
     ] = None,
-    keep_going: Annotated[bool, typer.Option(help="Leave out what is broken.")] = False,
+    keep_going: Annotated[bool, typer.Option(help="Skip broken entries.")] = False,
     workers: Workers = None,
     durability: Durability = None,
     json_: AsJson = False,
 ) -> None:
-    """Write a data set that was made elsewhere in other formats, each in a folder of its name, and nothing else. The pictures
-    are linked or copied.
-    """
+    """Convert a data set made elsewhere to other formats, each in a folder of its name. Links or copies the pictures."""
     from viewsphere.run.converting import convert as write_formats
     from viewsphere.run.exporting import writable_formats
     from viewsphere.run.importing import readable_formats

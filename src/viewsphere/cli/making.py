@@ -52,14 +52,14 @@ def new(
     folder: Annotated[
         Path | None,
         typer.Argument(
-            help="Folder to make the recipe in; with --from by default that of PATH with -again behind it, here.",
+            help="Folder for the recipe; with --from, the default is <name of PATH>-again.",
             show_default=False,
         ),
     ] = None,
     kind: Annotated[
         str | None,
         typer.Option(
-            help="What for: poses (the default), detector, pose6d, in-memory, blender.",
+            help="Task: poses (the default), detector, pose6d, in-memory, blender.",
             autocompletion=completion.starts,
             show_default=False,
         ),
@@ -74,7 +74,7 @@ def new(
         ),
     ] = None,
 ) -> None:
-    """Write a commented recipe to start from, of the models in FOLDER if any lie there; or one of a data set."""
+    """Write a commented recipe to start from, with the models in FOLDER if there are any; or a recipe of a data set."""
     if from_ is not None:
         if kind is not None:
             raise UserError(f"new: expected --kind or --from; found --kind {kind} and --from {from_[0]}: leave one of them out")
@@ -143,7 +143,7 @@ def inspect(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Where the picture goes; default: beside you, <model>-sides.png."),
+        typer.Option("-o", "--output", help="Picture to write; default: <model>-sides.png in the current folder."),
     ] = None,
     up: Annotated[
         str | None, typer.Option(help="Up axis, such as +z; default: the format's.", autocompletion=completion.axes)
@@ -154,12 +154,10 @@ def inspect(
     unit: Annotated[
         str | None, typer.Option(help="Unit of the file: m, cm, mm, in, ft or metres in one; default: the file's.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Which draw of a zoo family.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed for a zoo family.")] = 0,
     rig: Annotated[
         Path | None,
-        typer.Option(
-            help="Instead of a model: a recipe, whose sensors are shown, also as <recipe>-rig.glb.", show_default=False
-        ),
+        typer.Option(help="Instead of a model: a recipe; shows its sensors and writes <recipe>-rig.glb.", show_default=False),
     ] = None,
     changes: Changes = None,
     json_: AsJson = False,
@@ -218,20 +216,23 @@ def plan(
     recipe: RecipeFile,
     changes: Changes = None,
     estimate: Annotated[
-        bool, typer.Option("--estimate", help="Also make a few frames in a temporary folder, and say what all will take.")
+        bool,
+        typer.Option(
+            "--estimate", help="Also render a few frames in a temporary folder, and estimate the total time and size."
+        ),
     ] = False,
     models: Annotated[
         bool,
-        typer.Option("--models", help="Also read every model: report unusable files, and cameras inside of models."),
+        typer.Option("--models", help="Also read every model; report unusable files and cameras inside models."),
     ] = False,
     workers: Annotated[
         int | None,
-        typer.Option(min=0, help="Processes that the estimate is for; default: one a core.", show_default=False),
+        typer.Option(min=0, help="Processes to estimate for; default: one a core.", show_default=False),
     ] = None,
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:
-    """Report what a recipe would make: models, poses, frames, splits. No mesh is read without --models or --estimate."""
+    """Report a recipe's models, poses, frames and splits. Reads no mesh without --models or --estimate."""
     with pause_collection():
         from viewsphere.planning.plan import check_sidecars
         from viewsphere.run.opening import check_formats, prepare
@@ -273,26 +274,26 @@ def preview(
         Path, typer.Argument(help="Recipe (YAML), or a folder or URL that `render` wrote.", show_default=False, callback=at)
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Picture to write.")] = Path("preview.png"),
-    count: Annotated[int, typer.Option("-n", "--count", min=1, help="Frames shown; of sequences instants.")] = 12,
+    count: Annotated[int, typer.Option("-n", "--count", min=1, help="Frames shown; for sequences, instants.")] = 12,
     draw: Annotated[
         list[str] | None,
         typer.Option(
-            help="Label to draw: boxes, boxes3d, masks, depth, normals, parts, flow, ...; several times for several.",
+            help="Label to draw: boxes, boxes3d, masks, depth, normals, parts, flow, ...; repeatable.",
             autocompletion=completion.drawings,
         ),
     ] = None,
-    columns: Annotated[int, typer.Option(min=1, help="Pictures in a row; of a sequence instants.")] = 4,
+    columns: Annotated[int, typer.Option(min=1, help="Pictures in a row; for sequences, instants.")] = 4,
     video: Annotated[
         Path | None,
         typer.Option(help="Instead of a picture: a video of a data set's sequences, .mp4 or .webp.", show_default=False),
     ] = None,
     sequence: Annotated[
-        str | None, typer.Option(help="Only this sequence, in the video; default: one after another.", show_default=False)
+        str | None, typer.Option(help="Sequence for the video; default: all, one after another.", show_default=False)
     ] = None,
     changes: Changes = None,
     allow_scripts: AllowScripts = False,
 ) -> None:
-    """Write a contact sheet (of sequences, filmstrips): a recipe's frames rendered small, or a data set's; or a video."""
+    """Write a contact sheet of a recipe's frames, rendered small, or of a data set's; filmstrips for sequences; or a video."""
     from viewsphere.labels import is_shown
     from viewsphere.preview import Earlier, contact_sheet, dataset_samples, films_of, preview_samples, small_objects
     from viewsphere.store import Dataset
@@ -352,14 +353,12 @@ def render(
         int | None,
         typer.Option(
             min=0,
-            help="Processes; default: one a core, none for short work. 0: this one. With --ray: CPUs at most; default: all.",
+            help="Processes; default: one a core, none for short work. 0: this one. With --ray: most CPUs; default: all.",
             show_default=False,
         ),
     ] = None,
-    keep_going: Annotated[bool, typer.Option(help="Leave out models that cannot be used.")] = False,
-    append: Annotated[
-        bool, typer.Option("--append", help="Add what a finished data set lacks: models, poses, channels.")
-    ] = False,
+    keep_going: Annotated[bool, typer.Option(help="Skip unusable models.")] = False,
+    append: Annotated[bool, typer.Option("--append", help="Add models, poses and channels to a finished data set.")] = False,
     durability: Durability = None,
     shard: Annotated[
         str | None,
