@@ -107,8 +107,8 @@ def default(value: Any) -> str:
 def channels_page() -> str:
     text = NOTE + (
         "# Channels and annotations\n\nChoose the channels of each frame with your recipe's `channels`. Arrays have the "
-        "image's height and width; components come last. The table has the default files, which are lossless. Set `files` in your "
-        "recipe to change them ([formats.md](formats.md#files)). Engines render the channels up to `metallic` "
+        "image's height and width; components come last. The table has the default files, which are lossless. Set `files` in "
+        "your recipe to change them ([formats.md](formats.md#files)). Engines render the channels up to `metallic` "
         "([pictures.md](pictures.md#light-in-parts)); each of the others is one file in `src/viewsphere/labels/`.\n\n"
         "| channel | type | components | unit | empty | file | meaning |\n|---|---|---|---|---|---|---|\n"
     )
@@ -286,8 +286,8 @@ def limits_page() -> str:
     """All limits and their defaults."""
     text = NOTE + (
         "# Limits\n\nFiles are limited in memory, time and number, which protects you from bad files. An error gives the "
-        "limit's name, its value and the file's value. Set the environment variable `VIEWSPHERE_<name>` to change a limit, such as "
-        "`VIEWSPHERE_MAX_TRIANGLES=50000000`. Your recipe itself limits its frames (`max_frames`).\n\n"
+        "limit's name, its value and the file's value. Set the environment variable `VIEWSPHERE_<name>` to change a limit, such "
+        "as `VIEWSPHERE_MAX_TRIANGLES=50000000`. Your recipe itself limits its frames (`max_frames`).\n\n"
         "| Limit | Default | Meaning |\n|---|---|---|\n"
     )
     return text + "".join(f"| `{name}` | {limit.default:,} | {limit.meaning} |\n" for name, limit in table().items())
