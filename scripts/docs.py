@@ -286,8 +286,8 @@ def limits_page() -> str:
     """All limits and their defaults."""
     text = NOTE + (
         "# Limits\n\nFiles are limited in memory, time and number, which protects you from bad files. An error gives the "
-        "limit's name, its value and the file's value. Set the environment variable `VIEWSPHERE_<name>` to change a limit, such "
-        "as `VIEWSPHERE_MAX_TRIANGLES=50000000`. Your recipe itself limits its frames (`max_frames`).\n\n"
+        "limit's name, its value and the file's value. Set the environment variable `VIEWSPHERE_<name>` to change a limit, "
+        "such as `VIEWSPHERE_MAX_TRIANGLES=50000000`. Your recipe itself limits its frames (`max_frames`).\n\n"
         "| Limit | Default | Meaning |\n|---|---|---|\n"
     )
     return text + "".join(f"| `{name}` | {limit.default:,} | {limit.meaning} |\n" for name, limit in table().items())
