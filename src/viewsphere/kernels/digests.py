@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import sys
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -32,9 +34,20 @@ def sources_digest(file: str) -> str:
 def package_digest(folder: Path) -> str:
     """A digest of every Python source in a folder, and of the build."""
     digest = hashlib.sha256(repr(BUILD).encode())
-    for source in sorted(folder.rglob("*.py")):
-        digest.update(f"{source.relative_to(folder).as_posix()}\0".encode() + read_bytes(source))
+    for name in sorted(_python_files(str(folder))):
+        with open(f"{folder}{os.sep}{name}", "rb", buffering=0) as source:  # noqa: PTH123 # a thousand files: Path takes 4 times as long
+            digest.update(f"{name}\0".encode() + source.read())
     return digest.hexdigest()
+
+
+def _python_files(folder: str, below: str = "") -> Iterator[str]:
+    """The names of all Python sources below a folder, with slashes."""
+    with os.scandir(f"{folder}{os.sep}{below}") as entries:
+        for entry in entries:
+            if entry.name.endswith(".py"):
+                yield below + entry.name
+            elif entry.is_dir() and entry.name != "__pycache__":
+                yield from _python_files(folder, f"{below}{entry.name}/")
 
 
 def _named(source: Path) -> tuple[str, bytes]:
