@@ -22,7 +22,7 @@ from viewpoint_readers import read as read_mat
 from proven import close, equal, told
 from quick import quick
 from viewsphere import Dataset, generate
-from viewsphere.assets.metadata.traits import said_of
+from viewsphere.assets.metadata.sidecars import said_of
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.planning.plan import plan

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.paths.inside import split_source
-from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.readers import usd
 from viewsphere.errors import ModelError
+
+if TYPE_CHECKING:
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.assets.paths.folder import ModelFolder
+    from viewsphere.assets.primitive import FileFacts
 
 SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")
 BLENDER_SUFFIXES = ("abc", "blend", "fbx", "usd", "usda", "usdc", "usdz")
@@ -71,6 +74,8 @@ def load_model(
     `limits` allows.
     """
     suffix = check_source(path)
+    from viewsphere.assets.paths.folder import ModelFolder
+
     file, inside = split_source(path)
     # NaN and infinity are found and reported once the whole file is read.
     with np.errstate(all="ignore"):
@@ -95,6 +100,8 @@ def load_frames(
     Otherwise as `load_model`; ModelError for files that cannot move.
     """
     suffix = check_animated(path)
+    from viewsphere.assets.paths.folder import ModelFolder
+
     file, inside = split_source(path)
     folder = ModelFolder(file, confined, inside, shown, clip, fps)
     with np.errstate(all="ignore"):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.assets.cache import kept
+from viewsphere.assets.clip import Clip, Timeline
 from viewsphere.assets.load import ANIMATED_SUFFIXES, GLTF, USD, check_animated, needs_blender
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.paths.inside import split_source
@@ -20,35 +21,6 @@ from viewsphere.assets.readers.gltf.document import Document
 from viewsphere.assets.sandbox.client import timeline_apart
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import ModelError
-
-
-@dataclass(frozen=True)
-class Clip:
-    """One of a file's animations: its name, and its first and last frame."""
-
-    name: str
-    first: int
-    last: int
-
-
-@dataclass(frozen=True)
-class Timeline:
-    """First and last frame of a file, its frames a second, whether anything in it moves, and its animations."""
-
-    first: int
-    last: int
-    fps: float
-    moves: bool
-    clips: tuple[Clip, ...] = ()
-
-    def seconds(self, frame: int) -> float:
-        """Seconds from the first frame to this one."""
-        return (frame - self.first) / self.fps
-
-
-def no_animation(file: object) -> str:
-    """What is wrong with a file that is to play an animation, and in which nothing moves; it follows the recipe's field."""
-    return f"expected a file in which something moves; found no animation in {file}"
 
 
 @dataclass(eq=False)

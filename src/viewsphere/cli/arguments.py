@@ -54,9 +54,9 @@ Version = Annotated[
 
 def _allow_scripts(allowed: bool) -> bool:
     """Let scripts of recipes run in this process, and in those that it starts."""
-    from viewsphere.blender.interpreter import SCRIPTS
-
     if allowed:
+        from viewsphere.blender.interpreter import SCRIPTS
+
         os.environ[SCRIPTS] = "1"
     return allowed
 
@@ -128,7 +128,7 @@ def split(names: str | None) -> tuple[str, ...] | None:
 
 def asked_formats(formats: str | None, option: str = "--format") -> tuple[str, ...] | None:
     """The formats that an option names, None for None; UserError names one that cannot be written."""
-    from viewsphere.run.exporting import writable
+    from viewsphere.run.writable import writable
 
     asked = split(formats)
     for name in asked or ():

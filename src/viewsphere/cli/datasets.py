@@ -65,7 +65,7 @@ def export(
 ) -> None:
     """Write a finished or half-finished data set, or some of its frames, in other formats, without rendering."""
     from viewsphere.run.exporting import export as write_formats
-    from viewsphere.run.exporting import writable_formats
+    from viewsphere.run.writable import writable_formats
     from viewsphere.store import Choice, Dataset, frame_ranges
 
     names = asked_formats(format_)

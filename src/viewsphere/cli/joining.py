@@ -111,8 +111,8 @@ def convert(
 ) -> None:
     """Convert a data set made elsewhere to other formats, each in a folder of its name. Links or copies the pictures."""
     from viewsphere.run.converting import convert as write_formats
-    from viewsphere.run.exporting import writable_formats
     from viewsphere.run.importing import readable_formats
+    from viewsphere.run.writable import writable_formats
 
     if kind is None:
         raise UserError(f"--from: expected one of {', '.join(readable_formats())}; found none")

@@ -10,7 +10,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.cache import load_normalised
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import projected_bounds
@@ -47,6 +46,8 @@ class Shape:
 @lru_cache(maxsize=64)
 def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> Shape:
     """The shape of a model at a time step; the last ones are kept. Raises ModelError if its file cannot be used."""
+    from viewsphere.assets.cache import load_normalised  # which loads readers of models
+
     spec, step = shown
     mesh = load_normalised(spec, build_zoo_model, step=step)
     is_used = np.zeros(len(mesh.vertices), np.bool_)

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, chain, groupby, pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from viewsphere.assets.timeline import Blenders, Timeline, no_animation
+from viewsphere.assets.clip import Timeline, no_animation
 from viewsphere.composing.viewpoints.poses import Poses, RepeatedPoses
 from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.model.instant import Moment, Viewpoint
@@ -20,6 +21,9 @@ from viewsphere.recipe.models import ZOO, ModelEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.time import Frames, Steps, chosen_frames
 from viewsphere.zoo import file_of
+
+if TYPE_CHECKING:
+    from viewsphere.assets.timeline import Blenders
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,8 @@ def timed(
     """
     if not is_animated(recipe):
         return tuple(spec for spec, _ in models), (None,) * len(models), views
+    from viewsphere.assets.timeline import Blenders  # which loads readers of models
+
     with Blenders.none_yet() as blenders:
         scene = tuple(_scene_steps(recipe, blenders))
 

@@ -7,15 +7,12 @@ add a label by an entry point of the group `viewsphere.labels` that names such a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Container
 from functools import cache
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from viewsphere import plugins
+from viewsphere.homes import names_of
 from viewsphere.labels._field import Field
 from viewsphere.labels._ids import IdKind, by_number, by_table, in_attributes, in_column, renumbered
 from viewsphere.labels._label import (
@@ -30,24 +27,15 @@ from viewsphere.labels._label import (
     ObjectLabel,
     Picture,
     SampleLabel,
-    later,
 )
-from viewsphere.labels._passes import DRAWINGS
 from viewsphere.labels._placement import Placement, view_of
-from viewsphere.labels._record import Makers, computed, finite, from_short_record, from_whole_record, short_record, whole_record
-from viewsphere.labels._sight import Around, Sight
-from viewsphere.model.camera import Camera
+from viewsphere.labels._record import Makers, finite, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel, picture_of
-from viewsphere.model.keypoints import Keypoints
-from viewsphere.model.looks import Looks
-from viewsphere.model.model_spec import Size
-from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.shot import Shot
-from viewsphere.model.symmetries import Symmetries
-from viewsphere.model.thing import Thing
-from viewsphere.model.traits import Traits
-from viewsphere.truth.raster.geometry import Geometry
-from viewsphere.truth.raster.visibility import Visibility
+from viewsphere.model.sample import Sample
+
+if TYPE_CHECKING:
+    from viewsphere.labels._computing import annotated, observe, sample_values, sight_of
+    from viewsphere.labels._sight import Sight
 
 __all__ = [
     "TAIL",
@@ -78,8 +66,11 @@ __all__ = [
     "from_whole_record",
     "in_attributes",
     "in_column",
+    "is_channel",
     "is_in",
+    "is_on_request",
     "is_shown",
+    "label_named",
     "labels",
     "labels_of",
     "makers",
@@ -95,16 +86,46 @@ __all__ = [
     "whole_record",
 ]
 
+_COMPUTING = "viewsphere.labels._computing"
+__getattr__ = names_of(
+    __name__,
+    {
+        "Sight": "viewsphere.labels._sight",
+        "annotated": _COMPUTING,
+        "observe": _COMPUTING,
+        "sample_values": _COMPUTING,
+        "sight_of": _COMPUTING,
+    },
+)
+
 
 @cache
 def labels() -> dict[str, Label]:
     """All labels by name, first the channels that recipes keep by default, then the others in alphabetical order."""
     names = sorted(plugins.names("labels"), key=lambda name: (name not in DEFAULT_CHANNELS, name))
-    found: dict[str, Label] = {name: plugins.load("labels", name).LABEL for name in names}
-    for name, label in found.items():
-        if label.name != name:
-            raise ValueError(f"label {name!r}: expected the name of its file, found {label.name!r}")
-    return found
+    return {name: label for name in names if (label := label_named(name))}
+
+
+@cache
+def label_named(name: str) -> Label | None:
+    """The label of this name, None where there is none; loads no other."""
+    if name not in plugins.names("labels"):
+        return None
+    label: Label = plugins.load("labels", name).LABEL
+    if label.name != name:
+        raise ValueError(f"label {name!r}: expected the name of its file, found {label.name!r}")
+    return label
+
+
+def is_on_request(name: str) -> bool:
+    """True for a label that a recipe's `annotations` may name."""
+    label = label_named(name)
+    return isinstance(label, SampleLabel) or (isinstance(label, ObjectLabel) and label.on_request)
+
+
+def is_channel(name: str) -> bool:
+    """True for a channel that a recipe's `channels` may name: a pass, or a label of pixels."""
+    return name in PASSES or isinstance(label_named(name), ChannelLabel)
 
 
 @cache
@@ -151,6 +172,8 @@ def channels() -> dict[str, Channel]:
 @cache
 def drawable() -> dict[str, Drawing]:
     """The drawings of all labels and passes that have one, by the name of the label or pass, in alphabetical order."""
+    from viewsphere.labels._passes import DRAWINGS  # which loads what develops pictures
+
     found = {name: label.drawing for name, label in labels().items() if label.drawing}
     return dict(sorted((found | DRAWINGS).items()))
 
@@ -176,128 +199,3 @@ def alone(channels: Container[str]) -> Callable[[Sample, int], Picture] | None:
 def is_shown(channels: Container[str]) -> bool:
     """Whether samples with these channels have a picture, or something that stands for it."""
     return picture_of(channels) is not None or alone(channels) is not None
-
-
-def observe(
-    geometry: Geometry,
-    camera: Camera,
-    visibility: Visibility,
-    names: Iterable[str],
-    around: Around | None = None,
-    options: Mapping[str, Mapping[str, Any]] | None = None,
-) -> dict[str, NDArray[Any]]:
-    """The named labels of pixels, each (H, W) or (H, W, components) as its file says.
-
-    `visibility` is `rasterize(geometry, camera)`; `around`: what labels of motion and of stereo pairs compare it with;
-    `options`: those of labels, by their names. The array of `instances` is shared with the visibility and must not be written
-    to. Raises ValueError for names that are no labels of pixels.
-    """
-    known, names = channel_labels(), tuple(names)
-    sight = Sight(geometry, camera, visibility, around=around, options=options or {})
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise ValueError(f"channel {unknown[0]!r}: expected one of {', '.join(known)}")
-    return {name: known[name].compute(sight) for name in names}
-
-
-def sight_of(
-    shot: Shot,
-    instant: int,
-    camera: Camera,
-    geometry: Geometry,
-    visibility: Visibility,
-    boxes: Sequence[NDArray[np.float64]],
-    models: Sequence[str],
-    real_sizes: Sequence[Size | None] | None = None,
-    around: Around | None = None,
-    traits: Sequence[Callable[[], Traits]] | None = None,
-) -> Sight:
-    """What a camera sees of a shot at an instant (counted from 0 there), with the places of its objects.
-
-    `boxes[i]` is the 3D box (8, 3) of object i + 1's model then in the object's axes, `models[i]` the path of that model in the
-    data set, `real_sizes[i]` its true size (by default the one its spec gives in numbers), and `traits[i]` gives what it says
-    of itself to labels that ask for it; `geometry` is the shot's stage and `visibility` what this camera sees of it.
-    """
-    objects = shot.objects
-    if not len(objects) == len(boxes) == len(models) == geometry.object_count:
-        raise ValueError(
-            f"sight_of: shot {shot.key}: expected {geometry.object_count} objects, boxes and models, "
-            f"got {len(objects)}, {len(boxes)}, {len(models)}"
-        )
-    sizes = real_sizes or [None if isinstance(thing.model.real_size, str) else thing.model.real_size for thing in objects]
-    facts = [
-        Rendered(model, box, size, thing.model.category, thing.model.category_id, _track(thing, instant), said)
-        for thing, box, model, size, said in zip(objects, boxes, models, sizes, traits or [_unsaid] * len(objects), strict=True)
-    ]
-    places = tuple(
-        None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known, step)
-        for thing, known in zip(objects, facts, strict=True)
-        for pose, step in ((thing.motion.at(instant), thing.motion.step_at(instant)),)
-    )
-    return Sight(geometry, camera, visibility, places, around, shot.annotations, shot.labels)
-
-
-def _unsaid() -> Traits:
-    raise ValueError("expected what the model says of itself; sight_of() was not given it")
-
-
-def _track(thing: Thing, instant: int) -> str:
-    """The key of the thing's model where it shows a time step, else empty."""
-    return thing.model.key if thing.motion.step_at(instant) else ""
-
-
-def annotated(sight: Sight) -> tuple[ObjectAnnotation, ...]:
-    """Annotations of the objects that are placed in a sight, visible or not, in the order of their ids. An object that covers
-    no pixel has an empty mask, no `box2d` and visibility 0.
-    """
-    seen = [label for label in labels_of(sight.asked) if label.compute is not later]
-    every = Makers(makers(), sight.asked, "this frame")
-    return tuple(
-        computed(i + 1, [label.compute(sight, i) for label in seen], place, every)
-        for i, place in enumerate(sight.placements)
-        if place
-    )
-
-
-def sample_values(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
-    """The fields of the labels of whole pictures that were asked for; `objects` are `annotated(sight)`."""
-    found: dict[str, Any] = {}
-    for name, label in sample_labels().items():
-        if name in sight.asked:
-            found |= label.compute(sight, objects)
-    return found
-
-
-@dataclass(frozen=True, eq=False)
-class Rendered:
-    """`ModelFacts` of a model that is rendered."""
-
-    obj: str
-    box3d_object: NDArray[np.float64]
-    real_size: Size | None
-    category: str
-    category_id: int
-    track: str
-    traits: Callable[[], Traits]
-    materials: tuple[str, ...] = ()
-    body_parts: tuple[str, ...] = ()
-
-    @property
-    def diameter(self) -> float:
-        """The largest distance between two vertices, metres."""
-        return self.traits().diameter
-
-    @property
-    def symmetries(self) -> Symmetries | None:
-        """Motions that leave the model as it is."""
-        return self.traits().symmetries
-
-    @property
-    def keypoints(self) -> Keypoints | None:
-        """Named points."""
-        return self.traits().keypoints
-
-    @property
-    def looks(self) -> Looks | None:
-        """What it looks like."""
-        return self.traits().looks()

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,11 @@ from numpy.typing import NDArray
 from viewsphere.assets.appearance.looks import words
 from viewsphere.geometry.box import Bounds
 from viewsphere.labels._placement import ModelFacts
-from viewsphere.labels._sight import Sight
 from viewsphere.labels._words import noun_of, noun_phrase
 from viewsphere.model.sample import ObjectAnnotation
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 SEEN = 16
 """Visible pixels from which on an object is told of, if enough of it is visible."""

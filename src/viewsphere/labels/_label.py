@@ -13,13 +13,14 @@ from viewsphere.errors import ViewsphereError
 from viewsphere.labels._field import Field
 from viewsphere.labels._ids import Ids, check_ids, has_whole_numbers
 from viewsphere.labels._placement import ModelFacts, Placement
-from viewsphere.labels._sight import Sight
 from viewsphere.model.channel import Channel
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 Array = NDArray[Any]
 Picture = NDArray[np.uint8]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, Picture, channel_of
-from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 TOLERANCE = 1e-5
 """How far the sum of weights may be from 1, as a share of the largest one: those of a ground that reaches to the horizon are

@@ -9,11 +9,12 @@ from viewsphere.geometry.mask import mask_box, rle_box
 from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
-from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:

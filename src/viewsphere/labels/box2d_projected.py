@@ -10,12 +10,13 @@ from viewsphere.geometry.mask import mask_box
 from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
-from viewsphere.labels._sight import Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import Field as Limits
@@ -43,12 +43,14 @@ from viewsphere.labels._sentences import (
     wrong,
     wrong_count,
 )
-from viewsphere.labels._sight import Around, Sight
 from viewsphere.labels._words import capital, listed, noun_of, number, plural, with_article
 from viewsphere.model.classes import SKY, STUFF_IDS
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Natural, Portion
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Around, Sight
 
 MOST = 100
 """Sentences about one picture."""

@@ -15,11 +15,12 @@ from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
 from viewsphere.labels._lines import arrow, middle
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
-from viewsphere.labels._sight import Alone, Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Alone, Sight
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,10 @@ from numpy.typing import NDArray
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.labels._nearness import extent, picture
-from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from statistics import NormalDist
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,12 @@ from pydantic import Field as Limits
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels._chance import generator
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
-from viewsphere.labels._sight import Sight
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Natural, Number
 from viewsphere.model.sample import Sample
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 Float = NDArray[np.float64]
 Draw = Callable[[str], Float]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
-from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 from viewsphere.truth.surface_points.raster import in_lens
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

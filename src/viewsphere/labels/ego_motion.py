@@ -12,12 +12,13 @@ from viewsphere.geometry.rotation import compose, rigid, rotation_vector
 from viewsphere.labels._field import Field
 from viewsphere.labels._inset import NEXT, OWN, PREVIOUS, inset
 from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
-from viewsphere.labels._sight import Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 TOLERANCE = 1e-9
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels import _flow
 from viewsphere.labels._label import ChannelLabel, Needs
-from viewsphere.labels._sight import Sight
 from viewsphere.labels._wheel import drawing
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

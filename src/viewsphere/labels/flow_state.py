@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels import _state
 from viewsphere.labels._label import ChannelLabel, Needs
-from viewsphere.labels._sight import Sight
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.uint8]:

@@ -15,7 +15,6 @@ from viewsphere.labels._field import Field
 from viewsphere.labels._label import Drawing, Models, Needs, ObjectLabel, rendered
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
-from viewsphere.labels._sight import Sight
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Number
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -24,6 +23,8 @@ from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VI
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 Float = NDArray[np.float64]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,12 @@ from viewsphere.labels._chance import generator
 from viewsphere.labels._from_above import from_above
 from viewsphere.labels._ids import in_column
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
-from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.lidar import POINT, Lidar
 from viewsphere.model.sample import Sample
 from viewsphere.truth.lidar.sweeping import Hits, still_hits, swept_hits
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Around, Sight
 
 Float = NDArray[np.float64]
 Rays = tuple[NDArray[np.intp], NDArray[np.intp]]

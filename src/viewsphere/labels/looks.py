@@ -11,12 +11,13 @@ from viewsphere.labels._label import Drawing, Models, Needs, ObjectLabel, render
 from viewsphere.labels._lines import note
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
-from viewsphere.labels._sight import Sight
 from viewsphere.model.looks import LONGEST
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:

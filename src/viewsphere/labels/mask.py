@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from viewsphere.geometry.mask import mask_polygons, rle_area, rle_of_part, rle_r
 from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, Picture, channel_of
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
-from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Rle, Sample
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels._directions import drawing, unit_proof
 from viewsphere.labels._label import ChannelLabel
-from viewsphere.labels._sight import Sight
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

@@ -14,11 +14,12 @@ from viewsphere.labels._field import Field
 from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
-from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 TOLERANCE = 1e-6
 """Pixels by which rounding may push a corner."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,11 @@ from viewsphere.labels._classes import KEY, colored, with_classes, wrong_classes
 from viewsphere.labels._ids import by_table
 from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Picture, channel_of
 from viewsphere.labels._paint import color_of
-from viewsphere.labels._sight import Sight
 from viewsphere.model.classes import SKY
 from viewsphere.model.sample import Sample
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 BITS = 16
 """Of an object's id; the class is above them."""

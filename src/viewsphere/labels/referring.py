@@ -28,7 +28,6 @@ from viewsphere.labels._ids import in_attributes
 from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
 from viewsphere.labels._lines import note
 from viewsphere.labels._paint import color_of
-from viewsphere.labels._sight import Sight
 from viewsphere.labels._words import noun_of, noun_phrase
 from viewsphere.model.camera import Scan
 from viewsphere.model.frozen import Frozen
@@ -37,6 +36,8 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 APART = 0.02
 """Share of the picture's width by which the leftmost and the rightmost are apart from the next."""

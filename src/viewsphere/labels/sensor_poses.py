@@ -14,11 +14,12 @@ from viewsphere.labels._inset import OWN, inset
 from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
 from viewsphere.labels._lines import axes
 from viewsphere.labels._paint import color_of
-from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 TOLERANCE = 1e-9
 

@@ -13,13 +13,14 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.labels._ids import in_column
 from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Needs, channel_of, rendered
 from viewsphere.labels._paint import color_of
-from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.surface_samples import SURFACE_SAMPLE, SurfaceSamples
 from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE, VISIBLE
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+    from viewsphere.labels._sight import Sight
 
 Float = NDArray[np.float64]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 from viewsphere.labels._ids import by_table
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.labels._paint import by_number
-from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.int32]:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from viewsphere.geometry.box import overlap
 from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.labels._lines import notes
-from viewsphere.labels._sight import EVERYWHERE, Sight
+from viewsphere.labels._sight import EVERYWHERE
 from viewsphere.model.sample import Sample
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:

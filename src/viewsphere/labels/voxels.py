@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xxhash
@@ -18,12 +19,14 @@ from viewsphere.labels._classes import KEY, with_classes
 from viewsphere.labels._ids import in_column
 from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, channel_of, rendered
 from viewsphere.labels._lifting import ROUNDING, exact_depth, largest
-from viewsphere.labels._sight import Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.classes import FIRST_THING, SKY, thing_class
 from viewsphere.model.sample import Sample
 from viewsphere.model.voxels import EMPTY, FREE, INSIDE, OCCLUDED, OUTSIDE, RUN, SURFACE, TOUCHED, Grid, VoxelGrid, Voxels
 from viewsphere.truth.raster.alpha_masks import NEVER
+
+if TYPE_CHECKING:
+    from viewsphere.labels._sight import Sight
 
 Float = NDArray[np.float64]
 Rows = NDArray[np.int64]

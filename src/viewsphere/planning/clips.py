@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from viewsphere.assets.timeline import Blenders, Timeline
+from viewsphere.assets.clip import Timeline
 from viewsphere.composing.motion import Start, mover
 from viewsphere.composing.seeds import generator
 from viewsphere.composing.time_steps import animated_file, animation, resting
@@ -17,6 +18,9 @@ from viewsphere.recipe.motion import MotionEntry, Motions, has_clip, listed
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.sequence import TimeEntry
 
+if TYPE_CHECKING:
+    from viewsphere.assets.timeline import Blenders
+
 
 def with_clips(
     recipe: Recipe, models: Sequence[tuple[ModelSpec, int]]
@@ -26,6 +30,8 @@ def with_clips(
 
     Raises RecipeError for files that cannot be read, and for those in which nothing moves, all together.
     """
+    from viewsphere.assets.timeline import Blenders  # which loads readers of models
+
     with Blenders.none_yet() as blenders:
 
         def line_of(one: tuple[ModelSpec, int]) -> Timeline | None:

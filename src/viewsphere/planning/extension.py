@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib.metadata import version
 from itertools import chain, groupby
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,7 +37,10 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
 from viewsphere.planning.fitting import check_fit, settings
 from viewsphere.planning.plan import Plan
-from viewsphere.store import Block, Category, Part, PlanRecord, Row, Simulated, Store
+from viewsphere.store import Block, Category, Part, PlanRecord, Row
+
+if TYPE_CHECKING:
+    from viewsphere.store import Store
 from viewsphere.store.index import Index, Ranges, numbers
 
 
@@ -64,6 +68,8 @@ class Portion(Sendable):
 
     def remembering(self, store: Store) -> Portion:
         """The same portion, which keeps in the store what is simulated for it."""
+        from viewsphere.store import Simulated  # which loads what reads stores
+
         return replace(self, plan=self.plan.changed(memory=Simulated(store.root)))
 
     def __str__(self) -> str:

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from viewsphere import plugins
-from viewsphere.assets.metadata.traits import said_of
-from viewsphere.assets.timeline import Timeline
+from viewsphere.assets.clip import Timeline
+from viewsphere.assets.metadata.sidecars import said_of
 from viewsphere.composing.composition import BoxOf, Numbering, compose
 from viewsphere.composing.filling import filled
 from viewsphere.composing.motion import check_motions

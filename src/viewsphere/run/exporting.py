@@ -10,13 +10,13 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.model.mistakes import one_of
 from viewsphere.model.quantity import quantity
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.run.preparing import Entries, prepared, targets
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.scope import refuse, scope_of
+from viewsphere.run.writable import writable
 from viewsphere.store import Choice, Dataset, located, new_folder
 from viewsphere.store.credits import credits_digest
 from viewsphere.store.shots.checksums import write_checksums, written_credits, written_frames, written_least, written_options
@@ -132,23 +132,6 @@ def is_out_of_date(name: str, dataset: Dataset, least: float | None) -> bool:
     if written_frames(folder) not in (None, len(dataset)) or (not spec.keeps_all_objects and written_least(folder) != least):
         return True
     return spec.names_credits and written_credits(folder) != credits_digest(dataset.models)
-
-
-def writable_formats() -> tuple[str, ...]:
-    """Names of the formats that data sets can be written in; others are only read."""
-    return tuple(name for name, spec in plugins.loadable(FormatSpec).items() if spec.writer)
-
-
-def writable(name: str, field: str = "format") -> FormatSpec:
-    """The format of this name; raises UserError for one that does not work here, and, as a mistake of `field`, for one that is
-    not known or only read.
-    """
-    spec = plugins.load(FormatSpec, name) if name in plugins.names("formats") else None
-    if spec is None or spec.writer is None:
-        raise UserError(f"{field}: {one_of(name, writable_formats())}")
-    if spec.check is not None:
-        spec.check()
-    return spec
 
 
 def _check_choice(dataset: Dataset, is_own: bool) -> None:

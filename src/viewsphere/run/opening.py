@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 from viewsphere.errors import RecipeError, StoreError, UserError
 from viewsphere.labels import on_request
@@ -19,9 +20,12 @@ from viewsphere.planning.plan import Plan, check_engine, check_images, plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.exporting import writable
 from viewsphere.run.scope import is_computed, needs_of, not_held, scope_of_plan
-from viewsphere.store import Part, PlanRecord, Store, check_codecs
+from viewsphere.run.writable import writable
+from viewsphere.store import check_codecs
+
+if TYPE_CHECKING:
+    from viewsphere.store import Part, PlanRecord, Store
 
 
 def prepare(recipe: Recipe) -> Plan:

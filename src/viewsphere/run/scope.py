@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, islice
+from typing import TYPE_CHECKING
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.refusals import lacking_labels
-from viewsphere.labels import Needs, channel_labels, labels, on_request
+from viewsphere.labels import Needs, channel_labels, label_named, on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.planning.plan import Plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.store import Dataset
-from viewsphere.store.foreign import ForeignDataset
+
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
+    from viewsphere.store.foreign import ForeignDataset
 
 LOOKED_AT = 1000
 """Pictures of a part that are asked what is known of them: many data sets have no cameras at all."""
@@ -96,7 +99,8 @@ def is_computed(name: str) -> bool:
 
     A painted pass does not, and neither do point tracks, a LiDAR's points and drawn looks.
     """
-    needs = labels()[name].needs if name in labels() else Needs()
+    label = label_named(name)
+    needs = label.needs if label else Needs()
     return name not in PASSES and not (needs.tracks or needs.lidar or needs.looks)
 
 

@@ -14,16 +14,23 @@ disk or at a URL (`places`).
 a file.
 """
 
-from viewsphere.store.index import Block, Row
-from viewsphere.store.samples.channel_files import check_codecs, decode, depth_step, encode
-from viewsphere.store.samples.choice import Choice, frame_ranges
-from viewsphere.store.samples.dataset import Dataset
-from viewsphere.store.samples.exported import Exported
-from viewsphere.store.samples.simulated import Simulated
-from viewsphere.store.samples.watching import Finished, Watch
-from viewsphere.store.shots.folder import Store, kept_shot, new_folder
-from viewsphere.store.shots.records import Category, ModelInfo, Part, PlanRecord
-from viewsphere.urls import located
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from viewsphere.homes import names_of
+
+if TYPE_CHECKING:
+    from viewsphere.store.index import Block, Row
+    from viewsphere.store.samples.channel_files import check_codecs, decode, depth_step, encode
+    from viewsphere.store.samples.choice import Choice, frame_ranges
+    from viewsphere.store.samples.dataset import Dataset
+    from viewsphere.store.samples.exported import Exported
+    from viewsphere.store.samples.simulated import Simulated
+    from viewsphere.store.samples.watching import Finished, Watch
+    from viewsphere.store.shots.folder import Store, kept_shot, new_folder
+    from viewsphere.store.shots.records import Category, ModelInfo, Part, PlanRecord
+    from viewsphere.urls import located
 
 __all__ = [
     "Block",
@@ -48,3 +55,30 @@ __all__ = [
     "located",
     "new_folder",
 ]
+
+__getattr__ = names_of(
+    __name__,
+    {
+        "Block": "viewsphere.store.index",
+        "Category": "viewsphere.store.shots.records",
+        "Choice": "viewsphere.store.samples.choice",
+        "Dataset": "viewsphere.store.samples.dataset",
+        "Exported": "viewsphere.store.samples.exported",
+        "Finished": "viewsphere.store.samples.watching",
+        "ModelInfo": "viewsphere.store.shots.records",
+        "Part": "viewsphere.store.shots.records",
+        "PlanRecord": "viewsphere.store.shots.records",
+        "Row": "viewsphere.store.index",
+        "Simulated": "viewsphere.store.samples.simulated",
+        "Store": "viewsphere.store.shots.folder",
+        "Watch": "viewsphere.store.samples.watching",
+        "check_codecs": "viewsphere.store.samples.channel_files",
+        "decode": "viewsphere.store.samples.channel_files",
+        "depth_step": "viewsphere.store.samples.channel_files",
+        "encode": "viewsphere.store.samples.channel_files",
+        "frame_ranges": "viewsphere.store.samples.choice",
+        "kept_shot": "viewsphere.store.shots.folder",
+        "located": "viewsphere.urls",
+        "new_folder": "viewsphere.store.shots.folder",
+    },
+)

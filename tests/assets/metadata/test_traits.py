@@ -9,8 +9,9 @@ import trimesh
 
 from viewsphere.assets.cache import load
 from viewsphere.assets.metadata import traits
+from viewsphere.assets.metadata.sidecars import sidecar_of
 from viewsphere.assets.metadata.spread_points import spread_points
-from viewsphere.assets.metadata.traits import sidecar_of, traits_of
+from viewsphere.assets.metadata.traits import traits_of
 from viewsphere.errors import ModelError
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import ModelSpec

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from pathlib import Path
 from typing import cast
 
 import numpy as np
 
-from viewsphere.assets.cache import ZOO, frame_of, readers_digest
+from viewsphere.assets.cache import frame_of, readers_digest
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.metadata.sidecars import said_of
 from viewsphere.assets.metadata.spread_points import spread_points
 from viewsphere.assets.metadata.surface import Surface
 from viewsphere.assets.metadata.symmetries import find, lacking
-from viewsphere.assets.paths.inside import split_source
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.skin import grouped
 from viewsphere.caches.arrays import Content
 from viewsphere.caches.entries import kept
-from viewsphere.errors import ModelError, RecipeError
+from viewsphere.errors import ModelError
 from viewsphere.geometry.diameter import diameter
 from viewsphere.model.keypoints import Keypoints, Place
 from viewsphere.model.mistakes import nearest, shown
@@ -27,7 +26,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
 from viewsphere.model.traits import Traits
-from viewsphere.recipe.sidecar import ENDING, Sidecar, read_sidecar
+from viewsphere.recipe.sidecar import Sidecar
 
 BEYOND = 0.1
 """Share of its diameter by which a point that a model names may lie outside of its box."""
@@ -72,37 +71,6 @@ def with_body_parts(mesh: Mesh, spec: ModelSpec) -> Mesh:
                 found = f"{shown(bone)}{nearest(bone, bones)}" if bones else "a model that has none"
                 raise ModelError(f"{path}: body_parts.{name}: expected bones of the model's skin; found {found}")
     return grouped(mesh, parts)
-
-
-def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:
-    """A model's sidecar and what it says; an empty one where there is none, and of a part of a file.
-
-    Raises ModelError for one that cannot be read.
-    """
-    path = None if spec.parts is not None else sidecar_of(spec)
-    try:
-        return path, Sidecar() if path is None else read_sidecar(path)
-    except RecipeError as error:
-        raise ModelError(str(error)) from None
-
-
-def sidecar_of(spec: ModelSpec) -> Path | None:
-    """The file that says symmetries, points and parts of a model: that which the recipe names, else the one beside it; None
-    without.
-
-    Raises ModelError for one beside it that is a link out of the folder of a confined model.
-    """
-    if spec.sidecar is not None:
-        return Path(spec.sidecar)
-    file, inside = split_source(Path(spec.source))
-    path = file.with_name(file.name + ENDING)
-    if spec.source.startswith(ZOO) or inside or not path.exists():
-        return None
-    if spec.confined and path.resolve().parent != path.parent.resolve():
-        raise ModelError(
-            f"{path}: expected a file in this folder; found a link to {path.resolve()}: copy it, or say confined: false"
-        )
-    return path
 
 
 def found_symmetries(mesh: Mesh) -> Symmetries:

@@ -8,11 +8,10 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewsphere.assets.scene_file import SceneFile, SceneObject, places, scene_file
 from viewsphere.composing.scene.scenery import Naming, SceneryPiece, draw_names, scenery_key
 from viewsphere.composing.seeds import Names, share
 from viewsphere.composing.sendable import Sendable
@@ -26,6 +25,9 @@ from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.recipe.blend import VALUE, BlendEntry, LabelRule, VariantEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
+
+if TYPE_CHECKING:
+    from viewsphere.assets.scene_file import SceneFile, SceneObject
 
 NAMES_SAID = 5
 
@@ -69,6 +71,8 @@ class BlendScenery(Sendable):
         if not self.path.is_file():
             raise RecipeError(f"scene.blend.file: expected a .blend file; found none at {self.path}")
         try:
+            from viewsphere.assets.scene_file import scene_file  # which loads what asks Blender
+
             patterns = tuple(v.one_of for v in self.entry.variants.values())
             return scene_file(self.path, self.entry.confined, patterns, self.frames)
         except ModelError as error:
@@ -230,6 +234,8 @@ class BlendScenery(Sendable):
     @cached_property
     def _stands(self) -> Mapping[int, Mapping[str, Float]]:
         names = tuple(one.root.name for one in self.labelled)
+        from viewsphere.assets.scene_file import places
+
         try:
             return places(self.path, self.entry.confined, names, self.frames)
         except ModelError as error:

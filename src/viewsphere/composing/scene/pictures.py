@@ -11,7 +11,6 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from viewsphere.assets.paths.folder import UnreadableError
 from viewsphere.composing.scene.entries_walked import named
 from viewsphere.errors import RecipeError
 from viewsphere.files import open_file
@@ -22,7 +21,6 @@ from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.light import SKY_SUFFIXES
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.rendering.sky.environment_head import read_head
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -175,6 +173,9 @@ def _ends_well(path: str, kind: str) -> bool:
 
 
 def _check_sphere(path: str, field: str) -> None:
+    from viewsphere.assets.paths.folder import UnreadableError  # which loads numpy's and Pillow's readers
+    from viewsphere.rendering.sky.environment_head import read_head
+
     try:
         head = read_head(Path(path))
     except UnreadableError as error:

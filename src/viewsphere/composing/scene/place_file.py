@@ -7,15 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.cache import kept, load
-from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.paths.inside import split_source
-from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.scene_annotations import FLOOR, INDOORS, LANE, SURFACE, Mark, kind_of, naturally, own_name
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
@@ -24,6 +21,10 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.zoo.places import Lane, Surface, standing
+
+if TYPE_CHECKING:
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.assets.primitive import FileFacts
 
 Float = NDArray[np.float64]
 
@@ -110,6 +111,8 @@ def offers_of(spec: ModelSpec) -> FileOffers:
 @lru_cache(maxsize=16)
 def _offers_of(text: str, state: tuple[int, int]) -> FileOffers:
     """The offers by the specification as JSON, and by what changes with the file."""
+    from viewsphere.assets.cache import kept, load  # which loads readers of models
+
     spec = ModelSpec.model_validate_json(text)
 
     def ask() -> tuple[list[Any], tuple[Path, ...]]:

@@ -17,7 +17,6 @@ from viewsphere.formats.coco.said import Licences
 from viewsphere.formats.shared.export_files import Expected
 from viewsphere.formats.shared.paper import faces, json_bytes, transformation_matrix
 from viewsphere.geometry.mask import mask_polygons
-from viewsphere.labels.captions import MOST
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 
@@ -73,7 +72,11 @@ class Entries:
 
 def _captions(sample: Sample) -> Iterator[dict[str, Any]]:
     """COCO's captions of a picture, if it has any."""
-    for number, caption in enumerate(sample.captions if CAPTIONS in sample.asked else (), 1):
+    if CAPTIONS not in sample.asked:
+        return
+    from viewsphere.labels.captions import MOST  # which loads what describes scenes
+
+    for number, caption in enumerate(sample.captions, 1):
         yield {"id": sample.index * MOST + number, "image_id": sample.index + 1, "caption": caption.text}
 
 

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,10 @@ from viewsphere.codecs.png_tiff import decode_png, encode_png
 from viewsphere.errors import UserError
 from viewsphere.files import open_file, read_bytes
 from viewsphere.plugins.format import Remark
-from viewsphere.store import Dataset
-from viewsphere.store.foreign import Loaded
 from viewsphere.store.shots.checksums import CHECKSUMS
+
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,8 @@ def _problem(dataset: Dataset, content: Content, file: Path) -> str | None:
     if not file.is_file():
         return "expected a file, found none"
     if isinstance(content, str):
+        from viewsphere.store.foreign import Loaded  # only a data set that was loaded has them
+
         stored = dataset.stored(content)
         same = read_bytes(file) == stored.data if isinstance(stored, Loaded) else same_bytes(stored, file)
         return None if same else f"expected the bytes of {content}, found others"

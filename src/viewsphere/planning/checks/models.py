@@ -13,7 +13,7 @@ from viewsphere.composing.layouts import check_layout, check_orientation
 from viewsphere.composing.redraws import redraws_frames
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.errors import RecipeError
-from viewsphere.labels import Needs, channels, labels, on_request
+from viewsphere.labels import Needs, channels, is_channel, is_on_request, label_named, labels, on_request
 from viewsphere.model.channel import MATERIAL_PASSES, PASSES
 from viewsphere.model.mistakes import nearest, one_of, read_options, shown
 from viewsphere.model.model_spec import ModelSpec
@@ -81,9 +81,9 @@ def check_names(recipe: Recipe) -> None:
         check_layout(recipe.scenes.layout, "scenes")
         check_orientation(recipe.scenes.orientation, "scenes")
     for i, name in enumerate(recipe.channels):
-        if name in on_request():
+        if is_on_request(name):
             raise RecipeError(f"channels[{i}]: expected a channel; found {name}, which is one of annotations")
-        if name not in channels():
+        if not is_channel(name):
             raise RecipeError(f"channels[{i}]: {_unknown(name, tuple(channels()))}")
         check_needs(recipe, f"channels[{i}]", name)
         _check_painted(recipe, f"channels[{i}]", name)
@@ -102,11 +102,11 @@ def _check_plugin(field: str, kind: plugins.Kind, name: str) -> None:
 
 def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
     """A label that can be asked for, with what it needs."""
-    if name in channels():
+    if is_channel(name):
         raise RecipeError(f"{where}: expected a label of objects or of pictures; found {name}, which is one of channels")
-    if name in labels() and name not in on_request():
+    if label_named(name) and not is_on_request(name):
         raise RecipeError(f"{where}: expected a label on request; found {name}, which every data set has: leave it out")
-    if name not in on_request():
+    if not is_on_request(name):
         of = [label.name for label in on_request().values() if name in {field.name for field in label.fields}]
         known = f"expected a label; found {name}, a field of {of[0]}: name that" if of else _unknown(name, tuple(on_request()))
         raise RecipeError(f"{where}: {known}")
@@ -123,9 +123,10 @@ def _unknown(name: str, known: tuple[str, ...]) -> str:
 
 def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) -> None:
     """Options of a label that the recipe names."""
-    if name not in labels():
+    label = label_named(name)
+    if label is None:
         raise RecipeError(f"labels: {one_of(name, tuple(name for name, label in labels().items() if label.options))}")
-    options = labels()[name].options
+    options = label.options
     if options is None:
         raise RecipeError(f"labels.{name}: expected no options, {name} has none; found {', '.join(given) or 'a mapping'}")
     if name not in (*recipe.channels, *recipe.annotations):
@@ -137,7 +138,8 @@ def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) ->
 
 def check_needs(recipe: Recipe, where: str, name: str) -> None:
     """See that the recipe has what a label compares: instants, sensors, a LiDAR, tracks; raises RecipeError."""
-    needs, rig = labels()[name].needs if name in labels() else Needs(), recipe.rig
+    label, rig = label_named(name), recipe.rig
+    needs = label.needs if label else Needs()
     for field, what, is_lacking in (
         ("time", "whose instants are compared", bool(needs.instants or needs.poses) and recipe.time is None),
         ("rig", "whose sensors are compared", needs.rig and recipe.rig is None),

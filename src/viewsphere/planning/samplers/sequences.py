@@ -18,7 +18,7 @@ from viewsphere.composing.trajectories import instant as instant_of
 from viewsphere.composing.trajectories import is_still
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
-from viewsphere.labels import labels
+from viewsphere.labels import label_named
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import quantity
@@ -155,10 +155,10 @@ def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) 
 
 def _needed(stock: Stock, taken: Set[int]) -> set[int]:
     """The instants that labels of those that are taken need besides."""
-    known = labels()
     names = {name for sensor in stock.rig.sensors for name in sensor.kept(stock.recipe.channels)}
     names.update(stock.recipe.annotations)
-    offsets = {offset for name in names if name in known for offset in (*known[name].needs.instants, *known[name].needs.poses)}
+    needs = (label.needs for name in names if (label := label_named(name)))
+    offsets = {offset for some in needs for offset in (*some.instants, *some.poses)}
     offsets |= {-1, 1} if any(sensor.lidar and sensor.lidar.sweep for sensor in stock.rig.sensors) else set()
     count = time_of(stock).count
     compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewsphere.assets.timeline import Blenders
 from viewsphere.composing.viewpoints.pose_files.entries import Extrinsics, PoseFile
 from viewsphere.composing.viewpoints.pose_files.lens import one_lens
 from viewsphere.composing.viewpoints.pose_files.motions import motion
@@ -15,6 +14,9 @@ from viewsphere.errors import ModelError, RecipeError
 from viewsphere.model.camera import Intrinsics
 from viewsphere.recipe.time import chosen_frames
 from viewsphere.recipe.viewpoints import PoseList
+
+if TYPE_CHECKING:
+    from viewsphere.assets.timeline import Blenders
 
 SUFFIXES = (".abc", ".blend", ".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
 
@@ -25,6 +27,8 @@ def read_cameras(path: Path, entry: PoseList, zooms: bool = False) -> PoseFile:
 
     Raises RecipeError for a file without such a camera or such frames, and without `zooms` for a lens that changes.
     """
+    from viewsphere.assets.timeline import Blenders  # which loads readers of models
+
     with Blenders.none_yet() as blenders:
         try:
             frames = _frames(path, entry, blenders)

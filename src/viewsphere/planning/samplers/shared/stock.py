@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from pydantic import JsonValue
 
-from viewsphere.assets.timeline import Timeline
+from viewsphere.assets.clip import Timeline
 from viewsphere.composing.composition import Composition
 from viewsphere.composing.layouts import Remembering, unremembered
 from viewsphere.composing.redraws import redraw_names
@@ -25,7 +25,7 @@ from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
-from viewsphere.labels import labels
+from viewsphere.labels import label_named
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
@@ -298,7 +298,8 @@ class Stock(Sendable):
 
 def _options(recipe: Recipe) -> dict[str, dict[str, JsonValue]]:
     """The options of the labels that a recipe names; those that leave something to chance have the recipe's seed."""
-    kinds = {name: labels()[name].options for name in (*recipe.channels, *recipe.annotations) if name in labels()}
+    named = ((name, label_named(name)) for name in (*recipe.channels, *recipe.annotations))
+    kinds = {name: label.options for name, label in named if label}
     drawn = {name: {"seed": recipe.seed} for name, kind in kinds.items() if kind and "seed" in kind.model_fields}
     return {name: {**drawn.get(name, {}), **recipe.labels.get(name, {})} for name in {**recipe.labels, **drawn}}
 

@@ -1,0 +1,42 @@
+"""The file beside a model that says its symmetries, points and parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewsphere.assets.paths.inside import split_source
+from viewsphere.errors import ModelError, RecipeError
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.recipe.models import ZOO
+from viewsphere.recipe.sidecar import ENDING, Sidecar, read_sidecar
+
+
+def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:
+    """A model's sidecar and what it says; an empty one where there is none, and of a part of a file.
+
+    Raises ModelError for one that cannot be read.
+    """
+    path = None if spec.parts is not None else sidecar_of(spec)
+    try:
+        return path, Sidecar() if path is None else read_sidecar(path)
+    except RecipeError as error:
+        raise ModelError(str(error)) from None
+
+
+def sidecar_of(spec: ModelSpec) -> Path | None:
+    """The file that says symmetries, points and parts of a model: that which the recipe names, else the one beside it; None
+    without.
+
+    Raises ModelError for one beside it that is a link out of the folder of a confined model.
+    """
+    if spec.sidecar is not None:
+        return Path(spec.sidecar)
+    file, inside = split_source(Path(spec.source))
+    path = file.with_name(file.name + ENDING)
+    if spec.source.startswith(ZOO) or inside or not path.exists():
+        return None
+    if spec.confined and path.resolve().parent != path.parent.resolve():
+        raise ModelError(
+            f"{path}: expected a file in this folder; found a link to {path.resolve()}: copy it, or say confined: false"
+        )
+    return path

@@ -1,0 +1,152 @@
+"""Labels of a picture, computed from truth: what loads the rasterizer, which those that only name labels do without."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels import channel_labels, labels_of, makers, sample_labels
+from viewsphere.labels._label import later
+from viewsphere.labels._placement import Placement
+from viewsphere.labels._record import Makers, computed
+from viewsphere.labels._sight import Around, Sight
+from viewsphere.model.camera import Camera
+from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.looks import Looks
+from viewsphere.model.model_spec import Size
+from viewsphere.model.sample import ObjectAnnotation
+from viewsphere.model.shot import Shot
+from viewsphere.model.symmetries import Symmetries
+from viewsphere.model.thing import Thing
+from viewsphere.model.traits import Traits
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Visibility
+
+
+def observe(
+    geometry: Geometry,
+    camera: Camera,
+    visibility: Visibility,
+    names: Iterable[str],
+    around: Around | None = None,
+    options: Mapping[str, Mapping[str, Any]] | None = None,
+) -> dict[str, NDArray[Any]]:
+    """The named labels of pixels, each (H, W) or (H, W, components) as its file says.
+
+    `visibility` is `rasterize(geometry, camera)`; `around`: what labels of motion and of stereo pairs compare it with;
+    `options`: those of labels, by their names. The array of `instances` is shared with the visibility and must not be written
+    to. Raises ValueError for names that are no labels of pixels.
+    """
+    known, names = channel_labels(), tuple(names)
+    sight = Sight(geometry, camera, visibility, around=around, options=options or {})
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise ValueError(f"channel {unknown[0]!r}: expected one of {', '.join(known)}")
+    return {name: known[name].compute(sight) for name in names}
+
+
+def sight_of(
+    shot: Shot,
+    instant: int,
+    camera: Camera,
+    geometry: Geometry,
+    visibility: Visibility,
+    boxes: Sequence[NDArray[np.float64]],
+    models: Sequence[str],
+    real_sizes: Sequence[Size | None] | None = None,
+    around: Around | None = None,
+    traits: Sequence[Callable[[], Traits]] | None = None,
+) -> Sight:
+    """What a camera sees of a shot at an instant (counted from 0 there), with the places of its objects.
+
+    `boxes[i]` is the 3D box (8, 3) of object i + 1's model then in the object's axes, `models[i]` the path of that model in the
+    data set, `real_sizes[i]` its true size (by default the one its spec gives in numbers), and `traits[i]` gives what it says
+    of itself to labels that ask for it; `geometry` is the shot's stage and `visibility` what this camera sees of it.
+    """
+    objects = shot.objects
+    if not len(objects) == len(boxes) == len(models) == geometry.object_count:
+        raise ValueError(
+            f"sight_of: shot {shot.key}: expected {geometry.object_count} objects, boxes and models, "
+            f"got {len(objects)}, {len(boxes)}, {len(models)}"
+        )
+    sizes = real_sizes or [None if isinstance(thing.model.real_size, str) else thing.model.real_size for thing in objects]
+    facts = [
+        Rendered(model, box, size, thing.model.category, thing.model.category_id, _track(thing, instant), said)
+        for thing, box, model, size, said in zip(objects, boxes, models, sizes, traits or [_unsaid] * len(objects), strict=True)
+    ]
+    places = tuple(
+        None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known, step)
+        for thing, known in zip(objects, facts, strict=True)
+        for pose, step in ((thing.motion.at(instant), thing.motion.step_at(instant)),)
+    )
+    return Sight(geometry, camera, visibility, places, around, shot.annotations, shot.labels)
+
+
+def _unsaid() -> Traits:
+    raise ValueError("expected what the model says of itself; sight_of() was not given it")
+
+
+def _track(thing: Thing, instant: int) -> str:
+    """The key of the thing's model where it shows a time step, else empty."""
+    return thing.model.key if thing.motion.step_at(instant) else ""
+
+
+def annotated(sight: Sight) -> tuple[ObjectAnnotation, ...]:
+    """Annotations of the objects that are placed in a sight, visible or not, in the order of their ids. An object that covers
+    no pixel has an empty mask, no `box2d` and visibility 0.
+    """
+    seen = [label for label in labels_of(sight.asked) if label.compute is not later]
+    every = Makers(makers(), sight.asked, "this frame")
+    return tuple(
+        computed(i + 1, [label.compute(sight, i) for label in seen], place, every)
+        for i, place in enumerate(sight.placements)
+        if place
+    )
+
+
+def sample_values(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+    """The fields of the labels of whole pictures that were asked for; `objects` are `annotated(sight)`."""
+    found: dict[str, Any] = {}
+    for name, label in sample_labels().items():
+        if name in sight.asked:
+            found |= label.compute(sight, objects)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered:
+    """`ModelFacts` of a model that is rendered."""
+
+    obj: str
+    box3d_object: NDArray[np.float64]
+    real_size: Size | None
+    category: str
+    category_id: int
+    track: str
+    traits: Callable[[], Traits]
+    materials: tuple[str, ...] = ()
+    body_parts: tuple[str, ...] = ()
+
+    @property
+    def diameter(self) -> float:
+        """The largest distance between two vertices, metres."""
+        return self.traits().diameter
+
+    @property
+    def symmetries(self) -> Symmetries | None:
+        """Motions that leave the model as it is."""
+        return self.traits().symmetries
+
+    @property
+    def keypoints(self) -> Keypoints | None:
+        """Named points."""
+        return self.traits().keypoints
+
+    @property
+    def looks(self) -> Looks | None:
+        """What it looks like."""
+        return self.traits().looks()

@@ -1,0 +1,25 @@
+"""The formats that data sets can be written in."""
+
+from __future__ import annotations
+
+from viewsphere import plugins
+from viewsphere.errors import UserError
+from viewsphere.model.mistakes import one_of
+from viewsphere.plugins.format import FormatSpec
+
+
+def writable_formats() -> tuple[str, ...]:
+    """Names of the formats that data sets can be written in; others are only read."""
+    return tuple(name for name, spec in plugins.loadable(FormatSpec).items() if spec.writer)
+
+
+def writable(name: str, field: str = "format") -> FormatSpec:
+    """The format of this name; raises UserError for one that does not work here, and, as a mistake of `field`, for one that is
+    not known or only read.
+    """
+    spec = plugins.load(FormatSpec, name) if name in plugins.names("formats") else None
+    if spec is None or spec.writer is None:
+        raise UserError(f"{field}: {one_of(name, writable_formats())}")
+    if spec.check is not None:
+        spec.check()
+    return spec
