@@ -23,6 +23,7 @@ from worlds import WORLDS
 HEAVY = {"blend", "huggingface"}  # a program of its own; another library's files
 OF_PEOPLE = {"surreal"}  # of none of these worlds: its own tests try the same
 FEW = {"sscnet": Choice(frames=((0, 2), (6, 8)))}  # whose eight million cells a picture take half a second
+KINDS = {"still": ("stills", "poses"), "moving": ("videos", "drives")}
 FORMATS = [name for name in writable_formats() if name not in HEAVY | OF_PEOPLE]
 
 
@@ -73,13 +74,32 @@ def test_every_format_holds_some_data_set_and_refuses_others_in_words(name, requ
     assert len(refused) < len(WORLDS)
 
 
+def first_of(exported, name, kind):
+    """The first world of a kind that a format does not refuse; None where it refuses all."""
+    return next((world for world in KINDS[kind] if exported(name, world) is not None), None)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", FORMATS)
-def test_an_export_is_proved(exported, name, world, request):
-    folder = exported(name, world)
-    if folder is not None:
-        assert remarks(request.getfixturevalue(world), name, folder) == []
+def test_an_export_of_a_still_and_of_a_moving_world_is_proved(exported, name, kind, request):
+    if (world := first_of(exported, name, kind)) is not None:
+        assert remarks(request.getfixturevalue(world), name, exported(name, world)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.shipped
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", FORMATS)
+def test_an_export_of_every_other_world_is_proved(exported, name, kind, request):
+    for world in KINDS[kind]:
+        if world != first_of(exported, name, kind) and exported(name, world) is not None:
+            assert remarks(request.getfixturevalue(world), name, exported(name, world)) == [], world
+
+
+@pytest.mark.slow
+def test_all_worlds_are_still_or_moving():
+    assert sorted(world for worlds in KINDS.values() for world in worlds) == sorted(WORLDS)
 
 
 @pytest.mark.slow
