@@ -1,12 +1,13 @@
 """Axes, units, scale and centring, in closed form."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.normalise import normalise, rotation
+from viewsphere.assets.normalise import normalise, rotation, sorted_by_part
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
@@ -124,3 +125,15 @@ def test_triangles_come_sorted_by_part_and_material(cube):
     np.testing.assert_array_equal(found.triangles, mesh.triangles[order])
     np.testing.assert_array_equal(found.triangle_part, part[order])
     np.testing.assert_array_equal(found.triangle_material, material[order])
+
+
+def test_sorted_triangles_stay_the_arrays_that_processes_share(cube):
+    whole = replace(box(cube=cube), triangle_part=np.arange(12, dtype=np.int32) % 3, parts=("a", "b", "c"))
+    once = sorted_by_part(whole)
+    assert once.triangle_part.tolist() == [0] * 4 + [1] * 4 + [2] * 4
+    assert np.array_equal(once.triangles, np.concatenate([whole.triangles[part::3] for part in range(3)]))
+    assert sorted_by_part(once) is once
+    for mesh, are_shared in ((once, True), (whole, False)):
+        made = normalise(mesh, NATIVE, spec())
+        assert np.array_equal(made.triangles, once.triangles)
+        assert np.shares_memory(made.triangles, mesh.triangles) == are_shared

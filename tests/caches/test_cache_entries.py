@@ -274,3 +274,23 @@ def test_fifty_killed_writers_leave_nothing_torn_and_nothing_over_the_limit(monk
         assert total() <= 1_000_000
     write("last")
     assert not [path for path in Path(cache_of("light")).iterdir() if path.is_dir()]
+
+
+def test_plain_entries_of_a_folder_that_others_write_are_used_if_whole(cache):
+    """They are data: who writes the folder can change pictures, but run nothing. Kernels, which are programs, are refused."""
+    made("a")
+    cache.chmod(0o777)
+    cache_of("light").chmod(0o777)
+    file_of("a").chmod(0o666)
+    assert not made("a")
+    damaged = bytearray(file_of("a").read_bytes())
+    damaged[-1] ^= 1
+    file_of("a").write_bytes(damaged)
+    assert made("a") and not made("a")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root, to give a file to another user")
+def test_an_entry_of_another_user_is_used_if_whole():
+    made("a")
+    os.chown(file_of("a"), 65534, 65534)
+    assert not made("a")

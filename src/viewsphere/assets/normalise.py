@@ -36,17 +36,26 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, 
     origin = facts.origin if first is None else first[1].origin
     shift = factor * (np.subtract(facts.origin, origin) @ turn.T) - center
     stored = (factor * (mesh.vertices.astype(np.float64) @ turn.T) + shift).astype(np.float32)
-    order = np.lexsort((mesh.triangle_material, mesh.triangle_part))
-    triangles = mesh.triangles[order]
+    mesh = sorted_by_part(mesh)
     return replace(
         mesh,
         vertices=stored,
-        triangles=triangles,
-        normals=unit_normals(stored, triangles, (mesh.normals.astype(np.float64) @ turn.T).astype(np.float32)),
+        normals=unit_normals(stored, mesh.triangles, (mesh.normals.astype(np.float64) @ turn.T).astype(np.float32)),
+        warnings=mesh.warnings + warnings,
+    )
+
+
+def sorted_by_part(mesh: Mesh) -> Mesh:
+    """The mesh with its triangles sorted by part and material, otherwise in their order; the same one if they are already."""
+    order = np.lexsort((mesh.triangle_material, mesh.triangle_part))
+    if (order[1:] > order[:-1]).all():  # arrays of the cache stay those that all processes share
+        return mesh
+    return replace(
+        mesh,
+        triangles=mesh.triangles[order],
         triangle_material=mesh.triangle_material[order],
         triangle_part=mesh.triangle_part[order],
         triangle_body_part=None if mesh.triangle_body_part is None else mesh.triangle_body_part[order],
-        warnings=mesh.warnings + warnings,
     )
 
 

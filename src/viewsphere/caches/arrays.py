@@ -30,9 +30,10 @@ from viewsphere.caches.mounts import is_local
 from viewsphere.files import open_file
 
 MAGIC = b"VSA1"
-MAPPED_BYTES = 8 << 20
-"""Bytes from which on a file is mapped. Sharing smaller ones saves little, and a program that truncates a mapped file in place
-ends the processes that map it. viewsphere itself only replaces and deletes files.
+MAPPED_BYTES = 1 << 20
+"""Bytes from which on a file is mapped: three quarters of what a town's models take. Each mapping holds an open file, of which
+a process may have 1,024, and a program that truncates a mapped file in place ends the processes that map it. viewsphere itself
+only replaces and deletes files.
 """
 
 LINE = 64

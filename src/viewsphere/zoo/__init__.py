@@ -83,6 +83,7 @@ def build_zoo_model(spec: ModelSpec) -> Mesh | Path:
     if not plugins.family(family).__name__.startswith(f"{__name__}."):  # whose sources, all together, are not known
         return _built_to_size(family, spec)
     from viewsphere.assets.mesh_file import packed, unpacked
+    from viewsphere.assets.normalise import sorted_by_part
     from viewsphere.assets.primitive import FileFacts
 
     facts = FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0)
@@ -90,7 +91,7 @@ def build_zoo_model(spec: ModelSpec) -> Mesh | Path:
     return kept(
         "zoo",
         name,
-        lambda: _built_to_size(family, spec),
+        lambda: sorted_by_part(_built_to_size(family, spec)),
         lambda mesh: packed(mesh, facts),
         lambda content: unpacked(content, facts.path)[0],
     )
