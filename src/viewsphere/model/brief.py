@@ -10,9 +10,7 @@ from viewsphere.model.frozen import Frozen
 
 
 class Brief(Frozen):
-    """Is written without its fields in `UNSAID` where these are None. A field that classes get later belongs there: records and
-    digests without it stay what they were.
-    """
+    """Plain data that is written without those of its fields in `UNSAID` that are None."""
 
     UNSAID: ClassVar[tuple[str, ...]] = ()
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from viewsphere.geometry.camera import orbit_angles
 from viewsphere.geometry.pose_category import pose_category
@@ -97,13 +96,3 @@ class Instant(Frozen):
     finish: Finish | None = None
     intrinsics: Intrinsics | None = None
     recorded: bool = True
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `intrinsics` where nothing zooms, and without `recorded` where it is, as records always were."""
-        found: dict[str, Any] = handler(self)
-        if self.intrinsics is None:
-            found.pop("intrinsics", None)
-        if self.recorded:
-            found.pop("recorded", None)
-        return found

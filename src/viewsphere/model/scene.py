@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import BeforeValidator, Field
 
 from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
@@ -312,9 +312,3 @@ class Scene(Frozen):
     def weather(self) -> bool:
         """Whether there is any."""
         return any(getattr(self, name) is not None for name in (*WEATHER, "fog_outdoors") if name != "lamps")
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without weather where there is none, so that records of such scenes are what they were before."""
-        found: dict[str, Any] = handler(self)
-        return {name: value for name, value in found.items() if value is not None or name not in (*WEATHER, "fog_outdoors")}

@@ -5,10 +5,9 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Iterator
 from itertools import product
-from typing import Any
 
 import numpy as np
-from pydantic import Field, JsonValue, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, JsonValue, model_validator
 
 from viewsphere.geometry.rotation import compose, transform
 from viewsphere.model.camera import Camera, Intrinsics
@@ -82,20 +81,6 @@ class Shot(Frozen):
         if any(exposure and len(exposure.things) != len(self.things) for exposure in self.exposures):
             raise ValueError(f"exposures: expected a sweep or None for each of {len(self.things)} things")
         return self
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without shutter and exposures where there is no shutter, and without annotations and options that nobody asked for,
-        so that records of such shots are what they were before.
-        """
-        found: dict[str, Any] = handler(self)
-        for name in ("annotations", "labels", "variation", "redraw"):
-            if not getattr(self, name):
-                found.pop(name, None)
-        if not self.shutter:
-            found.pop("shutter", None)
-            found.pop("exposures", None)
-        return found
 
     @property
     def subject(self) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
@@ -47,14 +45,6 @@ class Motion(Frozen):
     poses: tuple[Matrix4 | None, ...] = Field(default=(IDENTITY,), min_length=1)
     steps: tuple[TimeStep | None, ...] = Field(default=(None,), min_length=1)
     moves: bool = False
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `moves` where it says nothing, as records always were."""
-        found: dict[str, Any] = handler(self)
-        if not self.moves:
-            found.pop("moves", None)
-        return found
 
     @property
     def is_still(self) -> bool:

@@ -370,17 +370,24 @@ class Plan(Shown, Stock):
 
         Files count by their names, so that folders can move; what is in a model's file, the store itself watches.
         """
-        models = [m.model_dump(mode="json") | {"source": Path(m.source).name} for m in self.kept_specs]
         planes = () if self.composition is None else self.composition.images
-        images = [Path(i).name for files in (self.images, *planes) for i in files]
-        value = [self.recipe.digest, models, self.pose_list.digest, images, self.shot_frames]
-        value += [spec.model_dump(mode="json") | {"source": Path(spec.source).name} for spec, _ in self.distractors]
-        value += [] if self.blend is None else [self.blend.digest]
-        script = script_digest(self.recipe)
-        value += [] if script is None else [script]
-        value += [] if self.own_rig is None else [self.own_rig.model_dump(mode="json")]
-        value += [] if self.tracks is None else [tracks_digest(self.tracks)]
+        value = [
+            self.recipe.digest,
+            [_by_name(spec) for spec in self.kept_specs],
+            [_by_name(spec) for spec, _ in self.distractors],
+            self.pose_list.digest,
+            [Path(image).name for files in (self.images, *planes) for image in files],
+            self.shot_frames,
+            None if self.blend is None else self.blend.digest,
+            script_digest(self.recipe),
+            None if self.own_rig is None else self.own_rig.model_dump(mode="json"),
+            None if self.tracks is None else tracks_digest(self.tracks),
+        ]
         return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
+
+
+def _by_name(spec: ModelSpec) -> dict[str, Any]:
+    return spec.model_dump(mode="json") | {"source": Path(spec.source).name}
 
 
 def _unlit(scene: SceneEntry) -> Iterator[str]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -51,30 +51,6 @@ from viewsphere.recipe.wanted import WantedEntry
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames", "keep_annotations_above"}
 """Fields of a recipe that change neither a picture nor a label, as the credits of its models do not."""
-
-LATER = {"scenes", "time", "rig", "tracks", "variations", "min_visibility", "wanted", "empty"}
-"""Fields that recipes once did not have: without them a recipe has the digest that it had then."""
-
-LATER_FIELDS: dict[tuple[str, ...], Any] = {
-    ("models", "faces"): None,
-    ("viewpoints", "shake"): None,
-    ("camera", "principal_point"): None,
-    ("scene", "company", "orientation"): "upright",
-    ("scene", "fog"): "off",
-    ("scene", "rain"): "off",
-    ("scene", "snow"): "off",
-    ("scene", "wet"): "auto",
-    ("scene", "lamps"): "auto",
-    ("scenes", "orientation"): "upright",
-    ("scenes", "balance"): "models",
-    ("scenes", "surface"): None,
-    ("scenes", "distractors"): 0,
-    ("scene", "jitter", "off_center"): [0.0, 0.0],
-    ("files", "shots"): "files",
-    ("annotations",): [],
-    ("labels",): {},
-}
-"""Likewise fields of their parts, with the defaults that are left out."""
 
 Share = Annotated[
     Annotated[Number, Field(ge=0, le=1), Tag("number")] | Annotated[tuple[str, ...], Tag("list")],
@@ -368,13 +344,8 @@ class Recipe(Shown, Frozen):
     @property
     def digest(self) -> str:
         """SHA-256 (hexadecimal) of all that changes a picture or a label; formats, for one, do not."""
-        without = BEFORE_RENDERING | {name for name in LATER if getattr(self, name) is None}
         credit: Any = {"models": {"__all__": set(Credit.model_fields)}}
-        value = self.model_dump(mode="json", exclude=dict.fromkeys(without, True) | credit)
-        for path, default in LATER_FIELDS.items():
-            _leave_out(value, path, default)
-        if value["scene"]["view"]["exposure"] == "auto" and not self.scene.may_be_indoors:
-            value["scene"]["view"]["exposure"] = 0.0  # what it was before it could be auto
+        value = self.model_dump(mode="json", exclude=dict.fromkeys(BEFORE_RENDERING, True) | credit)
         text = json.dumps(value, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -386,19 +357,6 @@ class Recipe(Shown, Frozen):
         for name in () if self.time is None else self.scene.flickering:
             plain.setdefault("scene", {}).setdefault(name, {})["draw"] = "per_frame"
         return dump(plain)
-
-
-def _leave_out(value: Any, path: Sequence[str], default: object) -> None:
-    """Take a field that has its default out of nested mappings, and out of each entry of lists on the way, where it is."""
-    name, *rest = path
-    if isinstance(value, list):
-        for entry in cast("list[Any]", value):
-            _leave_out(entry, path, default)
-    elif isinstance(value, dict) and name in value:
-        if rest:
-            _leave_out(value[name], rest, default)
-        elif value[name] == default:
-            del value[name]
 
 
 def _plain(value: Any) -> Any:

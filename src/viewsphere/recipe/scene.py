@@ -277,11 +277,6 @@ class SceneEntry(Frozen):
         return tuple(alternatives(self.background))
 
     @property
-    def may_be_indoors(self) -> bool:
-        """Whether the place may be a room: one of the zoo's that says so, or a file, which is not read here."""
-        return self.place is not None and (not self.place.name or self.place.is_room)
-
-    @property
     def automatic_ground(self) -> Literal["on", "off", "catcher"]:
         """The ground that `ground: auto` stands for in this scene."""
         if self.blend is not None:

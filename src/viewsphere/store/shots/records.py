@@ -29,7 +29,7 @@ from viewsphere.store.paths import names
 from viewsphere.store.shots.manifest import sealed, unsealed
 from viewsphere.store.texts import parsed
 
-STORE_VERSION = 2
+STORE_VERSION = 3
 
 MOST_FRAMES = 2**53
 """Frames of a data set: larger numbers would not be exact in everybody's JSON."""
