@@ -25,7 +25,7 @@ SLACK = f4(0.01)  # relative difference of 1/z at which two surfaces still pass 
 FLUSH = f4(1.001)  # of 1/z: a vertex in a surface that is already drawn does not count as behind it
 NARROW = 8  # pixels: up to this size every pixel of a triangle's box is looked at
 CELL = 16  # pixels: numbered pixels are found by the cell of their row that they are in
-FEW = 4  # pixels of a row: up to so many are tested one by one, which is faster than computing what the triangle covers
+FEW = 4  # numbered pixels in a row's cells: up to so many are tested one by one, sooner than the row's covered part is known
 THIN = 2.0  # pixels: a triangle as wide as this is seen at some pixel's centre
 
 
@@ -143,23 +143,18 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
         thin = not crossing and abs(det) * w0 * w1 * w2 < THIN * max(xb - xa, yb - ya)
         for y in range(ya, ya + 1 if narrow else yb + 1):
             if not narrow:
-                n, row = U(0), U(y)
-                if not thin:
-                    for k in range(U(starts[y * cells + xa // CELL]), U(starts[y * cells + xb // CELL + 1])):
+                n, row, cell, left, right = U(0), U(y), y * cells, xa, xb
+                if thin or starts[cell + xb // CELL + 1] - starts[cell + xa // CELL] > FEW:
+                    left, right = span((e0, e1, e2), y, xa, xb, lowest, highest)
+                if thin:
+                    for x in range(left, right + 1):
+                        found[n] = row << U(16) | U(x)
+                        n += U(before > limit[row, U(x)])
+                elif left <= right:
+                    for k in range(U(starts[cell + left // CELL]), U(starts[cell + right // CELL + 1])):
                         x = U(pixels[k] - y * width)
                         found[n] = row << U(16) | x
-                        n += U((x >= U(xa)) & (x <= U(xb)) & (before > limit[row, x]))
-                if thin or n > U(FEW):
-                    left, right = span((e0, e1, e2), y, xa, xb, lowest, highest)
-                    listed, n = n, U(0)
-                    if thin:
-                        for x in range(left, right + 1):
-                            found[n] = row << U(16) | U(x)
-                            n += U(before > limit[row, U(x)])
-                    for j in range(listed):
-                        found[n] = found[j]
-                        x = np.int64(found[j] & np.uint32(0xFFFF))
-                        n += U((x >= left) & (x <= right))
+                        n += U((x >= U(left)) & (x <= U(right)) & (before > limit[row, x]))
             for j in range(n):
                 row, column = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF))
                 k = grid[row, column]
