@@ -6,7 +6,7 @@
 A test file is chosen if it changed, or if it reaches a module that changed. It reaches what it imports, what its helpers
 and fixtures import, and what all of these import in turn, also inside functions (grimp reads the imports). Plug-ins, the
 command line and files are no imports. So a test also reaches what its strings name: a plug-in, a dotted path, the program,
-a file of `docs`, `recipes`, `examples` or `scripts` and what this file names in turn.
+a file of `docs`, `recipes`, `examples`, `benchmarks` or `scripts` and what this file names in turn.
 
 All tests are chosen where this cannot tell: without a revision to compare with, and for every other changed file. CI runs
 all tests on the default branch.
@@ -33,7 +33,7 @@ from viewsphere.plugins.registry import SEAMS
 
 ROOT = Path(__file__).parent.parent
 MAIN = "origin/main"
-READ = ("docs", "recipes", "examples", "scripts")
+READ = ("docs", "recipes", "examples", "benchmarks", "scripts")
 """Folders of files that tests read or run."""
 NAMING = ("viewsphere.formats.", "viewsphere.labels.", "viewsphere.zoo.")
 """Packages whose plug-ins name others. All other modules are given the names by recipes and by tests."""
@@ -302,7 +302,7 @@ def choose(changed: Iterable[str]) -> list[str]:
             chosen |= {file} & set(tests.files)  # one that is gone breaks none
         elif file.startswith("src/"):
             code |= modules_of(file, modules)
-        elif file.startswith(READ[:-1]) or ("/" not in file and file.endswith(".md")):
+        elif file.split("/")[0] in READ[:-1] or ("/" not in file and file.endswith(".md")):
             read.add(file if "/" in file else "docs/index.md")  # the tests of docs read those at the top as well
         else:
             raise CannotTell(f"any test may need {file}")

@@ -47,6 +47,7 @@ def chosen():
          ["tests/geometry/test_box.py"]),
         ("recipes/street.yaml", ["tests/test_recipes_as_shipped.py"],
          ["tests/geometry/test_box.py"]),
+        ("benchmarks/bench_rivals.py", ["tests/test_bench_rivals.py"], ["tests/geometry/test_box.py"]),
         ("README.md", ["tests/test_docs.py"],
          ["tests/geometry/test_box.py"]),
         ("tests/geometry/test_box.py", ["tests/geometry/test_box.py"],
