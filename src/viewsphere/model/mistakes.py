@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from viewsphere.errors import RecipeError
+from viewsphere.errors import MOST_TOLD, RecipeError
 from viewsphere.model.suggestions import suggestion
 
 Options = TypeVar("Options", bound=BaseModel)
@@ -66,6 +66,21 @@ def nearest(name: object, known: Iterable[str]) -> str:
     """`; did you mean 'x'?` with the valid name that was most likely meant; empty if none is close."""
     meant = suggestion(name, known)
     return f"; did you mean {meant!r}?" if meant else ""
+
+
+class Nearest:
+    """`nearest` for mistakes that are reported together: compares only as many different names as are shown, so that a wrong
+    table of thousands of names takes no longer than its reading.
+    """
+
+    def __init__(self) -> None:
+        self._hints: dict[object, str] = {}
+
+    def __call__(self, name: object, known: Iterable[str]) -> str:
+        """What `nearest` gives; nothing for names beyond those that are shown."""
+        if name not in self._hints:
+            self._hints[name] = nearest(name, known) if len(self._hints) < MOST_TOLD else ""
+        return self._hints[name]
 
 
 def one_of(name: object, known: Sequence[str]) -> str:

@@ -111,7 +111,8 @@ def _begun(name: str, names: Iterable[str]) -> str | None:
 def _closest(name: str, names: Iterable[str]) -> str | None:
     lower = name.lower()
     most = next((edits for length, edits in CLOSE if len(lower.lstrip("-")) <= length), 0)
-    longer = [one for one in names if len(lower) > 2 or len(one) > len(lower)]  # of two letters, a changed one is half
+    alike = (one for one in names if abs(len(one) - len(lower)) <= most)  # each letter more is an edit
+    longer = [one for one in alike if len(lower) > 2 or len(one) > len(lower)]  # of two letters, a changed one is half
     near = [(edits(lower, one.lower()), one) for one in longer if not _is_opposite(lower, one.lower())]
     least = min(near, key=lambda pair: pair[0], default=(most + 1, ""))
     return least[1] if least[0] <= min(most, len(least[1]) - 1) else None

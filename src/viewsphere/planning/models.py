@@ -24,7 +24,7 @@ from viewsphere.composing.tables import Cells, table_rows
 from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.limits import limits
 from viewsphere.model.file_names import is_reserved
-from viewsphere.model.mistakes import nearest, one_of
+from viewsphere.model.mistakes import Nearest, one_of
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.plugins import families
 from viewsphere.recipe.draws import drawn
@@ -87,7 +87,7 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
     """
     found = each(lambda i: tuple(_found(recipe, i)), range(len(recipe.models)))
     ids = {c.name: c.id for c in categories(recipe)}
-    table = cache(_read_sizes)
+    table, hint = cache(_read_sizes), Nearest()
 
     def numbered(found: _Found) -> tuple[ModelSpec, int]:
         entry = recipe.models[found.entry]
@@ -106,7 +106,7 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             unit=None if entry.unit is None else unit_metres(entry.unit),
             centring=entry.centring,
             scale=_scale(recipe, entry, found.key),
-            real_size=_real_size(recipe, found, table),
+            real_size=_real_size(recipe, found, table, hint),
             confined=entry.confined,
             sidecar=_sidecar(recipe, found.entry),
             symmetries="found" if entry.symmetries == "found" else None,
@@ -390,7 +390,7 @@ def _variant(key: str, path: Path, folders: int, *, ending: bool) -> str:
     return _short("-".join([key, *map(_as_key, names), *([path.suffix[1:]] if ending else [])]))
 
 
-def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes]) -> Size | Literal["file"] | None:
+def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes], hint: Nearest) -> Size | Literal["file"] | None:
     size = recipe.models[found.entry].real_size
     if isinstance(size, Dimensions):
         return size.width, size.height, size.length
@@ -405,7 +405,7 @@ def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes]) ->
     if row is None:
         raise RecipeError(
             f"models[{found.entry}].real_size: expected a row for {name!r} in {recipe.folder / path}; found none"
-            f"{nearest(name, sizes)}"
+            f"{hint(name, sizes)}"
         )
     width, height, length = (value * unit for value in row)
     return width, height, length

@@ -14,13 +14,16 @@ from viewsphere.model.notebook import Shown
 from viewsphere.model.quantity import quantity
 from viewsphere.model.sample import Sample
 from viewsphere.model.share import Share
+from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import Plan, plan
 from viewsphere.planning.turns import Turns
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
+from viewsphere.run.progress import shown_on_terminal
 from viewsphere.run.share import known_to_loaders, share_of, share_of_rank, share_of_worker
 from viewsphere.run.stages import Stages
+from viewsphere.run.warm import precompile, told_to
 
 
 class Frames(Shown, Iterable[Sample]):
@@ -36,11 +39,13 @@ class Frames(Shown, Iterable[Sample]):
         self._shard, self._shuffle, self._epochs, self._redraw = shard, shuffle, epochs, redraw
         self._stages = Stages()
         self._taken: Iterator[Sample] | None = None
+        self._is_compiled = False
         known_to_loaders(type(self))
 
     def __getstate__(self) -> dict[str, Any]:
         """What workers of data loaders are sent: this process's rank, but nothing that is warm."""
-        return {**self.__dict__, "_shard": self._shard or share_of_rank(), "_stages": Stages(), "_taken": None}
+        cold = {"_stages": Stages(), "_taken": None, "_is_compiled": False}
+        return {**self.__dict__, "_shard": self._shard or share_of_rank(), **cold}
 
     def __repr__(self) -> str:
         loops = "endless" if self._epochs is None else f"epochs {self._epochs}"
@@ -87,7 +92,15 @@ class Frames(Shown, Iterable[Sample]):
                 self._stages.read_ahead(planned, planned.cast(turn.subject))
                 self._stages.check_distances(planned, turn.subject)
             for row in turns.rows(turn):
-                yield from self._stages.render(framing.shot(row))
+                shot = framing.shot(row)
+                self._compile_for(shot)
+                yield from self._stages.render(shot)
+
+    def _compile_for(self, shot: Shot) -> None:
+        """Compile on all cores the kernels that the first shot calls, with a line on a terminal that counts them."""
+        if not self._is_compiled:
+            precompile(shot, told_to(shown_on_terminal))
+            self._is_compiled = True
 
     def _drawn(self, epoch: int) -> Plan:
         """The plan, whose random choices are drawn anew for each epoch where that is asked for."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -29,3 +30,11 @@ Listener = Callable[[Progress], None]
 
 def unheard(progress: Progress) -> None:
     """Nobody listens."""
+
+
+def shown_on_terminal(progress: Progress) -> None:
+    """Count the kernels that are compiled in a line of standard error where that is a terminal; elsewhere stay silent."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        end = "\n" if progress.done == progress.total else ""
+        sys.stderr.write(f"\rcompiling kernels, once on this machine: {progress.done} of {progress.total}{end}")
+        sys.stderr.flush()

@@ -12,7 +12,7 @@ from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics
 from viewsphere.composing.viewpoints.poses import ListedPoses, placed, pose_file, world_turn
 from viewsphere.errors import RecipeError, each
 from viewsphere.model.listed import ListedObject
-from viewsphere.model.mistakes import nearest, one_of
+from viewsphere.model.mistakes import Nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Rig
@@ -36,6 +36,8 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
         how = "frame, as shots say their splits" if say_splits else "scene, pose, place or frame beside sampler: listed"
         raise RecipeError(f"splits.by: expected {how}; found {recipe.splits.by}: set splits: {{by: frame}}")
 
+    hint = Nearest()
+
     def name(shot: Arranged) -> str:
         where, split = f"{path}:{shot.line}", shot.said.split
         if split is not None and split not in recipe.splits.shares:
@@ -45,7 +47,7 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
             if one.model not in keys:
                 raise RecipeError(
                     f"{where}: objects[{i}].model: expected the key of a model of the recipe; found {one.model!r}"
-                    f"{nearest(one.model, keys)}"
+                    f"{hint(one.model, keys)}"
                 )
         return shot.name
 
