@@ -17,7 +17,7 @@ from viewsphere.kernels.digests import package_digest
 
 T = TypeVar("T")
 
-PACKAGES = ("engines", "surroundings", "materials", "geometry", "kernels")
+PACKAGES = ("engines", "rendering", "materials", "geometry", "kernels")
 """Packages whose sources baked light depends on, besides the meshes and the light that it is made of."""
 
 
