@@ -31,7 +31,8 @@ from bench_scene import reference_recipe, write_reference
 from viewsphere import generate, plan, plugins
 from viewsphere.assets.mesh import Mesh
 from viewsphere.engines import Stage
-from viewsphere.engines.raster import painting, staging
+from viewsphere.engines.raster import staging
+from viewsphere.engines.raster.shading import painting
 from viewsphere.geometry.box import box_vertices
 from viewsphere.labels import annotated, observe, sight_of
 from viewsphere.model.camera import Camera

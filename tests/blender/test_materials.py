@@ -16,7 +16,7 @@ from blender_scenes import UPRIGHT, Scene, ball, camera, card, flat_image, raste
 from viewsphere.assets.mesh import WRAPS, Image, Material, Texture
 from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.exr import encode_exr
-from viewsphere.engines.raster.painting import paint
+from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.model import scene as model
 from viewsphere.rendering.view import EXPOSURE
 from viewsphere.truth.raster.visibility import rasterize

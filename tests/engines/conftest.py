@@ -5,4 +5,4 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def light_is_baked(monkeypatch):
-    monkeypatch.setattr("viewsphere.engines.raster.bounces.kept_light", lambda content, make, types: make())
+    monkeypatch.setattr("viewsphere.engines.raster.indirect.bounces.kept_light", lambda content, make, types: make())

@@ -9,13 +9,13 @@ from called import called
 from test_raster import box, mesh_of, rectangle
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.engines.raster import kernels_block as row
-from viewsphere.engines.raster.kernels_arrive import arrive
-from viewsphere.engines.raster.kernels_material import L_CASTS_FROM
-from viewsphere.engines.raster.kernels_occlusion import occlude
-from viewsphere.engines.raster.lights import Casters, Extent, Lights, bake_lights
-from viewsphere.engines.raster.occlusion import Occlusion
-from viewsphere.engines.raster.surface import Lengths, Rows, pack_materials
+from viewsphere.engines.raster.materials.kernels_material import L_CASTS_FROM
+from viewsphere.engines.raster.materials.surface import Lengths, Rows, pack_materials
+from viewsphere.engines.raster.shading import kernels_block as row
+from viewsphere.engines.raster.shadows.kernels_direct_light import arrive
+from viewsphere.engines.raster.shadows.kernels_occlusion import occlude
+from viewsphere.engines.raster.shadows.occlusion import Occlusion
+from viewsphere.engines.raster.shadows.shadow_maps import Casters, Extent, Lights, bake_lights
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec

@@ -6,10 +6,10 @@ import numpy as np
 from called import called
 
 from viewsphere.assets.mesh import Image, Material, Mesh
-from viewsphere.engines.raster import kernels_block as block
-from viewsphere.engines.raster.kernels_material import material
+from viewsphere.engines.raster.materials.kernels_material import material
+from viewsphere.engines.raster.materials.surface import Lengths, Rows, pack_materials
 from viewsphere.engines.raster.records import PictureRays
-from viewsphere.engines.raster.surface import Lengths, Rows, pack_materials
+from viewsphere.engines.raster.shading import kernels_block as block
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Thing

@@ -14,12 +14,14 @@ from quick import quick
 from shots import painted, still_shot
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines import raster
-from viewsphere.engines.raster import bounces as baking
-from viewsphere.engines.raster import gathering, lightmaps, volumes
-from viewsphere.engines.raster.kernels_probes import look_up
+from viewsphere.engines.raster.indirect import bounces as baking
+from viewsphere.engines.raster.indirect import final_gather as gathering
+from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
+from viewsphere.engines.raster.indirect.kernels_probes import look_up
+from viewsphere.engines.raster.lightmaps.lightmaps import lightmaps
 from viewsphere.engines.raster.options import parse_options
-from viewsphere.engines.raster.painting import paint
 from viewsphere.engines.raster.records import Bounces
+from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, PointLight, Scene, Sky, Sun

@@ -10,11 +10,11 @@ import pytest
 from called import called
 
 from quick import quick
-from viewsphere.engines.raster import kernels_block as rows
-from viewsphere.engines.raster import kernels_light
-from viewsphere.engines.raster.environment import Surrounding, bake_surrounding, lobe_albedo
-from viewsphere.engines.raster.kernels_environment import BELOW
 from viewsphere.engines.raster.records import NO_BOUNCES
+from viewsphere.engines.raster.shading import kernels_block as rows
+from viewsphere.engines.raster.shading import kernels_light
+from viewsphere.engines.raster.sky.environment import Surrounding, bake_surrounding, lobe_albedo
+from viewsphere.engines.raster.sky.kernels_environment import BELOW
 from viewsphere.model.scene import Sky
 from viewsphere.rendering.view import EXPOSURE
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.engines.raster import bundles
-from viewsphere.engines.raster.bundles import BundlePacker
-from viewsphere.engines.raster.kernels_filter import PLANES
+from viewsphere.engines.raster.materials import bundles
+from viewsphere.engines.raster.materials.bundles import BundlePacker
+from viewsphere.engines.raster.materials.kernels_filter import PLANES
 
 SET = ("base_color_texture", "normal_texture", "metallic_roughness_texture")
 

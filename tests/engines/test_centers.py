@@ -6,8 +6,8 @@ import numba as nb
 import numpy as np
 import pytest
 
-from viewsphere.engines.raster.kernels_block import BLOCK, T0, T1
-from viewsphere.engines.raster.kernels_gather import _find_centers
+from viewsphere.engines.raster.shading.kernels_block import BLOCK, T0, T1
+from viewsphere.engines.raster.shading.kernels_gather import _find_centers
 from viewsphere.kernels.jit import njit
 
 

@@ -10,10 +10,10 @@ import pytest
 from called import called
 
 from quick import quick
-from viewsphere.engines.raster import kernels_block as rows
-from viewsphere.engines.raster.environment import bake_surrounding, sky_behind, sky_lights, without_sun
-from viewsphere.engines.raster.kernels_light import light_around
 from viewsphere.engines.raster.records import PictureRays
+from viewsphere.engines.raster.shading import kernels_block as rows
+from viewsphere.engines.raster.shading.kernels_light import light_around
+from viewsphere.engines.raster.sky.environment import bake_surrounding, sky_behind, sky_lights, without_sun
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Daylight, Environment, Sky, Sun
 from viewsphere.rendering.sky.daylight import air, daylight_picture

@@ -13,12 +13,15 @@ from test_panes import PLATE, behind, metal, plate
 from test_raster import DARK, box, camera, rectangle
 
 from viewsphere.assets.mesh import Material
-from viewsphere.engines.raster import bounces, kernels_mirror, panes, volumes
-from viewsphere.engines.raster.gathering_near import with_near
-from viewsphere.engines.raster.lobes import lobe_rays
-from viewsphere.engines.raster.painting import paint, view_of
-from viewsphere.engines.raster.panes import mirror_in_panes
-from viewsphere.engines.raster.polish import NOWHERE
+from viewsphere.engines.raster.indirect import bounces
+from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
+from viewsphere.engines.raster.indirect.near_field_gather import with_near
+from viewsphere.engines.raster.reflections import kernels_mirror
+from viewsphere.engines.raster.reflections import planar_reflections as panes
+from viewsphere.engines.raster.reflections.glossy_reflections import NOWHERE
+from viewsphere.engines.raster.reflections.lobes import lobe_rays
+from viewsphere.engines.raster.reflections.planar_reflections import mirror_in_panes
+from viewsphere.engines.raster.shading.painting import paint, view_of
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground, Scene, Sun

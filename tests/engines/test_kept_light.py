@@ -5,10 +5,10 @@ import pytest
 from PIL import Image
 
 from viewsphere.caches import cache_of
-from viewsphere.engines.raster import kept_light
 from viewsphere.engines.raster.baking import _floor
+from viewsphere.engines.raster.indirect import kept_light
+from viewsphere.engines.raster.materials.surface import Lengths
 from viewsphere.engines.raster.records import NO_LIGHTMAP, Lightmap
-from viewsphere.engines.raster.surface import Lengths
 from viewsphere.model.scene import Ground
 
 HERE = Lengths((0.0, 0.0, 0.0), 1.0)

@@ -8,12 +8,13 @@ from test_bounces import EVEN, inside_out, matt, painted_mesh, room, stage_of, w
 from test_raster import DARK, box, camera, mesh_of, rectangle
 
 from shots import painted
-from viewsphere.engines.raster import bounces as baking
-from viewsphere.engines.raster import gathering, lightmaps, volumes
-from viewsphere.engines.raster import kernels_lightmap as kernels
-from viewsphere.engines.raster.kernels_probes import look_up
-from viewsphere.engines.raster.lightmaps import CELL, MOST, TURNS, charts_of
-from viewsphere.engines.raster.tracing import cast, tree_of
+from viewsphere.engines.raster.indirect import bounces as baking
+from viewsphere.engines.raster.indirect import final_gather as gathering
+from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
+from viewsphere.engines.raster.indirect.kernels_probes import look_up
+from viewsphere.engines.raster.lightmaps.lightmaps import CELL, MOST, TURNS, charts_of, lightmaps
+from viewsphere.engines.raster.lightmaps.lightmaps import kernels_lightmap as kernels
+from viewsphere.engines.raster.reflections.tracing import cast, tree_of
 from viewsphere.model.scene import Scene, Sun
 
 LOW, HIGH = np.array((-1.0, -0.8, -0.6)), np.array((1.0, 0.8, 0.6))

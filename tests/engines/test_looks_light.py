@@ -11,7 +11,7 @@ from light_stage import cuboid, flat
 
 from shots import painted, still_shot
 from viewsphere.engines import raster
-from viewsphere.engines.raster.environment import bake_surrounding, sky_lights
+from viewsphere.engines.raster.sky.environment import bake_surrounding, sky_lights
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from truth_scenes import LENSES, cube, lens, orbit_camera, placed, random_soup
-from viewsphere.engines.raster.mirroring import blurred, looked_at, lying
+from viewsphere.engines.raster.reflections.mirroring import blurred, looked_at, lying
 from viewsphere.geometry.camera import project
 from viewsphere.truth.raster.visibility import rasterize
 

@@ -12,8 +12,8 @@ from light_stage import LightStage, Samples, ball, cuboid, distances, flat, poin
 
 from quick import quick
 from viewsphere import zoo
-from viewsphere.engines.raster import occlusion
-from viewsphere.engines.raster.occlusion import NO_OCCLUSION, bake_occlusion, sky_directions, with_ground_light
+from viewsphere.engines.raster.shadows import occlusion
+from viewsphere.engines.raster.shadows.occlusion import NO_OCCLUSION, bake_occlusion, sky_directions, with_ground_light
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.rendering.sky.sun import Distant

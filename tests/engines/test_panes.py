@@ -12,10 +12,10 @@ from test_raster import DARK, box, camera, rectangle
 
 from shots import with_camera
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.engines.raster import volumes
-from viewsphere.engines.raster.painting import paint
-from viewsphere.engines.raster.panes import mirror_in_panes
-from viewsphere.engines.raster.polish import NOWHERE
+from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
+from viewsphere.engines.raster.reflections.glossy_reflections import NOWHERE
+from viewsphere.engines.raster.reflections.planar_reflections import mirror_in_panes
+from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.scene import Scene, Sun
 from viewsphere.truth.raster.visibility import rasterize

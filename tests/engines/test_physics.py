@@ -18,7 +18,7 @@ from shots import painted, still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster
-from viewsphere.engines.raster.painting import paint
+from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec

@@ -9,7 +9,7 @@ from test_raster import box, mesh_of, rectangle
 from shots import still_shot
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import raster
-from viewsphere.engines.raster.still_maps import MOST, STEPS, StillMaps, rounded, snapped
+from viewsphere.engines.raster.shadows.still_maps import MOST, STEPS, StillMaps, rounded, snapped
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec

@@ -9,9 +9,9 @@ from test_bounces import both, room, stage_of
 from test_raster import DARK, camera
 
 from viewsphere.assets.mesh import Material
-from viewsphere.engines.raster import volumes
-from viewsphere.engines.raster.painting import paint
-from viewsphere.engines.raster.polish import mirror_in_polish
+from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
+from viewsphere.engines.raster.reflections.glossy_reflections import mirror_in_polish
+from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.scene import Scene
 from viewsphere.truth.raster.visibility import rasterize

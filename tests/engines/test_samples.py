@@ -8,9 +8,9 @@ import pytest
 from quick import quick
 from truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, random_soup, sphere
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.engines.raster.kernels_paint import BRIGHT, GLINT, average_samples, brighten_lines, shared_samples
-from viewsphere.engines.raster.kernels_samples import TIE
-from viewsphere.engines.raster.samples import NOWHERE, OFFSETS, edge_samples, layers
+from viewsphere.engines.raster.antialiasing.kernels_samples import TIE
+from viewsphere.engines.raster.antialiasing.samples import NOWHERE, OFFSETS, edge_samples, layers
+from viewsphere.engines.raster.shading.kernels_paint import BRIGHT, GLINT, average_samples, brighten_lines, shared_samples
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.truth.raster.visibility import rasterize

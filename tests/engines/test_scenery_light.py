@@ -9,7 +9,7 @@ from test_raster import BLACK, DARK, SPEC, box, camera, mesh_of, rectangle
 from shots import painted, still_shot
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import raster
-from viewsphere.engines.raster.arriving import arriving
+from viewsphere.engines.raster.shadows.arriving import arriving
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Scene, Sky, Sun
 from viewsphere.model.thing import Motion, Thing

@@ -11,7 +11,7 @@ from light_stage import LightStage, ball, cuboid, distances, flat, points, quad
 from quick import quick
 from viewsphere import zoo
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.engines.raster import kernels_shadow as shadow
+from viewsphere.engines.raster.shadows import kernels_shadow as shadow
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.scene import AreaLight, HemisphereLight, PointLight, SpotLight, Sun

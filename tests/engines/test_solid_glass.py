@@ -11,7 +11,7 @@ from light_stage import ball, cuboid, flat, quad
 from test_physics import camera, even, furnace, light_of, picture, sky_file, stage_of  # noqa: F401 (a fixture)
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.engines.raster.painting import paint
+from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.scene import Ground, Scene, Sky
 from viewsphere.rendering.view import EXPOSURE

@@ -9,10 +9,10 @@ from material_blocks import card, edges_of, made, packed, view_of
 
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import linear
-from viewsphere.engines.raster import kernels_block as block
-from viewsphere.engines.raster import kernels_filter as kf
-from viewsphere.engines.raster import kernels_material as km
-from viewsphere.engines.raster.bundles import BundlePacker
+from viewsphere.engines.raster.materials import kernels_filter as kf
+from viewsphere.engines.raster.materials import kernels_material as km
+from viewsphere.engines.raster.materials.bundles import BundlePacker
+from viewsphere.engines.raster.shading import kernels_block as block
 from viewsphere.kernels.jit import njit
 
 RNG = np.random.default_rng(4)
@@ -212,7 +212,7 @@ def test_textures_of_one_size_share_a_bundle():
 
 
 def test_very_large_textures_are_reduced(monkeypatch):
-    from viewsphere.engines.raster import bundles
+    from viewsphere.engines.raster.materials import bundles
 
     monkeypatch.setattr(bundles, "SHARPEST", 16)
     image = Image("a", RNG.integers(0, 256, (20, 50, 4)).astype(np.uint8))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewsphere.engines.raster.tracing import cast, tree_of, unblocked
+from viewsphere.engines.raster.reflections.tracing import cast, tree_of, unblocked
 
 
 def test_rays_meet_what_brute_force_finds():

@@ -11,16 +11,15 @@ from test_bounces import inside_out, matt, painted_mesh, stage_of
 from test_raster import DARK, box, camera, mesh_of, rectangle
 
 from shots import painted
-from viewsphere.engines.raster import bounces as baking
-from viewsphere.engines.raster import vertex_light
-from viewsphere.engines.raster.kernels_block import BARY1, BARY2, BLOCK, GLOW_R, GX, MAPPED, NX, ROWS
-from viewsphere.engines.raster.kernels_lightmap import WEIGHT
-from viewsphere.engines.raster.kernels_probes import look_up
-from viewsphere.engines.raster.kernels_vertex_light import NONE, read_vertices
-from viewsphere.engines.raster.lightmaps import charts_of
+from viewsphere.engines.raster.indirect import bounces as baking
+from viewsphere.engines.raster.indirect.kernels_probes import look_up
+from viewsphere.engines.raster.lightmaps.kernels_lightmap import WEIGHT
+from viewsphere.engines.raster.lightmaps.kernels_vertex_light import NONE, read_vertices
+from viewsphere.engines.raster.lightmaps.lightmaps import charts_of, vertex_light
+from viewsphere.engines.raster.lightmaps.vertex_light import vertex_light_of
 from viewsphere.engines.raster.records import NO_LIGHTMAP
-from viewsphere.engines.raster.tracing import tree_of
-from viewsphere.engines.raster.vertex_light import vertex_light_of
+from viewsphere.engines.raster.reflections.tracing import tree_of
+from viewsphere.engines.raster.shading.kernels_block import BARY1, BARY2, BLOCK, GLOW_R, GX, MAPPED, NX, ROWS
 from viewsphere.kernels.jit import njit
 from viewsphere.model.scene import Scene
 

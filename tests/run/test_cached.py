@@ -4,7 +4,7 @@ import pytest
 
 from small import small_recipe, tree_hash
 from viewsphere.caches import budget
-from viewsphere.engines.raster import bounces
+from viewsphere.engines.raster.indirect import bounces
 from viewsphere.kernels.entries import kernel_folder
 from viewsphere.run.generate import generate
 

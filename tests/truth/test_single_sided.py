@@ -8,7 +8,7 @@ import pytest
 
 from truth_scenes import FISHEYE, LENSES, cast, lens, mesh_of, orbit_camera, random_soup
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.engines.raster.samples import edge_samples
+from viewsphere.engines.raster.antialiasing.samples import edge_samples
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing

@@ -14,20 +14,20 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import linear
 from viewsphere.engines._arranged import Arranged
 from viewsphere.engines._lamps import lamplight
-from viewsphere.engines.raster import kernels_paint
-from viewsphere.engines.raster.bounces import bake_bounces, tree_of_hall
-from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
-from viewsphere.engines.raster.glass import glass_of
-from viewsphere.engines.raster.halls import Halls
-from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
-from viewsphere.engines.raster.lights import Casters, Extent, bake_lights
-from viewsphere.engines.raster.occlusion import bake_occlusion, of_ground_alone, with_ground_light
+from viewsphere.engines.raster.indirect.bounce_scene import Halls
+from viewsphere.engines.raster.indirect.bounces import bake_bounces, tree_of_hall
+from viewsphere.engines.raster.materials.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
+from viewsphere.engines.raster.materials.surface import Lengths, Materials, Rows, made_of, pack_materials
 from viewsphere.engines.raster.options import Options
-from viewsphere.engines.raster.painting import Baked
 from viewsphere.engines.raster.records import NO_BOUNCES, Float32, Int32, Surfaces
-from viewsphere.engines.raster.still_maps import StillMaps
-from viewsphere.engines.raster.surface import Lengths, Materials, Rows, made_of, pack_materials
-from viewsphere.engines.raster.thing_occlusion import TargetShades
+from viewsphere.engines.raster.reflections.glass import glass_of
+from viewsphere.engines.raster.shading import kernels_paint
+from viewsphere.engines.raster.shading.painting import Baked
+from viewsphere.engines.raster.shadows.occlusion import bake_occlusion, of_ground_alone, with_ground_light
+from viewsphere.engines.raster.shadows.shadow_maps import Casters, Extent, bake_lights
+from viewsphere.engines.raster.shadows.still_maps import StillMaps
+from viewsphere.engines.raster.shadows.thing_occlusion import TargetShades
+from viewsphere.engines.raster.sky.environment import bake_surrounding, lamps_on_ground, sky_lights
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.rendering.ground.material import SLABS, ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.rendering.sky.sky import even_light

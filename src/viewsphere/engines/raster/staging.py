@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 from viewsphere.assets.deforming import Load
 from viewsphere.engines._arranged import Arranged, Arrangements
 from viewsphere.engines._passes import shading_of
+from viewsphere.engines.raster.antialiasing.supersampling import paint_finely
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
 from viewsphere.engines.raster.blurring import Blur
-from viewsphere.engines.raster.halls import Halls
+from viewsphere.engines.raster.indirect.bounce_scene import Halls
+from viewsphere.engines.raster.materials.surface import Lengths
 from viewsphere.engines.raster.options import Options, parse_options
-from viewsphere.engines.raster.painting import NO_SPLIT, Baked, materials, paint
-from viewsphere.engines.raster.panes import mirror_in_panes
-from viewsphere.engines.raster.polish import NOWHERE, mirror_in_polish
 from viewsphere.engines.raster.records import Float32
-from viewsphere.engines.raster.supersampling import paint_finely
-from viewsphere.engines.raster.surface import Lengths
-from viewsphere.engines.raster.thing_occlusion import TargetShades
-from viewsphere.engines.raster.wet_ground import mirror_in_water
+from viewsphere.engines.raster.reflections.glossy_reflections import NOWHERE, mirror_in_polish
+from viewsphere.engines.raster.reflections.planar_reflections import mirror_in_panes
+from viewsphere.engines.raster.reflections.wet_ground import mirror_in_water
+from viewsphere.engines.raster.shading.painting import NO_SPLIT, Baked, materials, paint
+from viewsphere.engines.raster.shadows.thing_occlusion import TargetShades
 from viewsphere.errors import RecipeError
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of

@@ -1,0 +1,1 @@
+"""Samples along edges and finer pictures."""

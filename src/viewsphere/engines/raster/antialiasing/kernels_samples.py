@@ -1,0 +1,435 @@
+"""Exact rasterisation of a few chosen pixels, several points each: truth's algebra, bit for bit, at any point of a pixel.
+
+Point m of chosen pixel k (see `kernels_chosen`) is at (x, y) + `offsets`[:, m]. `nearest` (1/z of the nearest solid surface, 0
+where there is none) and `seen` (its triangle) are (K, M). `farthest` (H, W) holds, as a `level`, the 1/z that a surface must
+exceed to matter to a pixel, CLOSED for pixels that are not drawn; `tiles` holds its minimum in each tile. See-through surfaces
+are listed from near to far in `inverses` and `listed` (K, M, capacity), `counts` of them at each point.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from viewsphere.engines.raster.antialiasing.kernels_chosen import CLOSED, TILE, level
+from viewsphere.kernels.jit import inner, njit
+from viewsphere.truth.kernel_constants import NEARER
+from viewsphere.truth.raster.kernels_draw import (
+    BEHIND,
+    EPSILON,
+    NEVER,
+    ROUNDED_UP,
+    SLIVER,
+    crossing_at,
+    edges_inside,
+    hits_surface,
+    plane,
+)
+from viewsphere.truth.raster.kernels_rays import ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
+
+U = nb.uintp
+TIE = 1e-5  # relative difference of 1/z below which two surfaces count as lying on one another
+NARROW = TILE  # pixels: up to this size every pixel of a triangle's box is looked at
+MEDIUM = 64  # pixels: up to this size every tile of a box is looked at, beyond it every row
+
+
+@inner
+def _box(q, i0, i1, i2, reach, width, height):
+    """First and last pixel (x0, y0, x1, y1) in which points may be covered; x0 is BEHIND if a corner is behind the camera."""
+    c, d = U(2), U(3)
+    if min(q[i0, c], q[i1, c], q[i2, c]) <= 0.0:
+        return BEHIND, 0, 0, 0
+    low, high = reach[0] - EPSILON, reach[1] + EPSILON
+    x0, x1, x2 = q[i0, U(0)] * q[i0, d], q[i1, U(0)] * q[i1, d], q[i2, U(0)] * q[i2, d]
+    y0, y1, y2 = q[i0, U(1)] * q[i0, d], q[i1, U(1)] * q[i1, d], q[i2, U(1)] * q[i2, d]
+    return (
+        math.ceil(min(max(min(x0, x1, x2) - high, 0.0), float(width))),
+        math.ceil(min(max(min(y0, y1, y2) - high, 0.0), float(height))),
+        math.floor(max(min(max(x0, x1, x2) - low, width - 1.0), -1.0)),
+        math.floor(max(min(max(y0, y1, y2) - low, height - 1.0), -1.0)),
+    )
+
+
+@njit(_nrt=True)
+def around(q, triangles, runs, cutout, left_out, window):
+    """Triangles, int64, that may touch a window (x0, y0, x1, y1; pixels, both ends included), except those in `left_out`.
+    `runs` are those of `kernels_edges.with_corners_before`.
+    """
+    x0, y0, x1, y1 = window
+    side = np.empty(q.shape[0], np.uint8)  # one bit for each side of the window that the vertex is beyond
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    of_vertices, of_triangles = runs
+    for k in range(of_vertices.shape[0]):
+        for i in range(U(of_vertices[k, 0]), U(of_vertices[k, 1])):
+            side[i] = 0
+            if q[i, c] > 0.0:
+                x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+                side[i] = (x < x0) | ((x > x1 + 1.0) << 1) | ((y < y0) << 2) | ((y > y1 + 1.0) << 3)
+    order = np.empty(triangles.shape[0] + 1, np.int64)
+    n = U(0)
+    for k in range(of_triangles.shape[0]):
+        for t in range(U(of_triangles[k, 0]), U(of_triangles[k, 1])):
+            order[n] = t
+            beyond = side[U(triangles[t, a])] & side[U(triangles[t, b])] & side[U(triangles[t, c])]
+            n += U(((beyond == 0) | (cutout[t] < NEVER)) & (not left_out[t]))
+    return order[:n]
+
+
+@njit(_nrt=True)
+def touched_boxes(q, order, triangles, reach, farthest):
+    """Pixels inside these triangles' boxes that show something behind the triangle's nearest corner, (H, W) uint8."""
+    height, width = farthest.shape
+    marks = np.zeros((height, width), np.uint8)
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    for i in range(U(order.shape[0])):
+        t = U(order[i])
+        i0, i1, i2 = U(triangles[t, a]), U(triangles[t, b]), U(triangles[t, c])
+        xa, ya, xb, yb = _box(q, i0, i1, i2, reach, width, height)
+        if xa == BEHIND:
+            xa, ya, xb, yb = 0, 0, width - 1, height - 1
+        most = level(max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))
+        for y in range(ya, yb + 1):
+            for x in range(xa, xb + 1):
+                marks[U(y), U(x)] |= farthest[U(y), U(x)] < most
+    return marks
+
+
+@njit
+def first(grid, y, x):
+    """Number of the first chosen pixel at or after this one."""
+    k = grid[U(y), U(x)]
+    return max(k, ~k)
+
+
+@njit(_nrt=True)
+def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragments):
+    """Draw the triangles in `order` through a pinhole.
+
+    `points` is (grid, pixels, offsets, (lowest, highest offset)), `solid` (nearest, seen, farthest, tiles), `fragments`
+    (inverses, listed, counts, q).
+    """
+    grid, _, _, _ = points
+    farthest, tiles = solid[2], solid[3][1]
+    height, width = grid.shape
+    found = np.empty(max(width, MEDIUM * MEDIUM) + 1, np.uint32)
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    for i in range(U(order.shape[0])):
+        t = order[i]
+        ut = U(t)
+        i0, i1, i2 = U(triangles[ut, a]), U(triangles[ut, b]), U(triangles[ut, c])
+        endless = cutout[ut] < NEVER
+        xa, ya, xb, yb = (BEHIND, 0, 0, 0) if endless else _box(q, i0, i1, i2, points[3], width, height)
+        if xa > xb or ya > yb or cutout[ut] == NEVER:
+            continue
+        most = level(np.inf if endless else max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))
+        narrow = xb - xa < NARROW and yb - ya < NARROW
+        count = 0
+        if xa != BEHIND and _is_hidden(tiles, xa, ya, xb, yb, most):
+            continue
+        if narrow:
+            count = _open(farthest, xa, ya, xb, yb, most, found)
+            if count == 0:
+                continue
+        q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
+        w0, w1, w2 = q0[2], q1[2], q2[2]
+        crossing = xa == BEHIND
+        if crossing:
+            xa, ya, xb, yb = 0, 0, width - 1, height - 1
+        nx, ny, nz, det = plane(q0, q1, q2)
+        if det == 0.0 or (w0 <= 0.0 and w1 <= 0.0 and w2 <= 0.0 and not endless):
+            continue
+        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
+        checked = cutout[ut] >= 0 or see_through[ut] or (not crossing and abs(det) < SLIVER * (w0 * w1 * w2))
+        bounds = (0.0, np.inf)
+        if checked and not crossing:
+            bounds = (1.0 / max(w0, w1, w2), 1.0 / min(w0, w1, w2))
+        surface = (t, cutout[ut], see_through[ut], (nx, ny, nz, det), bounds)
+        box, edges = (xa, ya, xb, yb), (e0, e1, e2)
+        if not narrow:
+            _draw_wide(surface, edges, checked, box, most, found, points, cutouts, triangles, solid, fragments)
+        elif checked:
+            _draw_checked(surface, edges, found, count, points, cutouts, triangles, solid, fragments)
+        else:
+            _draw_solid(surface, edges, found, count, points, solid)
+
+
+@inner
+def _draw_wide(surface, edges, checked, box, most, found, points, cutouts, triangles, solid, fragments):
+    """Draw a triangle tile by tile, or row by row if it is very large."""
+    xa, ya, xb, yb = box
+    farthest, blocks = solid[2], solid[3][0]
+    medium = not checked and xb - xa < MEDIUM and yb - ya < MEDIUM
+    scales = (crossing_at(edges[0][0], 1), crossing_at(edges[1][0], 1), crossing_at(edges[2][0], 1))
+    for y in range(ya, ya + 1 if medium else yb + 1):
+        if medium:
+            count = _open_tiles(farthest, blocks, box, edges, most, found)
+        else:
+            span = (xa, xb) if checked else _span(edges, scales, y, xa, xb, points[3])
+            count = _open_row(farthest, points, y, span, yb - ya < NARROW, most, found)
+        if count == 0:
+            continue
+        if checked:
+            _draw_checked(surface, edges, found, count, points, cutouts, triangles, solid, fragments)
+        else:
+            _draw_solid(surface, edges, found, count, points, solid)
+
+
+@inner
+def _is_hidden(tiles, xa, ya, xb, yb, most):
+    """Whether, by the tiles' minima, no pixel of the box shows anything farther than `most`."""
+    for row in range(U(ya // TILE), U(yb // TILE + 1)):
+        for column in range(U(xa // TILE), U(xb // TILE + 1)):
+            if tiles[row, column] < most:
+                return False
+    return True
+
+
+@inner
+def _open(farthest, xa, ya, xb, yb, most, found):
+    """Pixels of the box that show something farther than `most`, as row << 16 | column."""
+    count = U(0)
+    for y in range(U(ya), U(yb + 1)):
+        for x in range(U(xa), U(xb + 1)):
+            found[count] = y << U(16) | x
+            count += U(farthest[y, x] < most)
+    return count
+
+
+@inner
+def _open_tiles(farthest, blocks, box, edges, most, found):
+    """As `_open`, in the tiles of the box that the triangle may touch."""
+    xa, ya, xb, yb = box
+    count = U(0)
+    for row in range(ya // TILE, yb // TILE + 1):
+        for column in range(xa // TILE, xb // TILE + 1):
+            if blocks[U(row), U(column)] >= most:
+                continue
+            x, y = float(column * TILE), float(row * TILE)
+            if _is_outside(edges[0], x, y) or _is_outside(edges[1], x, y) or _is_outside(edges[2], x, y):
+                continue
+            for v in range(U(max(ya, row * TILE)), U(min(yb, row * TILE + TILE - 1) + 1)):
+                for u in range(U(max(xa, column * TILE)), U(min(xb, column * TILE + TILE - 1) + 1)):
+                    found[count] = v << U(16) | u
+                    count += U(farthest[v, u] < most)
+    return count
+
+
+@inner
+def _is_outside(e, x, y):
+    """Whether all of the tile that begins at (x, y) is outside of an edge."""
+    return max(e[0] * x, e[0] * (x + TILE)) + (max(e[1] * y, e[1] * (y + TILE)) + e[2]) < 0.0
+
+
+@inner
+def _open_row(farthest, points, y, span, thorough, most, found):
+    """As `_open`, for a part of a row; of a long part only chosen pixels, unless `thorough`."""
+    grid, pixels, _, _ = points
+    left, right = span
+    if left > right:
+        return U(0)
+    if thorough or right - left < NARROW:
+        return _open(farthest, left, y, right, y, most, found)
+    width, count = grid.shape[1], U(0)
+    k, end = U(first(grid, y, left)), y * width + right
+    while pixels[k] <= end:
+        x = U(pixels[k] - y * width)
+        found[count] = U(y) << U(16) | x
+        count += U(farthest[U(y), x] < most)
+        k += U(1)
+    return count
+
+
+@inner
+def _span(edges, scales, y, xa, xb, reach):
+    """First and last pixel of a row in which a point may be covered."""
+    low, high = float(xa), float(xb)
+    lowest, highest = reach
+    for e, scale in zip(edges, scales):  # noqa: B905, numba knows no strict
+        f = max(e[1] * (y + lowest), e[1] * (y + highest)) + e[2]
+        if e[0] > 0.0:
+            low = max(low, f * scale - highest - EPSILON)
+        elif e[0] < 0.0:
+            high = min(high, f * scale - lowest + EPSILON)
+        elif f < 0.0:
+            high = -1.0
+    return (0, -1) if low > high else (math.ceil(low), math.floor(high))
+
+
+@inner
+def _draw_solid(surface, edges, found, count, points, solid):
+    """Draw a solid triangle at these pixels: four points are tested at once, single points only where any is covered."""
+    grid, _, offsets, _ = points
+    nearest, seen, farthest, _ = solid
+    t, _, _, (nx, ny, nz, det), _ = surface
+    e0, e1, e2 = edges
+    inverse = 1.0 / det
+    n = (nx * inverse, ny * inverse, nz * inverse)
+    m, zero, one = U(nearest.shape[1]), U(0), U(1)
+    for j in range(count):
+        row, column = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF))
+        x, y = float(column), float(row)
+        covered = 0
+        for i in range(U(4)):
+            px, py = x + offsets[zero, i], y + offsets[one, i]
+            covered |= (
+                (e0[0] * px + (e0[1] * py + e0[2]) >= 0.0)
+                & (e1[0] * px + (e1[1] * py + e1[2]) >= 0.0)
+                & (e2[0] * px + (e2[1] * py + e2[2]) >= 0.0)
+            )
+        if not covered:
+            continue
+        k = grid[row, column]
+        least = CLOSED
+        for i in range(m):
+            px, py = x + offsets[zero, i], y + offsets[one, i]
+            inside = (
+                (e0[0] * px + (e0[1] * py + e0[2]) >= 0.0)
+                & (e1[0] * px + (e1[1] * py + e1[2]) >= 0.0)
+                & (e2[0] * px + (e2[1] * py + e2[2]) >= 0.0)
+            )
+            inverse = n[0] * px + (n[1] * py + n[2])
+            old = nearest[U(k), i]
+            if inside & _is_before(inverse, t, old, seen[U(k), i]):
+                nearest[U(k), i], seen[U(k), i] = inverse, t
+            least = min(least, level(nearest[U(k), i]))
+        farthest[row, column] = max(farthest[row, column], least)
+
+
+@inner
+def _is_before(inverse, t, old, seen):
+    """Whether triangle t is seen instead of triangle `seen`: truth, which draws in order, decides so by `NEARER` alone."""
+    return (inverse > old * NEARER) | ((t < seen) & (inverse * NEARER >= old))
+
+
+@inner
+def _draw_checked(surface, edges, found, count, points, cutouts, triangles, solid, fragments):
+    """Draw a cut-out, a sliver or a see-through triangle at these pixels."""
+    grid, _, offsets, _ = points
+    nearest, _, farthest, _ = solid
+    for j in range(count):
+        row, column = found[j] >> np.uint32(16), found[j] & np.uint32(0xFFFF)
+        k = grid[row, column]
+        least = CLOSED
+        for i in range(nearest.shape[1]):
+            ray = (column + offsets[0, i], row + offsets[1, i], 1.0)
+            _cast(surface, edges, ray, (U(k), U(i)), cutouts, triangles, solid, fragments)
+            least = min(least, level(nearest[U(k), U(i)]))
+        farthest[row, column] = max(farthest[row, column], least)
+
+
+@inner
+def _cast(surface, edges, ray, p, cutouts, triangles, solid, fragments):
+    """Do for one point's ray what truth does for cut-outs and slivers; a see-through surface is listed."""
+    t, cutout, is_see_through, (nx, ny, nz, det), bounds = surface
+    nearest, seen = solid[0], solid[1]
+    a, b, c = edges
+    x, y, z = ray
+    e0, e1, e2 = a[0] * x + (a[1] * y + a[2] * z), b[0] * x + (b[1] * y + b[2] * z), c[0] * x + (c[1] * y + c[2] * z)
+    if not ((e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0) or (e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0)):
+        return
+    inverse = min(max((nx * x + (ny * y + nz * z)) / det, bounds[0]), bounds[1])
+    if is_see_through:
+        if inverse > 0.0 and inverse * (1.0 + TIE) >= nearest[p] and hits_surface(cutouts, cutout, e0, e1, e2):
+            _insert(t, inverse, p, triangles, fragments)
+    elif _is_before(inverse, t, nearest[p], seen[p]) and hits_surface(cutouts, cutout, e0, e1, e2):
+        nearest[p] = inverse
+        seen[p] = t
+
+
+@inner
+def _insert(t, inverse, p, triangles, fragments):
+    """List a see-through surface by distance; of surfaces that lie on one another the last triangle is in front.
+
+    Only one of two triangles that share an edge and lie on one another is listed: the point is on that edge, or one
+    is the other's back.
+    """
+    k, m = p
+    inverses, listed, counts, q = fragments
+    near, here = inverses[k, m], listed[k, m]
+    capacity, count = len(near), np.int64(counts[p])
+    at = count
+    while at > 0 and inverse * (1.0 + TIE) >= near[at - 1]:
+        at -= 1
+        if inverse <= near[at] * (1.0 + TIE) and _share_edge(q, triangles, t, here[at]):
+            return
+    if at == capacity:
+        return
+    for i in range(min(count, capacity - 1), at, -1):
+        near[i], here[i] = near[i - 1], here[i - 1]
+    near[at], here[at] = inverse, t
+    counts[p] = min(count + 1, capacity)
+
+
+@inner
+def _share_edge(q, triangles, s, t):
+    """Whether two corners of triangle s are where corners of t are."""
+    same = 0
+    for i in range(3):
+        for j in range(3):
+            a, b = triangles[s, i], triangles[t, j]
+            if q[a, 0] == q[b, 0] and q[a, 1] == q[b, 1] and q[a, 2] == q[b, 2]:
+                same += 1
+    return same >= 2
+
+
+@njit(_nrt=True)
+def draw_rays(q, order, triangles, cutout, cutouts, see_through, unit, table, points, solid, fragments):
+    """As `draw`, along rays: `table` is (rays, levels, boxes, cells) of `kernels_rays`, of S x S rays a pixel.
+
+    `points` is (grid, pixels, S); q is in camera axes, and `unit` says that the rays have length 1 rather than z = 1.
+    """
+    rays, levels, boxes, faces = table
+    leaves = leaf_list(levels)
+    window = (0, 0, rays.shape[1], rays.shape[0])
+    for t in order:
+        if cutout[t] == NEVER:
+            continue
+        i0, i1, i2 = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        q0, q1, q2 = (q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2])
+        endless = cutout[t] < NEVER
+        if not unit and not endless and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
+            continue
+        small, box = (False, NO_BOX) if endless else pixel_box(faces, q0, q1, q2)
+        if small and (box[2] < 0 or _is_empty(points, box)):
+            continue
+        nx, ny, nz, det = plane(q0, q1, q2)
+        if det == 0.0:
+            continue
+        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[t])
+        sliver, bounds = (False, ANY_DEPTH) if endless else limits(q0, q1, q2, det, unit)
+        surface = (t, cutout[t], see_through[t], (nx, ny, nz, det), bounds)
+        count = 1 if small else touched(e0, e1, e2, sliver, levels, boxes, window, leaves)
+        for i in range(count):
+            if not small:
+                x, y = np.int64(leaves[i, 0]), np.int64(leaves[i, 1])
+                box = (x, y, x + LEAF - 1, y + LEAF - 1)
+            _cast_box(surface, (e0, e1, e2), box, rays, cutouts, triangles, points, solid, fragments)
+
+
+@inner
+def _is_empty(points, box):
+    """Whether no pixel of a box of rays is chosen."""
+    grid, pixels, side = points
+    xa, ya, xb, yb = box
+    empty = True
+    for y in range(ya // side, yb // side + 1):
+        empty &= pixels[first(grid, y, xa // side)] > y * grid.shape[1] + xb // side
+    return empty
+
+
+@inner
+def _cast_box(surface, edges, box, rays, cutouts, triangles, points, solid, fragments):
+    """Draw a triangle at the chosen pixels of a box of rays (both ends included)."""
+    grid, pixels, side = points
+    height, width = grid.shape
+    xa, xb = box[0] // side, min(box[2] // side, width - 1)
+    for y in range(box[1] // side, min(box[3] // side, height - 1) + 1):
+        k = first(grid, y, xa)
+        while pixels[k] <= y * width + xb:
+            x = pixels[k] - y * width
+            for i in range(side * side):
+                ray = rays[y * side + i // side, x * side + i % side]
+                _cast(surface, edges, (ray[0], ray[1], ray[2]), (U(k), U(i)), cutouts, triangles, solid, fragments)
+            k += 1

@@ -1,0 +1,1 @@
+"""Light between surfaces: radiosity patches, final gather, irradiance volumes."""

@@ -1,0 +1,164 @@
+"""Which things of a scene throw light at one another."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from operator import is_
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.engines._arranged import Arranged
+from viewsphere.engines.raster.indirect.bounces import Hall
+from viewsphere.engines.raster.materials.kernels_material import L_CASTS_FROM
+from viewsphere.engines.raster.materials.surface import Lengths, Rows
+from viewsphere.engines.raster.records import Float32, Int32
+from viewsphere.engines.raster.reflections.tracing import cast, tree_of
+from viewsphere.engines.raster.shadows.shadow_maps import Casters
+from viewsphere.model.thing import Thing
+
+Float = NDArray[np.float64]
+
+LATTICE = 24
+"""Places, each way, from which one looks up for a roof."""
+
+EYES = 0.4
+"""Of a place's height: from where."""
+
+ROOFED = 0.6
+"""Share of a place under a roof from which on it is indoors."""
+
+UP = np.array([[[1e-3, 2e-3, 1]]], np.float32)
+"""Nearly: no ray runs along a wall."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Throwing:
+    """Things that stand still, and which of a stage's triangles of theirs throw light (T,), between low and high (3,)."""
+
+    things: tuple[Thing, ...]
+    meshes: tuple[Mesh, ...]
+    lengths: Lengths
+    triangles: NDArray[np.uint32]
+    which: Int32
+    low: Float
+    high: Float
+
+
+@dataclass(frozen=True, eq=False)
+class Halls:
+    """Finds the things that throw light at one another. The last ones are kept: to find them takes a look at all triangles."""
+
+    _last: list[_Throwing] = field(default_factory=list[_Throwing])
+
+    def of(
+        self,
+        arranged: Arranged,
+        rows: Rows,
+        casters: Casters,
+        floor: Float32,
+        ground: Hashable,
+        lengths: Lengths,
+        has_ground: bool,
+        bounces: Literal["auto", "on", "fine", "off"],
+    ) -> Hall | None:
+        """The scenery that stands still, which lights whatever else is there; in a picture without scenery all targets. None
+        where light is not to bounce: it shall not, or only indoors. ground: equal for grounds made of the same. All calls have
+        the same `bounces`.
+        """
+        if bounces == "off" or (bounces == "auto" and not arranged.has_scenery):
+            return None
+        own = self._throwing(arranged, rows, bounces == "auto")
+        if not len(own.which):
+            return None
+        height = arranged.geometry.ground_z if has_ground else None
+        ground_z = None if height is None else (height - lengths.origin[2]) / lengths.unit
+        key = (own.things, own.meshes), lengths, ground_z, floor.tobytes(), ground
+        has_map = ground_z is not None and not arranged.has_scenery
+        limits = own.which, own.low, own.high
+        surfaces = casters.surfaces._replace(normals=arranged.geometry.triangle_normals_of(_still(arranged)))
+        return Hall(key, surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map, bounces == "fine")
+
+    def _throwing(self, arranged: Arranged, rows: Rows, only_indoors: bool) -> _Throwing:
+        still, surfaces, lengths = _still(arranged), rows.surfaces, rows.lengths
+        things, meshes = tuple(arranged.things[i] for i in still), tuple(arranged.whole[i] for i in still)
+        for last in self._last:
+            same = len(last.things) == len(things) and all(map(is_, last.things, things)) and all(map(is_, last.meshes, meshes))
+            if same and last.lengths == lengths and last.triangles is surfaces.triangles:
+                return last
+        found = _thrown(still, (things, meshes), rows, only_indoors)
+        self._last[:] = [found]
+        return found
+
+
+def _thrown(still: list[int], own: tuple[tuple[Thing, ...], tuple[Mesh, ...]], rows: Rows, only_indoors: bool) -> _Throwing:
+    low, high = np.zeros(3), np.zeros(3)
+    casts = rows.surfaces.looks[:, L_CASTS_FROM] <= 1
+    every = ((i, np.flatnonzero(casts[rows.part(i).material])) for i in still)
+    parts = [(i, which) for i, which in every if len(which)]
+    if parts:
+        bounds = np.array([[f(_corners(rows, *part), axis=(0, 1)) for f in (np.nanmin, np.nanmax)] for part in parts])
+        low, high = np.nanmin(bounds[:, 0], axis=0), np.nanmax(bounds[:, 1], axis=0)
+        if only_indoors and not _is_roofed(_Roof((own, rows.lengths), low, high, [_above(rows, parts, _eyes(low, high))])):
+            parts = []
+    rows.write(i for i, _ in parts)
+    start = rows.geometry.triangle_start
+    which = np.concatenate([np.empty(0, np.int32), *((start[i] + which).astype(np.int32) for i, which in parts)])
+    return _Throwing(*own, rows.lengths, rows.surfaces.triangles, which, low.astype(np.float64), high.astype(np.float64))
+
+
+def _corners(rows: Rows, i: int, which: NDArray[np.intp]) -> Float32:
+    """Where the corners of these triangles (n,) of thing i are, (n, 3, 3)."""
+    part = rows.part(i)
+    return part.vertices[part.triangles[which], 11:14]
+
+
+def _above(rows: Rows, parts: list[tuple[int, NDArray[np.intp]]], height: np.float32) -> Float32:
+    """Those of them, in all parts, that reach higher, (n, 3, 3)."""
+    every = (_corners(rows, *part) for part in parts)
+    return np.concatenate([corners[corners[..., 2].max(axis=1) > height] for corners in every])
+
+
+def _still(arranged: Arranged) -> list[int]:
+    """The things that count, in their order."""
+    if not arranged.has_scenery:
+        return [] if arranged.is_sequence else list(range(len(arranged.things)))
+    own = range(arranged.targets, len(arranged.things))
+    return [i for i in own if i not in arranged.moving and len(arranged.whole[i].triangles)]
+
+
+def _eyes(low: Float32, high: Float32) -> np.float32:
+    """How high one looks up from in a place between two corners."""
+    return np.float32(low[2] + EYES * (high[2] - low[2]))
+
+
+@dataclass(frozen=True)
+class _Roof:
+    """A place between two corners (3,). above: the triangles (n, 3, 3) that reach higher than eyes, which are taken out where
+    they are looked at: what is known of a place is kept, its triangles are not.
+    """
+
+    key: Hashable
+    low: Float32 = field(compare=False)
+    high: Float32 = field(compare=False)
+    above: list[Float32] = field(compare=False)
+
+
+@lru_cache(maxsize=4)
+def _is_roofed(roof: _Roof) -> bool:
+    """Whether most places within a scenery have the underside of something above them; within a solid thing there is none."""
+    # A tree of what is above is small: of a street nearly nothing is.
+    low, high, above, eyes = roof.low, roof.high, roof.above.pop(), _eyes(roof.low, roof.high)
+    at = (np.arange(LATTICE) + 0.5) / LATTICE
+    x, y = np.meshgrid(*(low[k] + at * (high[k] - low[k]) for k in range(2)))
+    if not len(above):
+        return False
+    places = np.stack([x, y, np.full_like(x, eyes)], axis=-1).reshape(-1, 3).astype(np.float32)
+    (met,), _ = cast(tree_of(above), places, UP, np.zeros(len(places), np.int32), np.inf)
+    a, b, c = above[met[met >= 0]].transpose(1, 0, 2)
+    is_underside = np.cross(b - a, c - a)[:, 2] < 0
+    return bool(is_underside.sum() >= ROOFED * len(places))

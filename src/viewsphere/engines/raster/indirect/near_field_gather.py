@@ -1,0 +1,79 @@
+"""What is nearer to the samples of a picture than probes know: gathered by short rays from each sample (`bounces: fine`).
+
+The last bounce of light is followed from the picture itself (final gathering, Reichert 1992), about as far as probes are apart:
+leaves shade leaves, an awning the shop below it. What the rays meet sends what its patch sends; where they meet nothing, the
+probes' light arrives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewsphere.engines.raster.indirect import kernels_near as kernels
+from viewsphere.engines.raster.indirect.bounces import Hall
+from viewsphere.engines.raster.indirect.directions import domes
+from viewsphere.engines.raster.indirect.patch_rays import axes_along
+from viewsphere.engines.raster.records import NO_NEAR, Bounces, Float32, Int32, PictureRays
+from viewsphere.engines.raster.reflections.tracing import Tree, cast
+
+REACH = 2.0
+"""Cells of the finest probes up to which rays go."""
+
+RAYS, TILE = 32, 8
+"""Of a sample; pixels after which they are turned the same way again."""
+
+OFF = 5e-4
+"""Metres off the surface at which rays begin."""
+
+SOME = 1 << 14
+"""Samples at a time: each takes some 1,000 bytes."""
+
+
+def with_near(
+    bounces: Bounces, hall: Hall, tree: Tree, view: PictureRays, slots: Int32, triangle: Int32, depth: Float32
+) -> Bounces:
+    """The same with `Bounces.near` of the samples `slots` (N,) that show the hall's triangles and have no lightmap.
+
+    triangle, depth (S,): what samples show, see `kernels_paint.shade`.
+    """
+    slots = slots[hall.owns[triangle[slots]]]
+    if len(bounces.lightmap.chart):
+        slots = slots[bounces.lightmap.chart[triangle[slots]] == -1]
+    if not len(slots):
+        return bounces._replace(near=NO_NEAR)
+    near = np.zeros((len(triangle), 4), np.float32)
+    near[:, 0] = 1
+    turned = domes(RAYS, TILE * TILE).astype(np.float32)
+    for start in range(0, len(slots), SOME):
+        own = slots[start : start + SOME]
+        places, rays = _seen_at(view, own, depth)
+        normals = hall.surfaces.normals[triangle[own]]
+        normals = np.where((normals * rays).sum(axis=1, keepdims=True) < 0, normals, -normals)
+        ways = np.matmul(turned[_turn(view, own)], axes_along(normals))
+        origins = (places + normals * np.float32(OFF / hall.unit)).astype(np.float32)
+        each = np.arange(len(own), dtype=np.int32)
+        met, far = cast(tree, origins, ways, each, REACH / float(bounces.frame[0, 3]))
+        kernels.gather(met, far, origins, ways, hall.which, hall.surfaces.normals, bounces.sent, own, near)
+    return bounces._replace(near=near)
+
+
+def _turn(view: PictureRays, slots: Int32) -> Int32:
+    """How the rays of samples are turned: in all ways within a tile of pixels."""
+    if len(view.places):
+        return slots % (TILE * TILE)
+    row, column = np.divmod(slots, np.int32(view.columns))
+    return row % TILE * TILE + column % TILE
+
+
+def _seen_at(view: PictureRays, slots: Int32, depth: Float32) -> tuple[Float32, Float32]:
+    """Where samples (N,) see something, (N, 3), and their rays, (N, 3), in the stage's axes; depth (S,): see `with_near`."""
+    if len(view.rays):
+        rays = view.rays[slots]
+    else:
+        row, column = np.divmod(slots, np.int32(view.columns))
+        at = view.places[slots] if len(view.places) else np.stack([column, row], axis=1) + np.float32(0.5)
+        rays = np.ones((len(slots), 3), np.float32)
+        rays[:, :2] = at @ view.lens[:, :2].T + view.lens[:, 2]
+    rays = rays @ view.rotation
+    places = view.eye + rays * (view.scale / depth[slots])[:, None]
+    return places.astype(np.float32), rays.astype(np.float32)

@@ -1,0 +1,1 @@
+"""Light of still surfaces, by texel and by vertex."""

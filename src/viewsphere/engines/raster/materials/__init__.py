@@ -1,0 +1,1 @@
+"""Surfaces, their textures and mips, as kernels read them."""

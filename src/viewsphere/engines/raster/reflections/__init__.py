@@ -1,0 +1,1 @@
+"""What mirrors and glass show."""

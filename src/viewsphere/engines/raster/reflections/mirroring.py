@@ -1,0 +1,97 @@
+"""What level surfaces mirror: the scene once more, as an eye below them sees it, which the mirror image of the eye does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.raster.records import Float32
+from viewsphere.engines.raster.reflections import kernels_mirror as kernels
+from viewsphere.engines.raster.shading.painting import NO_SPLIT, Baked, shade_all, view_of
+from viewsphere.engines.raster.sky.environment import sky_behind
+from viewsphere.geometry.camera import inverse_camera_matrix
+from viewsphere.model.camera import Camera
+from viewsphere.truth.raster.alpha_masks import NEVER
+from viewsphere.truth.raster.geometry import Geometry, with_both_sides
+from viewsphere.truth.raster.visibility import Visibility, lens_rays, rasterize
+
+Float = NDArray[np.float64]
+
+BRIGHTEST = 4.0
+"""Radiance of what is mirrored, at most: highlights on it would dot what mirrors it."""
+
+
+class Mirrored(NamedTuple):
+    """What n pixels mirror: things (n, 3), their radiance; hidden (n, 1), the share of the sky that they hide; sky (n, 3), its
+    radiance; nearness (n,), one over the depth of things from the mirror image of the camera, 0 for none.
+    """
+
+    things: Float32
+    hidden: Float32
+    sky: Float32
+    nearness: Float32
+
+
+def lying(geometry: Geometry, height: float) -> NDArray[np.bool_]:
+    """Which triangles (T,) lie below a height altogether."""
+    return geometry.triangle_tops < height
+
+
+def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> tuple[Float, Float]:
+    """Cosines (n,) of these pixels' rays to the vertical, and the places (n, 3) of the world that they meet."""
+    rays, camera_from_pixel = lens_rays(camera), inverse_camera_matrix(camera.intrinsics)
+    table = np.zeros((0, 3)) if rays is None else rays.reshape(-1, 3)
+    table.setflags(write=False)  # as those of a lens are: the kernel is compiled once
+    cosine, place = np.empty(len(at)), np.empty((len(at), 3))
+    pose, depth = (camera.R, camera.center), visibility.inverse_depth.reshape(-1)
+    kernels.meet(at, camera.width, table, camera_from_pixel, *pose, depth, cosine, place)
+    return cosine, place
+
+
+def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bool_], at: NDArray[np.intp]) -> Mirrored:
+    """What a mirror at the height `plane` shows in the pixels `at` (n,), without the triangles `left_out` (T,)."""
+    below = _below(camera, plane)
+    geometry, blended = (_without(geometry, left_out) for geometry in (baked.geometry, baked.blended))
+    own = replace(baked, geometry=geometry, blended=blended, is_fine=False)
+    found, view = rasterize(geometry, below), view_of(baked, below)
+    baked.rows.write_seen(below, found, geometry)
+    triangle, depth = np.full(found.triangle.size, -1, np.int32), np.zeros(found.triangle.size, np.float32)
+    triangle[at], depth[at] = found.triangle.reshape(-1)[at], found.inverse_depth.reshape(-1)[at]
+    light = np.zeros((len(triangle), 4), np.float32)
+    shape = found.triangle.shape
+    seen = Visibility(triangle.reshape(shape), depth.reshape(shape))
+    shade_all(own, below, view, seen, triangle, depth, light, NO_SPLIT)
+    sky = np.ones_like(light)
+    sky[at] = 0  # looked up here alone
+    sky_behind(view, baked.surrounding, sky)
+    return Mirrored(np.minimum(light[at, :3], BRIGHTEST), light[at, 3:], sky[at, :3], depth[at])
+
+
+def _without(geometry: Geometry, left_out: NDArray[np.bool_]) -> Geometry:
+    """The same, but these triangles (T,) are never seen, and all others from both sides: a mirror is no camera."""
+    return replace(with_both_sides(geometry), triangle_cutout=np.where(left_out, np.int32(NEVER), geometry.triangle_cutout))
+
+
+def _below(camera: Camera, plane: float) -> Camera:
+    """The mirror image of a camera in a level plane: it sees things where their mirror images are."""
+    turned = camera.R * np.array([1.0, 1.0, -1.0])
+    center = camera.center * np.array([1.0, 1.0, -1.0]) + np.array([0.0, 0.0, 2 * plane])
+    return Camera(camera.intrinsics, turned, -turned @ center)
+
+
+def blurred(image: Float32, at: NDArray[np.intp], camera: Camera, reach: tuple[int, int]) -> Float32:
+    """The mean (n, 3) of mirror images (n, 3) around each pixel of `at` (n,), so many pixels down and across."""
+    first, last = int(at.min()) // camera.width, int(at.max()) // camera.width
+    rows = np.zeros((last - first + 1, camera.width, kernels.COLUMNS), np.float32)
+    own = at - first * camera.width
+    kernels.spread_out(own, image, rows.reshape(-1, kernels.COLUMNS))
+    other = np.empty_like(rows)
+    for _ in range(2):  # two boxes are nearly a bell
+        kernels.box_down(rows.reshape(len(rows), -1), reach[0], other.reshape(len(rows), -1))
+        kernels.box_across(other, reach[1], rows)
+    means = np.empty((len(at), 3), np.float32)
+    kernels.gather_means(own, rows.reshape(-1, kernels.COLUMNS), means)
+    return means

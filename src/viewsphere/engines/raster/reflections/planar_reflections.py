@@ -1,0 +1,183 @@
+"""What smooth surfaces mirror of the things that stand still, where light bounces: window panes, mirrors, polished metal.
+
+Their material mirrors what probes see, as blurred as roughness 0.5 shows it. A ray from each pixel finds what is there instead:
+sharp, lit by sun, lamps and what bounces; where light bounces finely, rays in their lobes do so for rougher surfaces, too.
+Targets before scenery and what moves neither mirror in this way nor are mirrored; cut-out textures are solid; where a ray meets
+the ground, what probes say stays. Of level surfaces, the one that shows most has a mirror image of its own, which is of all
+things (`glossy_reflections`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.raster.indirect import kernels_probes
+from viewsphere.engines.raster.indirect.bounces import Hall, without_maps
+from viewsphere.engines.raster.indirect.radiosity_patches import ANY_VIEW
+from viewsphere.engines.raster.materials.kernels_material import L_ROUGH, L_ROUGH_TEXEL
+from viewsphere.engines.raster.records import Float32, Int32, PictureRays
+from viewsphere.engines.raster.reflections import kernels_mirror
+from viewsphere.engines.raster.reflections.lobes import lobe_rays
+from viewsphere.engines.raster.reflections.mirroring import BRIGHTEST
+from viewsphere.engines.raster.reflections.tracing import Tree, cast
+from viewsphere.engines.raster.shading import kernels_paint, kernels_split
+from viewsphere.engines.raster.shading.painting import Baked, view_of
+from viewsphere.model.camera import Camera
+from viewsphere.truth.raster.visibility import Visibility
+
+SHARP, BLURRED = 0.1, 0.2
+"""Roughness up to which what a ray sees counts in full, and from which on not at all."""
+
+FINE_SHARP, FINE_BLURRED, LOBE_RAYS = 0.45, 0.55, 16
+"""The same where light bounces finely, with so many rays in each pixel's lobe: what probes see is as blurred as roughness 0.5
+shows it.
+"""
+
+OFF = 0.002
+"""Metres along a ray at which it begins, and off the surface that it meets those towards lights."""
+
+LAYERS = 3
+"""Surfaces that a ray goes through, at most, where they are blended with what is behind them; the last is solid."""
+
+SKY_ROUGHNESS = np.float32(0.03)
+"""Of the map of the sky that is read: nearly sharp."""
+
+SOME = 1 << 16
+"""Pixels at a time: each takes some 300 bytes."""
+
+
+def mirror_in_panes(
+    baked: Baked, camera: Camera, visibility: Visibility, left_out: NDArray[np.intp], radiance: Float32
+) -> None:
+    """Put what rays see in place of what smooth surfaces are taken to mirror in `radiance` (H * W, 4), if light bounces, but in
+    the pixels `left_out` (n,).
+    """
+    if baked.hall is None or baked.tree is None:
+        return
+    panes = _panes(baked, baked.hall, visibility, left_out)
+    triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+    view, light = view_of(baked, camera), (baked.surrounding, baked.occlusion, baked.bounces)
+    borders = (FINE_SHARP, FINE_BLURRED) if baked.is_fine else (SHARP, BLURRED)
+    for start in range(0, len(panes), SOME):
+        at = panes[start : start + SOME]
+        gloss = np.empty((len(at), kernels_split.GLOSS), np.float32)
+        kernels_split.gloss(view, baked.surfaces, baked.textures, baked.floor, *light, at, triangle, depth, gloss)
+        width = (view.pixel * view.scale / depth[at]).astype(np.float32)
+        if baked.is_fine:
+            toward, normals = _facing(view, gloss)
+            shown, is_known = _seen_in_lobes(baked, baked.hall, baked.tree, view, (toward, normals), gloss, at, width)
+            made_of = baked.surfaces.material[triangle[at]]
+            shown = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, camera.width)
+        else:
+            sights = gloss[:, 7:10].copy(), gloss[:, 10:13].copy(), width
+            shown, is_known = _seen(baked, baked.hall, baked.tree, sights, float(view.pixel))
+        at, gloss, shown = at[is_known].astype(np.intp), gloss[is_known], shown[is_known]
+        nearness = np.zeros(len(at), np.float32)
+        kernels_mirror.polish(at, gloss, shown, shown, nearness, depth, *map(np.float32, borders), radiance)
+
+
+def _facing(view: PictureRays, gloss: Float32) -> tuple[Float32, Float32]:
+    """Directions towards the viewer, and normals, (n, 3) each; gloss (n, 13): see `kernels_split.gloss`."""
+    toward = view.eye - gloss[:, 7:10]
+    toward /= np.sqrt((toward * toward).sum(axis=1, keepdims=True))
+    normals = toward + gloss[:, 10:13]
+    return toward, normals / np.maximum(np.sqrt((normals * normals).sum(axis=1, keepdims=True)), np.float32(1e-6))
+
+
+def _seen_in_lobes(
+    baked: Baked,
+    hall: Hall,
+    tree: Tree,
+    view: PictureRays,
+    facing: tuple[Float32, Float32],
+    gloss: Float32,
+    at: Int32,
+    width: Float32,
+) -> tuple[Float32, NDArray[np.bool_]]:
+    """The mean radiance (n, 3) of what `LOBE_RAYS` of each of the pixels `at` (n,) see, and where there is any, (n,). Rays that
+    see what is not known have the light that the pixel was taken to mirror.
+
+    facing: see `_facing`; gloss (n, 13): see `kernels_split.gloss`; width (n,): of a pixel there.
+    """
+    shown, known = np.zeros((len(at), 3), np.float32), np.zeros(len(at), np.bool_)
+    toward, normals = facing
+    taken = gloss[:, 3:6] / np.maximum(gloss[:, :3], np.float32(1e-6))
+    for start in range(0, len(at), SOME // LOBE_RAYS):
+        own = slice(start, start + SOME // LOBE_RAYS)
+        ways, weights = lobe_rays(toward[own], normals[own], gloss[own, 6], at[own], int(view.columns), LOBE_RAYS)
+        sights = np.tile(gloss[own, 7:10], (LOBE_RAYS, 1)), ways.reshape(-1, 3), np.tile(width[own], LOBE_RAYS)
+        seen, is_known = _seen(baked, hall, tree, sights, float(view.pixel))
+        total = weights.sum(axis=0)
+        each = np.where(is_known.reshape(*weights.shape, 1), seen.reshape(*weights.shape, 3), taken[own])
+        shown[own] = (weights[..., None] * each).sum(axis=0) / np.maximum(total, np.float32(1e-6))[:, None]
+        known[own] = total > 0
+    return shown, known
+
+
+def _panes(baked: Baked, hall: Hall, visibility: Visibility, left_out: NDArray[np.intp]) -> Int32:
+    """Pixels (n,) that show a smooth surface of the hall, and are not left out."""
+    looks, shown = baked.surfaces.looks, visibility.triangle.reshape(-1)
+    is_smooth = looks[:, L_ROUGH] + looks[:, L_ROUGH_TEXEL] < (FINE_BLURRED if baked.is_fine else BLURRED)
+    is_pane = (shown >= 0) & is_smooth[baked.surfaces.material[shown]] & (baked.kind[shown] == kernels_paint.SOLID)
+    is_pane[left_out] = False
+    at = np.flatnonzero(is_pane)
+    if not len(at):
+        return at.astype(np.int32)
+    return at[hall.owns[shown[at]]].astype(np.int32)
+
+
+def _seen(
+    baked: Baked, hall: Hall, tree: Tree, sights: tuple[Float32, Float32, Float32], pixel: float
+) -> tuple[Float32, NDArray[np.bool_]]:
+    """Radiance (n, 3) of what is seen along rays, and where it is known (n,). sights: where rays begin (n, 3), their
+    directions of length 1 (n, 3), and the width of a pixel there (n,), which grows by `pixel` a length.
+    """
+    origins, ways, width = sights
+    off, ground = np.float32(OFF / hall.unit), hall.ground_z is not None
+    origins, light = (origins + off * ways).astype(np.float32), np.zeros_like(origins)
+    left, at = np.ones(len(origins), np.float32), np.arange(len(origins))
+    is_known = np.ones(len(origins), np.bool_)
+    for layer in range(LAYERS):
+        turn = np.arange(len(at), dtype=np.int32)
+        (met,), (far,) = cast(tree, origins[at], ways[at][:, None], turn, np.inf)
+        on = at[met < 0]
+        is_known[on] &= (not ground) | (ways[on, 2] >= 0)
+        sky = np.empty((len(on), 3), np.float32)
+        kernels_probes.sky_from(baked.surrounding, ways[on], SKY_ROUGHNESS, sky)
+        light[on] += left[on, None] * sky
+        at, far, met = at[met >= 0], far[met >= 0], met[met >= 0]
+        origins[at] += far[:, None] * ways[at]
+        width[at] += far * np.float32(pixel)
+        shaded, opacity = _shaded(baked, hall, tree, off, (hall.which[met], origins[at], ways[at], width[at]))
+        opacity = np.ones_like(opacity) if layer == LAYERS - 1 else opacity
+        light[at] += (left[at] * opacity)[:, None] * shaded
+        left[at] *= 1 - opacity
+        at = at[left[at] > 0]
+        origins[at] += off * ways[at]
+        if not len(at):
+            break
+    return light, is_known
+
+
+def _shaded(
+    baked: Baked, hall: Hall, tree: Tree, off: np.float32, hits: tuple[Int32, Float32, Float32, Float32]
+) -> tuple[Float32, Float32]:
+    """Radiance (n, 3) of what rays hit, as if it scattered all light, and its opacity (n,). hits: triangles (n,), places and
+    the rays' directions (n, 3), and a pixel's width (n,).
+    """
+    triangle, places, ways, _ = hits
+    answers, arrived, glow = (np.empty((len(places), columns), np.float32) for columns in (7, 3, 3))
+    made = ANY_VIEW, hall.surfaces, hall.textures, hall.floor, baked.surrounding.albedo
+    lights = without_maps(baked.lights)
+    kernels_probes.shade_hits(*made, tree, lights, off, *hits, False, False, answers, arrived)
+    normals, inside = hall.surfaces.normals[triangle], np.empty(len(places), np.float32)
+    facing = np.where((normals * ways).sum(axis=1, keepdims=True) < 0, normals, -normals).astype(np.float32)
+    kernels_probes.look_up(baked.bounces, places, facing, triangle, glow, inside)
+    up = (1 + facing[:, 2:]) / 2
+    elsewhere = up * baked.surrounding.up + (1 - up) * baked.surrounding.below
+    light = arrived / np.float32(math.pi) + glow + (1 - inside[:, None]) * elsewhere
+    shaded = answers[:, 3:6] + answers[:, :3] * light
+    return np.minimum(shaded, BRIGHTEST).astype(np.float32), answers[:, 6].copy()

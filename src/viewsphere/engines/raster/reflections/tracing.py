@@ -1,0 +1,64 @@
+"""Rays through triangles, for what is baked once: see `kernels_trace`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.raster.records import Float32, Int32
+from viewsphere.engines.raster.reflections import kernels_trace as kernels
+
+
+class Tree(NamedTuple):
+    """Boxes around triangles: eight to a node, eight triangles to a leaf, as the processor's vectors take them.
+
+    bounds (N, 6 * 8) float32: of a node's children the lowest x of all, then y, z and the highest, infinite where there are
+    fewer; links (N, 8) int32: each child's node, or -1 - k where it is leaf k; corners (L, 9 * 8) float32: of a leaf's
+    triangles the first corner's x, y, z and both edges; order (L * 8,) int32: which triangles, some places twice.
+    """
+
+    bounds: Float32
+    links: Int32
+    corners: Float32
+    order: Int32
+
+
+def tree_of(corners: Float32) -> Tree:
+    """The tree of triangles (T, 3, 3), at least one; those that have a corner without numbers are met by no ray."""
+    corners = np.where(np.isfinite(corners).all(axis=(1, 2), keepdims=True), corners, np.float32(0)).astype(np.float32)
+    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    order = np.arange(len(corners), dtype=np.int32)
+    bounds, links = np.empty((2 * len(corners), 6), np.float32), np.empty((2 * len(corners), 2), np.int32)
+    count = kernels.build(boxes, order, bounds, links)
+    leaves = int(np.count_nonzero(links[:count, 1]))
+    a, b, c = corners.transpose(1, 0, 2)
+    wide = kernels.WIDE
+    tree = Tree(
+        np.empty((leaves, 6 * wide), np.float32),
+        np.empty((leaves, wide), np.int32),
+        np.empty((leaves, 9 * wide), np.float32),
+        np.empty(leaves * wide, np.int32),
+    )
+    nodes = kernels.widen(bounds, links, order, np.concatenate([a, b - a, c - a], axis=1), tree)
+    return tree._replace(bounds=tree.bounds[:nodes].copy(), links=tree.links[:nodes].copy())
+
+
+def cast(tree: Tree, origins: Float32, directions: Float32, turn: Int32, limit: float) -> tuple[Int32, Float32]:
+    """What rays from all origins (N, 3) meet first, in the K directions (W, K, 3) of each origin's `turn` (N,): the triangle,
+    (K, N) int32, -1 for nothing before `limit`, and how far away it is, (K, N).
+    """
+    shape = directions.shape[1], len(origins)
+    met, far = np.empty(shape, np.int32), np.empty(shape, np.float32)
+    kernels.cast(tree, origins, directions, turn, np.float32(limit), met, far)
+    found = met >= 0
+    met[found] = tree.order[met[found]]
+    return met, far
+
+
+def unblocked(tree: Tree, origins: Float32, ways: Float32) -> NDArray[np.float32]:
+    """1 where nothing lies between an origin (N, 3) and origin + way (N, 3), else 0."""
+    clear = np.empty(len(origins), np.float32)
+    kernels.unblocked(tree, origins, ways, clear)
+    return clear

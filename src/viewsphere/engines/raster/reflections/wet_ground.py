@@ -1,0 +1,79 @@
+"""What wet ground mirrors: in puddles sharply, in the film on rough ground drawn out along the picture's columns.
+
+What a film is taken to mirror is part of its material: the sky, or where light bounces what probes see, too. Here the scene's
+own mirror image takes its place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.appearance.wetting import FILM
+from viewsphere.engines.raster.records import Float32
+from viewsphere.engines.raster.reflections.mirroring import blurred, looked_at, lying, mirrored
+from viewsphere.engines.raster.shading import kernels_paint, kernels_split
+from viewsphere.engines.raster.shading.painting import Baked, view_of
+from viewsphere.model.camera import Camera
+from viewsphere.model.classes import STUFF_IDS
+from viewsphere.model.weather import Wet
+from viewsphere.rendering.weather.puddles import puddles
+from viewsphere.truth.raster.visibility import Visibility
+
+LOW = 0.3
+"""Metres above the ground up to which a surface mirrors, and is not mirrored: kerbs and pavements lie in between."""
+
+LEVEL = 0.97
+"""z of a normal from which on a surface mirrors."""
+
+WATER = 0.02
+"""Reflectance of water at normal incidence."""
+
+PAVED = [STUFF_IDS[name] for name in ("ground", "scenery", "road", "road marking", "pavement")]
+"""Classes that mirror."""
+
+DRAWN_OUT = 30, 150
+"""The picture's height over the reach of a film's blur, down and across."""
+
+UNDER_WATER = 0.35
+"""Share of a puddle's ground that is not seen for what swims in it."""
+
+
+def mirror_in_water(baked: Baked, camera: Camera, visibility: Visibility, wet: Wet, radiance: Float32) -> None:
+    """Add to `radiance` (H * W, 4) of a picture, in place, what its wet ground mirrors."""
+    geometry, shown = baked.geometry, visibility.triangle.reshape(-1)
+    plane = 0.0 if geometry.has_scenery or geometry.ground_z is None else geometry.ground_z  # in a place things stand on 0
+    if camera.center[2] <= plane + LOW:
+        return
+    low = lying(geometry, plane + LOW)
+    is_mirror = low & (baked.surfaces.normals[:, 2] > LEVEL) & np.isin(geometry.triangle_class, PAVED)
+    at = np.flatnonzero((shown >= 0) & is_mirror[shown])
+    if not len(at):
+        return
+    cosine, place = looked_at(camera, visibility, at)
+    water = WATER + (1 - WATER) * (1 - cosine) ** 5
+    deep = puddles(wet, place[:, 0], place[:, 1])
+    radiance[at, :3] *= 1 - (UNDER_WATER * deep)[:, None]
+    seen = mirrored(baked, camera, plane, low, at)
+    image = (seen.things + (1 - seen.hidden) * seen.sky).astype(np.float32)
+    share, taken = _taken(baked, camera, visibility, at, (wet.amount * FILM * water).astype(np.float32), seen.sky)
+    reach = max(1, camera.height // DRAWN_OUT[0]), max(1, camera.height // DRAWN_OUT[1])
+    film = ((1 - deep) * share)[:, None] * blurred(image, at, camera, reach)
+    pool = (deep * water)[:, None] * image
+    radiance[at, :3] = np.maximum(radiance[at, :3] + film + pool - taken, 0)
+
+
+def _taken(
+    baked: Baked, camera: Camera, visibility: Visibility, at: NDArray[np.intp], share: Float32, sky: Float32
+) -> tuple[Float32, Float32]:
+    """The share of light that the films of pixels (n,) mirror, (n,), and the light that they were taken to mirror, (n, 3): on
+    the ground that share of the `sky`.
+    """
+    triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+    is_thing = baked.kind[triangle[at]] != kernels_paint.FLOOR
+    slots = at[is_thing].astype(np.int32)
+    own, light = np.empty((len(slots), 4), np.float32), (baked.surrounding, baked.occlusion, baked.bounces)
+    kernels_split.film(view_of(baked, camera), baked.surfaces, baked.textures, baked.floor, *light, slots, triangle, depth, own)
+    taken = share[:, None] * sky
+    share[is_thing], taken[is_thing] = own[:, 3], own[:, :3]
+    return share, taken

@@ -1,0 +1,1 @@
+"""From samples to light: the kernels that paint."""

@@ -1,0 +1,291 @@
+"""A picture of a stage: its visible samples, shaded once each, and the sky behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.raster.antialiasing import kernels_chosen
+from viewsphere.engines.raster.antialiasing.samples import Layer, Marks, Samples, differs_behind, edge_samples, layers
+from viewsphere.engines.raster.indirect.bounces import Hall
+from viewsphere.engines.raster.indirect.near_field_gather import with_near
+from viewsphere.engines.raster.materials.kernels_material import L_BENDS
+from viewsphere.engines.raster.materials.surface import Rows
+from viewsphere.engines.raster.records import Bounces, Float32, Int32, PictureRays, Surfaces, Textures
+from viewsphere.engines.raster.reflections.glass import NO_GLASS, Glass
+from viewsphere.engines.raster.reflections.tracing import Tree
+from viewsphere.engines.raster.shading import kernels_paint, kernels_split
+from viewsphere.engines.raster.shadows.occlusion import Occlusion
+from viewsphere.engines.raster.shadows.shadow_maps import Lights
+from viewsphere.engines.raster.sky.environment import Surrounding, sky_behind
+from viewsphere.geometry.camera import inverse_camera_matrix
+from viewsphere.model.camera import Camera
+from viewsphere.model.weather import Fog
+from viewsphere.rendering.weather.fog import Air
+from viewsphere.truth.raster.geometry import Geometry
+from viewsphere.truth.raster.visibility import Visibility, lens_rays
+
+_NO_RAYS = np.zeros((0, 3), np.float32)
+_NO_PLACES = np.zeros((0, 2), np.float32)
+NO_SPLIT = np.zeros((0, 0), np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Baked:
+    """All that a picture is painted from; lengths are in `unit`s from `origin`.
+
+    floor (13,): the ground's texture repeats per length, its texture coordinates at the origin, its material, 1 if the ground
+    only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over
+    half their size; its slabs in a repeat, 0 for none. kind
+    (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where neighbouring triangles look alike;
+    see_through (T + 1,). blended: `with_blended_colors`. hall: what
+    throws the light of `bounces`, None if none bounces; tree: of the hall's triangles; is_fine: whether rays from each sample
+    find what is near, and what rough mirrors show.
+    """
+
+    geometry: Geometry
+    origin: NDArray[np.float64]
+    unit: float
+    surfaces: Surfaces
+    rows: Rows
+    textures: Textures
+    floor: Float32
+    surrounding: Surrounding
+    lights: Lights
+    occlusion: Occlusion
+    bounces: Bounces
+    kind: NDArray[np.uint8]
+    owner: Int32
+    see_through: NDArray[np.bool_]
+    blended: Geometry
+    glass: Glass
+    hall: Hall | None
+    tree: Tree | None
+    is_fine: bool
+
+    @property
+    def catches(self) -> bool:
+        """Whether the ground is a shadow catcher."""
+        return bool(self.floor[4] == 2)
+
+
+def paint(
+    baked: Baked,
+    camera: Camera,
+    visibility: Visibility,
+    antialias: bool,
+    has_sky: bool,
+    radiance: Float32,
+    split: Float32 = NO_SPLIT,
+    fog: Fog | None = None,
+    is_outdoors: bool = False,
+    more: Callable[[Float32], None] | None = None,
+) -> None:
+    """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the covered share of the pixel.
+
+    All is seen through `fog`; if that `is_outdoors` of a room, only sky and ground are. `more` adds to the light of the pixels'
+    centres what surfaces mirror.
+
+    Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, else 0. `split`, if it is not empty,
+    is filled with the parts of this light, (H * W, 6 or 9) float32 as `kernels_split` has them; it must be 0 before.
+    """
+    baked.rows.write_seen(camera, visibility, baked.geometry)
+    view = view_of(baked, camera)
+    triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+    air = None if fog is None else Air.of(fog, camera, is_outdoors=is_outdoors)
+    stack = shade_all(baked, camera, view, visibility, triangle, depth, radiance, split, air=air, more=more)
+    if has_sky:
+        _lay_sky(view, baked.surrounding, radiance, air)
+    if not antialias:
+        return
+    behind = differs_behind(visibility, stack, baked.owner, baked.surfaces.normals, radiance)
+    if len(baked.glass.corners) and stack:
+        bent = _nearest_glass(baked, stack, len(triangle)) < len(stack)
+        kernels_chosen.compare_bent(bent.reshape(visibility.triangle.shape), radiance, behind)
+    samples = edge_samples(baked.geometry, camera, visibility, baked.owner, behind)
+    if samples is not None:
+        _smooth(baked, camera, visibility, samples, behind, has_sky, radiance, split, fog, is_outdoors)
+
+
+def materials(baked: Baked, camera: Camera, visibility: Visibility) -> Float32:
+    """Roughness and metallic of what a camera's pixel centres see, (H * W, 2) float32; 0 for nothing and a shadow catcher."""
+    baked.rows.write_seen(camera, visibility, baked.geometry)
+    view, out = view_of(baked, camera), np.zeros((visibility.triangle.size, 2), np.float32)
+    triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+    is_floor = baked.kind[triangle] == kernels_paint.FLOOR
+    for is_ground, shown in ((False, (triangle >= 0) & ~is_floor), (True, is_floor)):
+        slots = np.flatnonzero(shown).astype(np.int32)
+        if len(slots) and not (is_ground and baked.catches):
+            surfaces = baked.surfaces, baked.textures, baked.floor
+            kernels_split.substance(view, *surfaces, is_ground, slots, triangle, depth, out)
+    return out
+
+
+def _smooth(
+    baked: Baked,
+    camera: Camera,
+    visibility: Visibility,
+    samples: Samples,
+    behind: Marks,
+    has_sky: bool,
+    radiance: Float32,
+    split: Float32,
+    fog: Fog | None,
+    is_outdoors: bool,
+) -> None:
+    """Set edge pixels to the mean of their samples. Samples are shaded only if they look like no centre of a pixel around, or
+    lie in pixels marked in `behind`.
+    """
+    shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
+    surfaces = baked.owner, baked.surfaces.normals
+    like, rows = kernels_paint.shared_samples(samples.pixels, *shown, *centres, *surfaces, behind, radiance)
+    count = 4 * len(rows)
+    is_other, places, triangle, inverse = (
+        np.empty(count, np.bool_),
+        np.empty((count, 2), np.float32),
+        np.empty(count, np.int32),
+        np.empty(count, np.float32),
+    )
+    kernels_paint.own_samples(rows, like, samples.position, *shown, places, triangle, inverse, is_other)
+    rays = samples.rays.reshape(-1, 4, 3)[rows].reshape(-1, 3) if len(samples.rays) else samples.rays
+    own = Samples(samples.pixels[rows], places, rays, triangle, inverse)
+    view = view_of(baked, camera, own)
+    colors, parts = np.empty((count, 4), np.float32), np.zeros((count if len(split) else 0, split.shape[1]), np.float32)
+    air = None if fog is None else Air.of(fog, camera, _rays(camera, own), is_outdoors)
+    shade_all(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own, air)
+    if has_sky:
+        colors[is_other, 3] = 1  # the sky need not be looked up for these
+        _lay_sky(view, baked.surrounding, colors, air)
+    if len(split):
+        kernels_split.average_split(samples.pixels, like, colors, radiance, parts, split)
+    glints, means = kernels_paint.average_samples(samples.pixels, like, colors, radiance)
+    kernels_paint.brighten_lines(samples.pixels[glints], means, camera.width, radiance)
+
+
+def shade_all(
+    baked: Baked,
+    camera: Camera,
+    view: PictureRays,
+    visibility: Visibility,
+    triangle: Int32,
+    depth: Float32,
+    radiance: Float32,
+    split: Float32,
+    samples: Samples | None = None,
+    air: Air | None = None,
+    more: Callable[[Float32], None] | None = None,
+) -> list[Layer]:
+    """Fill `radiance` (S, 4) with what the samples show, surfaces behind see-through ones first, and `split` with its parts,
+    if it is not empty; each surface is seen through the air before it. Returns the layers.
+    """
+    solid, ground = np.empty((2, len(triangle)), np.int32)
+    materials = baked.surfaces.material, np.zeros(len(baked.surfaces.looks) + 1, np.uint64)
+    solids, grounds = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance, solid, ground)
+    _shade_some(baked, view, solid[:solids], False, triangle, depth, radiance, split)
+    _shade_some(baked, view, ground[:grounds], True, triangle, depth, radiance, split)
+    if more is not None:
+        more(radiance)
+    # Layers are listed also where a solid surface is in front: a decal may lie on that surface.
+    pixels = None if samples is None else samples.pixels
+    stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
+    reached = depth.copy()  # 1/depth up to which light has come
+    first, behind = _nearest_glass(baked, stack, len(triangle)), triangle
+    for i, layer in enumerate(stack):
+        if air is not None and i > 0:
+            on, near = _veiled(baked, air, layer.slot, behind[layer.slot], layer.inverse_depth)
+            air.veil(radiance, air.depth(reached[on], on) - air.depth(near, on), on)
+        reached[layer.slot] = layer.inverse_depth
+        behind, behind_depth = triangle.copy(), depth.copy()
+        behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
+        is_ground, is_bent = baked.kind[layer.triangle] == kernels_paint.FLOOR, first[layer.slot] == i
+        for which in (False, True):
+            slots = layer.slot[(is_ground == which) & ~is_bent]
+            _shade_some(baked, view, slots, which, behind, behind_depth, radiance, split)
+        _shade_some(baked, view, layer.slot[is_bent], False, behind, behind_depth, radiance, split, baked.glass)
+    if air is not None:
+        on, far = _veiled(baked, air, np.arange(len(triangle), dtype=np.int32), triangle, reached)
+        air.veil(radiance, air.depth(far, on), on)
+    return stack
+
+
+def _veiled(baked: Baked, air: Air, slots: Int32, behind: Int32, inverse_depth: Float32) -> tuple[Int32, Float32]:
+    """Those of samples, and of their `inverse_depth` (n,), that show what is behind, triangles (n,), through the air."""
+    if not air.is_outdoors:
+        return slots, inverse_depth
+    is_ground = baked.kind[behind] == kernels_paint.FLOOR
+    return slots[is_ground], inverse_depth[is_ground]
+
+
+def _nearest_glass(baked: Baked, stack: list[Layer], count: int) -> NDArray[np.uint8]:
+    """Of each sample (S,): in which layer it sees solid glass first, their number where in none."""
+    first = np.full(count, len(stack), np.uint8)
+    if len(baked.glass.corners):
+        bends = baked.surfaces.looks[:, L_BENDS] > 0
+        for i, layer in enumerate(stack):
+            first[layer.slot[bends[baked.surfaces.material[layer.triangle]]]] = i
+    return first
+
+
+def _lay_sky(view: PictureRays, surrounding: Surrounding, radiance: Float32, air: Air | None) -> None:
+    """Lay radiance (S, 4) over the sky as it is seen through the air."""
+    before = None if air is None else radiance.copy()
+    sky_behind(view, surrounding, radiance)
+    if air is not None and before is not None:
+        radiance[:, :3] = before[:, :3] + air.behind(radiance[:, :3] - before[:, :3], before[:, 3])
+
+
+def _rays(camera: Camera, samples: Samples) -> NDArray[np.floating]:
+    """The rays (S, 3) of samples, in the camera's axes."""
+    if len(samples.rays):
+        return samples.rays
+    at = np.column_stack([samples.position, np.ones(len(samples.position))])
+    return at @ inverse_camera_matrix(camera.intrinsics).T
+
+
+def _shade_some(
+    baked: Baked,
+    view: PictureRays,
+    slots: Int32,
+    is_ground: bool,
+    triangle: Int32,
+    depth: Float32,
+    radiance: Float32,
+    split: Float32,
+    glass: Glass = NO_GLASS,
+) -> None:
+    if len(slots) == 0:
+        return
+    light, seen = (baked.surrounding, baked.lights, baked.occlusion), (slots, triangle, depth)
+    if is_ground and baked.catches:
+        kernels_paint.catch(view, baked.floor, *light, *seen, radiance)
+        return
+    bounces = baked.bounces
+    if baked.is_fine and baked.hall is not None and baked.tree is not None and not is_ground:
+        bounces = with_near(bounces, baked.hall, baked.tree, view, *seen)
+    given = view, baked.surfaces, baked.textures, baked.floor, *light, bounces, is_ground, *seen, glass
+    kernels_paint.shade(*given, radiance)
+    if len(split):
+        kernels_split.split(*given, split)
+
+
+def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> PictureRays:
+    """The rays of a camera's pixel centres, or of these samples."""
+    rays, places = _NO_RAYS, _NO_PLACES
+    table = lens_rays(camera)
+    if table is not None:
+        rays = (table if samples is None else samples.rays).astype(np.float32).reshape(-1, 3)
+    elif samples is not None:
+        places = samples.position
+    return PictureRays(
+        ((camera.center - baked.origin) / baked.unit).astype(np.float32),
+        camera.R.astype(np.float32),
+        inverse_camera_matrix(camera.intrinsics)[:2].astype(np.float32),
+        rays,
+        np.uint32(camera.width),
+        np.float32(1 / np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)),
+        np.float32(1 / baked.unit),
+        places,
+    )

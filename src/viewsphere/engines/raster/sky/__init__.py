@@ -1,0 +1,1 @@
+"""Light from the sky and from environment pictures."""
