@@ -42,9 +42,9 @@ from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.material import MaterialSpec
-from viewsphere.plugins.overview import SPECS
 from viewsphere.recipe.file import schema
 from viewsphere.run.listing import Listed, listed
+from viewsphere.run.overview import SPECS
 
 DOCS = Path(__file__).parent.parent / "docs"
 NOTE = "<!-- written by scripts/docs; do not edit -->\n\n"
@@ -230,7 +230,7 @@ A plug-in is one module, named by an entry point of its group, that holds its sp
 def plugins_page() -> str:
     """The fields of all specs."""
     text = NOTE + PLUGINS
-    for spec in SPECS:
+    for spec in (spec for spec in SPECS if spec is not Label):
         text += f"\n## {spec.__name__}\n\n{inspect.getdoc(spec)}\n\n"
         text += f"Entry points `viewsphere.{spec.KIND}`; the module holds `{plugins.SEAMS[spec.KIND].constant}`.\n"
         text += "\n| field | default | meaning |\n|---|---|---|\n"

@@ -27,9 +27,10 @@ from viewsphere.check import check
 from viewsphere.errors import PluginError, RecipeError, UserError
 from viewsphere.formats import coco
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.plugins.overview import overview
-from viewsphere.run.exporting import export, writable_formats
+from viewsphere.run.exporting import export
 from viewsphere.run.listing import listed
+from viewsphere.run.overview import overview
+from viewsphere.run.writable import writable_formats
 from viewsphere.store.shots.sample_records import from_whole_sample, whole_sample
 
 PAGE = Path(__file__).parent.parent / "docs" / "extending.md"
@@ -135,8 +136,31 @@ def test_a_label_of_objects_is_one_file(labelled, tmp_path):
 
 def test_a_label_of_another_name_than_its_file_is_refused(labelled):
     labelled("other", EXAMPLES["borders"])
-    with pytest.raises(ValueError, match="label 'other': expected the name of its file, found 'borders'"):
-        labels.labels()
+    assert "other" not in labels.labels() and "depth" in labels.labels()
+    with pytest.raises(PluginError, match=r"LABEL\.name: expected 'other', the name of its file; found 'borders'"):
+        plan(small_recipe(channels=["rgb", "other"]))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("encoding=", "encodin=", r"ChannelLabel\.encodin: 'encodin' is unknown; did you mean 'encoding'\?"),
+        ("compute=compute", "compute='depth'", r"ChannelLabel\.compute: expected a function; found 'depth'"),
+        ("compute=compute", "compute=max", r"ChannelLabel\.meaning: expected a value; found nothing"),
+        ("    ids={},\n", "", r"ChannelLabel\.ids: label 'borders' holds whole numbers"),
+        (
+            "def compute(sight)",
+            "def compute(sight, i)",
+            r"ChannelLabel\.compute: expected a function of 1 value; found",
+        ),
+    ],
+)
+def test_a_faulty_label_is_refused_where_it_is_named_and_nowhere_else(labelled, old, new, message):
+    code = EXAMPLES["borders"].replace(old, new)
+    labelled("borders", code.replace("    meaning=", "    # meaning=") if new == "compute=max" else code)
+    with pytest.raises(PluginError, match=message):
+        plan(small_recipe(channels=["rgb", "borders"]))
+    assert plan(small_recipe(channels=["rgb", "depth"])).frames
 
 
 def test_a_channel_that_needs_its_neighbours_is_refused_for_still_pictures(labelled):

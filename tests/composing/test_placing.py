@@ -197,9 +197,9 @@ def test_many_things_are_compared_with_few(floor, between, monkeypatch):
         apart = kind.apart
         monkeypatch.setattr(kind, "apart", lambda one, two, gap, apart=apart: compared.append(two) or apart(one, two, gap))
     shapes = [Shape(box(0.5, 0.6), lambda: box(0.5, 0.6))] * 150
-    module = plugins.load("placers", "scatter")
+    module = plugins.load(PlacerSpec, "scatter")
     rng, cast = partial(generator, 3, "layout"), [spec(f"m{i}") for i in range(150)]
-    poses = module.place(cast, Room(free=floor, gap=0.1), shapes, (), rng, module.Options(between=between))
+    poses = module.place(cast, Room(free=floor, gap=0.1), shapes, (), rng, module.options(between=between))
     assert first_crowded([footprint(shapes[0].box, pose) for pose in poses], 0.1) is None
     assert len(compared) < 30 * len(shapes)  # looking at all before each spot, there are 200,000
 

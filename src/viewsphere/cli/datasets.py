@@ -100,7 +100,7 @@ def formats(json_: AsJson = False) -> None:
 
 def plugins(json_: AsJson = False) -> None:
     """List all plug-ins with their distributions, and any reason why they cannot be loaded."""
-    from viewsphere.plugins.overview import overview
+    from viewsphere.run.overview import overview
 
     found = overview()
     if json_:

@@ -23,10 +23,10 @@ from viewsphere.printable import printable
 if TYPE_CHECKING:
     from viewsphere.check import Report
     from viewsphere.planning.plan import Plan
-    from viewsphere.plugins.overview import Installed
     from viewsphere.run.estimate import Estimate
     from viewsphere.run.generate import Summary, Warnings
     from viewsphere.run.listing import Listed
+    from viewsphere.run.overview import Installed
     from viewsphere.run.progress import Listener, Progress
     from viewsphere.run.status import Status
     from viewsphere.store.shots.heartbeat import Heartbeat

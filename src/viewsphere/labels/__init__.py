@@ -102,19 +102,16 @@ __getattr__ = names_of(
 @cache
 def labels() -> dict[str, Label]:
     """All labels by name, first the channels that recipes keep by default, then the others in alphabetical order."""
-    names = sorted(plugins.names("labels"), key=lambda name: (name not in DEFAULT_CHANNELS, name))
-    return {name: label for name in names if (label := label_named(name))}
+    found = plugins.loadable(Label)
+    return {name: found[name] for name in sorted(found, key=lambda name: (name not in DEFAULT_CHANNELS, name))}
 
 
 @cache
 def label_named(name: str) -> Label | None:
-    """The label of this name, None where there is none; loads no other."""
+    """The label of this name, None where there is none; loads no other. Raises PluginError for one that cannot be loaded."""
     if name not in plugins.names("labels"):
         return None
-    label: Label = plugins.load("labels", name).LABEL
-    if label.name != name:
-        raise ValueError(f"label {name!r}: expected the name of its file, found {label.name!r}")
-    return label
+    return plugins.load(Label, name)
 
 
 def is_on_request(name: str) -> bool:

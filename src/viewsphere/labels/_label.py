@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
+from pydantic import ConfigDict, InstanceOf, SkipValidation, model_validator
 
-from viewsphere.errors import ViewsphereError
+from viewsphere.errors import PluginError, ViewsphereError
 from viewsphere.labels._field import Field
 from viewsphere.labels._ids import Ids, check_ids, has_whole_numbers
 from viewsphere.labels._placement import ModelFacts, Placement
 from viewsphere.model.channel import Channel
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.plugins.registry import Kind
+from viewsphere.plugins.spec import Spec
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
     from viewsphere.labels._sight import Sight
+else:
+    Sight = Any  # which loads the rasterizer; the fields' types are evaluated when the classes are made
 
 Array = NDArray[Any]
 Picture = NDArray[np.uint8]
@@ -101,28 +106,30 @@ class Drawing:
         return self.beside(sample) if self.beside else None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Label:
+class Label(Spec):
     """The properties of all labels: `name` (that of their file), `meaning`, `axes`, their frame of reference, and `options`,
     the class of those that a recipe's `labels` may give.
 
     `prove` compares a stored sample with itself, which is quick; besides, `check` computes every label again.
     """
 
+    model_config = ConfigDict(allow_inf_nan=True)
+
+    KIND: ClassVar[Kind] = "labels"
+
     name: str
     meaning: str
     axes: str = ""
-    needs: Needs = Needs()
+    needs: InstanceOf[Needs] = Needs()
     options: type[Frozen] | None = None
     prove: Proof = trusted
-    drawing: Drawing | None = None
+    drawing: InstanceOf[Drawing] | None = None
 
     def is_in(self, sample: Sample) -> bool:
         """Whether a sample has it."""
         return self.name in sample.asked
 
 
-@dataclass(frozen=True, kw_only=True)
 class ChannelLabel(Label):
     """A label of pixels, stored as a separate file: (height, width) or (height, width, components); `empty` where nothing is
     seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact; `colors` are those of the
@@ -133,16 +140,21 @@ class ChannelLabel(Label):
     """
 
     compute: Callable[[Sight], Array]
-    dtype: DTypeLike
+    dtype: Any
     components: int = 1
     unit: str = "1"
     empty: float = 0
     encoding: Any = "tiff"
     colors: tuple[Color, ...] = ()
-    ids: Ids | None = None
+    ids: SkipValidation[Ids | None] = None
 
-    def __post_init__(self) -> None:
-        check_ids(f"label {self.name!r}", self.ids, has_whole_numbers(self.dtype), "by_table")
+    @model_validator(mode="after")
+    def _check_ids(self) -> Self:
+        try:
+            check_ids(f"label {self.name!r}", self.ids, has_whole_numbers(self.dtype), "by_table")
+        except ValueError as error:
+            raise PluginError(f"{type(self).__name__}.ids: {error}") from None
+        return self
 
     def is_in(self, sample: Sample) -> bool:
         """Whether the sample keeps the channel."""
@@ -164,7 +176,6 @@ def nothing(annotation: ObjectAnnotation) -> None:
     return
 
 
-@dataclass(frozen=True, kw_only=True)
 class ObjectLabel(Label):
     """A label of objects: one field or several that are computed together.
 
@@ -176,7 +187,7 @@ class ObjectLabel(Label):
     A label that is `on_request` is computed only where a recipe's `annotations` name it.
     """
 
-    fields: tuple[Field, ...]
+    fields: tuple[InstanceOf[Field], ...]
     compute: Callable[[Sight, int], Mapping[str, Any]] = later
     restore: Callable[[Any, Placement, ObjectAnnotation], Mapping[str, Any]]
     keep: Callable[[ObjectAnnotation], Any] = nothing
@@ -216,14 +227,13 @@ class ObjectLabel(Label):
         )
 
 
-@dataclass(frozen=True, kw_only=True)
 class SampleLabel(Label):
     """A label of a whole picture, computed where a recipe's `annotations` name it.
 
     `compute(sight, objects)` gives its fields. The store keeps them as they are.
     """
 
-    fields: tuple[Field, ...]
+    fields: tuple[InstanceOf[Field], ...]
     compute: Callable[[Sight, Sequence[ObjectAnnotation]], Mapping[str, Any]]
 
 

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar, overload
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 from viewsphere.errors import PluginError, UserError
 
@@ -55,19 +55,13 @@ def names(kind: Kind) -> tuple[str, ...]:
     return tuple(sorted({*_shipped(kind), *(entry.name for entry in entry_points(group=f"viewsphere.{kind}"))}))
 
 
-@overload
-def load(kind: type[S], name: str) -> S: ...
-@overload
-def load(kind: Kind, name: str) -> Any: ...
-def load(kind: type[S] | Kind, name: str) -> Any:
+def load(spec: type[S], name: str) -> S:
     """The spec of a plug-in.
 
     Raises UserError for an unknown name, with the nearest known one. Raises PluginError for a plug-in that cannot be loaded, or
     whose spec is not valid.
     """
-    if isinstance(kind, str):
-        return _module_of(kind, name)
-    return _spec(kind, _module_of(kind.KIND, name), name)
+    return _spec(spec, _module_of(spec.KIND, name), name)
 
 
 def loadable(spec: type[S]) -> dict[str, S]:
@@ -146,6 +140,9 @@ def _spec(spec: type[S], found: Any, name: str) -> S:
     held = others[constant]
     if not isinstance(held, spec):
         raise PluginError(f"{where}: {constant}: expected a {spec.__name__}; found {shown(held)}")
+    if getattr(held, "name", name) != name:  # of kinds whose specs are found without their modules
+        other = shown(vars(held)["name"])
+        raise PluginError(f"{where}: {constant}.name: expected {name!r}, the name of its file; found {other}")
     return held
 
 

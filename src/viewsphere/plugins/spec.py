@@ -14,6 +14,7 @@ from viewsphere.errors import PluginError, RecipeError
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import explained, report
 from viewsphere.model.mistakes import read_options as read_as
+from viewsphere.model.quantity import quantity
 from viewsphere.plugins.registry import Kind
 
 
@@ -95,4 +96,4 @@ def _check_call(field: str, function: Callable[..., Any], count: int) -> None:
         signature.bind(*range(count))
     except TypeError:
         name = getattr(function, "__name__", "")
-        raise PluginError(f"{field}: expected a function of {count} values; found {name}{signature}") from None
+        raise PluginError(f"{field}: expected a function of {quantity(count, 'value')}; found {name}{signature}") from None

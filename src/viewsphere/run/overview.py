@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from viewsphere.errors import UserError
+from viewsphere.labels import Label
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.material import MaterialSpec
@@ -14,7 +15,7 @@ from viewsphere.plugins.registry import SEAMS, Kind, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.spec import Spec
 
-SPECS: tuple[type[Spec], ...] = (EngineSpec, FormatSpec, MaterialSpec, MotionSpec, PlacerSpec, SamplerSpec)
+SPECS: tuple[type[Spec], ...] = (EngineSpec, FormatSpec, Label, MaterialSpec, MotionSpec, PlacerSpec, SamplerSpec)
 """The specs of all kinds."""
 
 
@@ -34,9 +35,8 @@ def overview() -> tuple[Installed, ...]:
 
 
 def _error(kind: Kind, name: str) -> str | None:
-    spec = {spec.KIND: spec for spec in SPECS}.get(kind)
     try:
-        load(kind if spec is None else spec, name)
+        load({spec.KIND: spec for spec in SPECS}[kind], name)
     except UserError as error:
         return str(error)
     return None
