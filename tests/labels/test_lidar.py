@@ -262,7 +262,7 @@ def test_points_are_drawn_from_above():
         ({"azimuth": [20, -20]}, "azimuth: expected \\[low, high\\]"),
         ({"elevations": [1, 2]}, "expected rings and elevation, or elevations; found both"),
         ({"rings": None, "elevation": None}, "or elevations; found neither"),
-        ({"rings": None, "elevation": None, "elevations": [1, 1]}, "expected different ones; found one twice"),
+        ({"rings": None, "elevation": None, "elevations": [1, 1]}, "one of them is listed twice: remove it"),
         ({"elevation": [-100, 0]}, "elevation"),
         ({"range": [10, 5]}, "range: expected \\[low, high\\]"),
         ({"range": [-1, 5]}, "range"),

@@ -256,7 +256,10 @@ def test_categories_are_balanced_in_each_split_and_where_models_are_few():
             {"camera": {"fov_deg": [30, 40]}, "rig": {"sensors": {"a": {}, "b": {"size": [32, 24], "position": [1, 0, 0]}}}},
             "rig.sensors.b: expected fov_deg, focal_px or K beside size or distortion, as the camera's lens is drawn",
         ),
-        ({"models": [{"source": "a.obj", "category": "a", "count": [1, 2]}]}, "expected one number for count"),
+        (
+            {"models": [{"source": "a.obj", "category": "a", "count": [1, 2]}]},
+            "count is a distribution, but for files it must be one number",
+        ),
         ({"scene": {"company": {"count": [1, 3]}}}, "scene.company.count: expected at most 1, as there are 2 models"),
         ({"scenes": {"count": 2, "balance": "categories"}}, "did you mean 'category'"),
     ],

@@ -140,7 +140,7 @@ MISTAKES = [
     ({"kind": "stereo", "baseline": -0.1}, "rig.baseline: expected a number greater than 0"),
     ({"kind": "stereo"}, "rig.baseline: expected a value"),
     ({"kind": "mono"}, "rig.kind: 'mono' is unknown. Valid: sensors, stereo, surround, file"),
-    ({"sensors": {"Left": {}, "left": {}}}, "rig.sensors: expected names that differ in more than capitals"),
+    ({"sensors": {"Left": {}, "left": {}}}, "rig.sensors: sensors .Left. and .left. differ only in capitals"),
     ({"sensors": {}}, "rig.sensors: expected at least 1"),
     ({"sensors": {"a b": {}}}, "rig.sensors.a b: "),
     ({"sensors": {"a": {"rotation": [0, 0, 0], "look": [0, 0, 1]}}}, "rig.sensors.a: expected rotation or look; found both"),

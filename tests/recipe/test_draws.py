@@ -191,9 +191,9 @@ REFUSED = [
     ({"number": {"uniform": [1, True]}}, ("number", "uniform", 1), "a number; found true"),
     ({"number": {"uniform": [1, math.inf]}}, ("number", "uniform", 1), "a finite number; found inf"),
     ({"number": {"choice": []}}, ("number", "choice"), "at least 1 of them; found 0"),
-    ({"number": {"choice": [1, 2], "weights": [1]}}, ("number",), "as many weights as there are choices"),
+    ({"number": {"choice": [1, 2], "weights": [1]}}, ("number",), "as many weights as choices"),
     ({"number": {"choice": [1, 2], "weights": [0, 0]}}, ("number",), "a weight above 0"),
-    ({"number": {"uniform": [1, 2], "weights": [0, 1]}}, ("number",), "as many weights as there are choices"),
+    ({"number": {"uniform": [1, 2], "weights": [0, 1]}}, ("number",), "as many weights as choices"),
     ({"free": {"log_uniform": [0, 1]}}, ("free",), "ends above 0; found one that may be 0"),
     ({"free": {"log_uniform": [{"normal": [3, 1]}, 9]}}, ("free",), "ends above 0; found one that may be -inf"),
     ({"share": {"uniform": [0, 2]}}, ("share", "uniform", 1), "less than or equal to 1; found 2"),
@@ -205,7 +205,7 @@ REFUSED = [
     ({"color": [[0, 2], 0, 0]}, ("color", 0, "uniform", 1), "less than or equal to 1; found 2"),
     ({"point": {"uniform": [[0, 0], [1, 1, 1]]}}, ("point", "uniform", 0, 2), "a value; found nothing"),
     ({"point": {"uniform": [0, 1]}}, ("point", "uniform", 0), "a list; found 0"),
-    ({"point": {"normal": [[0, 0, 0], [1, 1]]}}, ("point",), "the mean's components"),
+    ({"point": {"normal": [[0, 0, 0], [1, 1]]}}, ("point",), "one per component of the mean"),
 ]
 
 
@@ -265,5 +265,5 @@ def test_distributions_in_one_another_have_a_limit():
     assert drawn(Entry(free=value), lambda path: np.random.default_rng(len(path))).free in (1, 2)
     for _ in range(300):
         value = {"choice": [value, 2.0]}
-    with pytest.raises(ValidationError, match="expected at most 16 distributions in one another; found more"):
+    with pytest.raises(ValidationError, match="expected distributions nested at most 16 deep; found more"):
         Entry(free=value)

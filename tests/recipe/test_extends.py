@@ -110,7 +110,7 @@ def test_a_change_follows_yamls_rules():
 WRONG = [
     ("extends: nothing.yaml\n", r"own.yaml:1: extends: expected a recipe file; found none at .*nothing.yaml"),
     ("name: x\nextends: [3]\n", r"own.yaml:2: extends: expected the path of a recipe, or a list of them; found 3"),
-    ("extends: own.yaml\n", r"own.yaml:1: extends: expected recipes that do not extend one another; found own.yaml again"),
+    ("extends: own.yaml\n", r"own.yaml:1: extends: own.yaml extends itself, directly or through others"),
     ("extends: base.yaml\nscene: {sun: {elevation_deg: 300}}\n", r"own.yaml:2: scene.sun.elevation_deg: expected a number"),
     ("extends: base.yaml\nviewpoints: {tilt: x}\n", r"own.yaml:2: viewpoints.tilt"),
 ]
@@ -130,7 +130,7 @@ def test_a_mistake_of_the_other_recipe_is_named_there(write):
 
 def test_circles_are_refused(write):
     file = write(a="extends: b.yaml\n", b="extends: a.yaml\n")
-    with pytest.raises(RecipeError, match=r"expected recipes that do not extend one another; found b.yaml again"):
+    with pytest.raises(RecipeError, match=r"b.yaml extends itself, directly or through others"):
         Recipe.load(file)
 
 

@@ -177,8 +177,8 @@ MISTAKES = [
     ),
     (
         {"scene": {"lights": [{"kind": "spot", "position": [0, 0, 0], "strength": 1}]}},
-        "scene.lights[0].position: expected another place than toward, at which it points; ",
-        "found [0.0, 0.0, 0.0] for both",
+        "scene.lights[0].position: the lamp is at the point it is aimed at, ",
+        "[0.0, 0.0, 0.0]: change this place or toward",
     ),
     (
         {
@@ -186,8 +186,8 @@ MISTAKES = [
                 "lights": [{"kind": "area", "position": {"choice": [[1, 1, 1], [2, 2, 2]]}, "toward": [2, 2, 2], "strength": 1}]
             }
         },
-        "scene.lights[0].position: expected another place than toward",
-        "found [2.0, 2.0, 2.0] for both",
+        "scene.lights[0].position: the lamp is at the point it is aimed at",
+        "[2.0, 2.0, 2.0]: change this place or toward",
     ),
     (
         {
@@ -195,8 +195,8 @@ MISTAKES = [
                 "lights": [{"kind": "area", "at": {"elevation_deg": 90, "distance": 3}, "toward": [0, 0, 3], "strength": 1}]
             }
         },
-        "scene.lights[0].at: expected another place than toward",
-        "found [0.0, 0.0, 3.0] for both",
+        "scene.lights[0].at: the lamp is at the point it is aimed at",
+        "[0.0, 0.0, 3.0]: change this place or toward",
     ),
     (
         {"scene": {"lights": [{"kind": "area", "position": [0, 0, 1], "size": [1, 0], "strength": 1}]}},

@@ -175,7 +175,7 @@ def test_without_variations_a_recipe_has_the_digest_it_had() -> None:
     [
         ({"a": {"place": "zoo:neighbourhood"}}, r"variations\.a\.place: expected sun, .*; found place"),
         ({"a-b": {}}, r"variations"),
-        ({"A": {}, "a": {}}, r"differ in more than capitals; found A and a"),
+        ({"A": {}, "a": {}}, r"variations A and a differ only in capitals"),
         ({}, r"variations"),
         ({"a": {}, "b": {"background": "transparent"}}, r"variations\.b\.background: expected a transparent background in all"),
         ({"a": {}, "b": {"background": "#ff0000"}}, None),

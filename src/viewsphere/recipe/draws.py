@@ -95,7 +95,7 @@ class Distribution(Brief):
             raise ValueError(f"expected one of {', '.join(KINDS)}; found {' and '.join(given) or 'none'}")
         if self.weights is not None:
             if self.choice is None or len(self.weights) != len(self.choice):
-                raise ValueError("expected as many weights as there are choices; found another number")
+                raise ValueError("expected as many weights as choices; found another number")
             if not sum(self.weights):
                 raise ValueError("expected a weight above 0; found none")
         return self
@@ -182,7 +182,7 @@ class _Reader(NamedTuple):
         if not isinstance(value, Mapping) or (self.of == "entry" and not _means_choice(value)):
             return self.plain(value)
         if self.depth == DEEPEST:
-            raise ValueError(f"expected at most {DEEPEST} distributions in one another; found more")
+            raise ValueError(f"expected distributions nested at most {DEEPEST} deep; found more")
         raw = Distribution.model_validate(value)
         if raw.kind != "choice" and self.of in ("word", "entry"):
             raise ValueError(f"expected choice; found {raw.kind}, which is for numbers")
@@ -213,10 +213,10 @@ class _Reader(NamedTuple):
                 values[name] = self._deviation(value) if name == "deviation" else self.read(value)
         order = [values[name] for name in ("min", "mean", "max") if name in values]
         if not all(_ordered(a, b) for a, b in pairwise(order)):
-            raise ValueError("expected a mean from min to max; found it outside")
+            raise ValueError("expected a mean from min to max; found one outside")
         mean, deviation = values["mean"], values["deviation"]
         if isinstance(mean, tuple) and isinstance(deviation, tuple) and len(mean) != len(deviation):
-            raise ValueError("expected a deviation that is one number, or has the mean's components; found another number")
+            raise ValueError("expected one deviation, or one per component of the mean; found another number")
         return raw.model_copy(update=values)
 
     def _deviation(self, value: Any) -> Any:

@@ -102,7 +102,9 @@ def _joined(path: Path, above: tuple[Path, ...], known: dict[str, _Layer]) -> _L
             raise RecipeError(f"{where} extends: expected the path of a recipe, or a list of them; found {shown(name)}")
         base = path.parent / Path(name).expanduser()
         if base.resolve() in chain:
-            raise RecipeError(f"{where} extends: expected recipes that do not extend one another; found {name} again")
+            raise RecipeError(
+                f"{where} extends: {name} extends itself, directly or through others: remove one of these extends"
+            )
         if not base.is_file():
             raise RecipeError(f"{where} extends: expected a recipe file; found none at {base}")
         found = _extended(base, chain, known)

@@ -43,7 +43,7 @@ def fetched(path: str | os.PathLike[str]) -> Path:
             target = place / hashlib.sha256(str(file.parent).encode()).hexdigest()[:32]
             _replace(target, own)
     except FileNotFoundError as error:
-        raise RecipeError(f"{file.parent}: expected files that stay while they are copied, found one gone: {error}") from None
+        raise RecipeError(f"{file.parent}: a file disappeared while it was copied ({error}): run the command again") from None
     except OSError as error:
         raise RecipeError(f"{place}: expected to keep {file.parent} there, found {error.strerror or error}") from None
     return target / file.name

@@ -85,7 +85,7 @@ class LidarEntry(Frozen):
             if self.rings is not None or self.elevation is not None:
                 raise ValueError("expected rings and elevation, or elevations; found both")
             if len(set(self.elevations)) < len(self.elevations):
-                raise ValueError("elevations: expected different ones; found one twice")
+                raise ValueError("elevations: one of them is listed twice: remove it")
         elif self.rings is None or self.elevation is None:
             raise ValueError("expected rings and elevation ([low, high] in degrees), or elevations; found neither")
         return self

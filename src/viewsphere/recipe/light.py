@@ -212,7 +212,7 @@ class _Aimed(entry_of(AimedLight), _Placed):
         for place in places:
             if any(_is_one_point(place, toward) for toward in alternatives(self.toward)):
                 with standing_at("position" if self.at is None else "at"):
-                    raise ValueError(f"expected another place than toward, at which it points; found {shown(place)} for both")
+                    raise ValueError(f"the lamp is at the point it is aimed at, {shown(place)}: change this place or toward")
         return self
 
 

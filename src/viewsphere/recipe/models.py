@@ -210,18 +210,18 @@ class ModelEntry(Brief):
             if not re.fullmatch(r"[a-z][a-z0-9_]*", family):
                 raise ValueError(f"expected zoo:<family>, such as zoo:car; found {ZOO + family!r}")
         if not families and is_random(self.count):
-            raise ValueError("expected one number for count, of how many files there have to be; found a distribution")
+            raise ValueError("count is a distribution, but for files it must be one number: the required number of files")
         if not families and not self.category:
             zoo = f"; did you mean {ZOO + self.source[0]!r}?" if self.source[0] in plugins.families() else ""
             raise ValueError(f"expected a category, such as car; found none (only zoo families have one of their own){zoo}")
         if self.up and self.forward and self.up[1] == self.forward[1]:
             raise ValueError(f"expected up and forward along different axes; found {self.up} and {self.forward}")
         if families and self.sidecar is not None:
-            raise ValueError("expected a file for sidecar; found the zoo, whose models say what there is to say")
+            raise ValueError("zoo models cannot have a sidecar, because they bring these facts themselves: remove sidecar")
         if self.frames is None and self.poses != "each":
             raise ValueError(f"expected frames, for poses: {self.poses}; found none")
         if not self.is_labelled and self.frames is not None:
-            raise ValueError("expected no frames beside labels: background; found some: distractors do not play their files")
+            raise ValueError("frames cannot be set with labels: background, because distractors play no frames: remove one")
         if self.scale == "real_size" and self.real_size is None and not families:
             raise ValueError("expected real_size to be set, for scale: real_size; found none")
         return self

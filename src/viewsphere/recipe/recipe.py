@@ -85,11 +85,15 @@ class Splits(Frozen):
             if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,99}", name):
                 raise ValueError(f"expected names of letters, digits, '-' and '_'; found split {name!r}")
             if is_reserved(name):
-                raise ValueError(f"expected names for folders, which Windows has not given to devices; found split {name!r}")
+                raise ValueError(
+                    f"split {name!r} is the name of a Windows device, which cannot be a folder: choose another name"
+                )
         folded = {name.casefold(): name for name in reversed(self.shares)}
         for name in self.shares:
             if (other := folded[name.casefold()]) != name:
-                raise ValueError(f"expected names that differ in more than capitals, for folders; found {other!r} and {name!r}")
+                raise ValueError(
+                    f"splits {other!r} and {name!r} differ only in capitals, which some file systems ignore: rename one"
+                )
         numbers = {name: share for name, share in self.shares.items() if not isinstance(share, tuple)}
         if numbers and abs(sum(numbers.values()) - 1) > 1e-6:
             added = " + ".join(f"{name} {share:g}" for name, share in numbers.items())

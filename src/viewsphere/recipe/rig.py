@@ -120,7 +120,9 @@ class SensorList(Frozen):
         seen: dict[str, str] = {}
         for name in value:
             if (other := seen.setdefault(name.casefold(), name)) != name:
-                raise ValueError(f"expected names that differ in more than capitals; found {name!r} beside {other!r}")
+                raise ValueError(
+                    f"sensors {other!r} and {name!r} differ only in capitals, which some file systems ignore: rename one"
+                )
         return value
 
     @property

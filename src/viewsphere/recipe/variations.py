@@ -43,7 +43,9 @@ def _distinct(variations: dict[str, SceneEntry]) -> dict[str, SceneEntry]:
     folded: dict[str, str] = {}
     for name in variations:
         if folded.setdefault(name.casefold(), name) != name:
-            raise ValueError(f"expected names that differ in more than capitals; found {folded[name.casefold()]} and {name}")
+            raise ValueError(
+                f"variations {folded[name.casefold()]} and {name} differ only in capitals: rename one, for file systems"
+            )
     return variations
 
 
