@@ -183,7 +183,7 @@ def test_usd_models_need_blender_only_without_usd_core(folder, monkeypatch):
         raise MissingExtraError("no Blender here")
 
     (folder / "house.usda").write_text("#usda 1.0\n")
-    monkeypatch.setattr("viewsphere.planning.models.find_blender", none)
+    monkeypatch.setattr("viewsphere.blender.interpreter.find_blender", none)
     monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: True)
     assert planned(folder, '"*.obj"', "house.usda").frames == 2
     monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: False)

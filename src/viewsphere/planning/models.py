@@ -17,7 +17,6 @@ from typing import Literal
 
 from viewsphere.assets.load import BLENDER_SUFFIXES, UP, check_source, needs_blender
 from viewsphere.assets.paths.inside import split_source
-from viewsphere.blender.interpreter import find_blender
 from viewsphere.composing.scene.entries_walked import below, matching, named
 from viewsphere.composing.seeds import generator, share
 from viewsphere.composing.tables import Cells, table_rows
@@ -149,6 +148,8 @@ def _check_file(entry: ModelEntry, found: _Found) -> None:
     except ModelError as error:
         raise RecipeError(f"{where}.source: {error}") from None
     if needs_blender(suffix):
+        from viewsphere.blender.interpreter import find_blender
+
         find_blender()
     up = UP.get(suffix)
     if up and entry.up is None and entry.forward is not None and entry.forward[1] == up:

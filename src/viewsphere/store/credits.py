@@ -6,13 +6,16 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 import xxhash
 
 from viewsphere.files import read_bytes
 from viewsphere.model.credit import Credit
-from viewsphere.store.samples.dataset import Dataset
 from viewsphere.store.shots.records import ModelInfo
+
+if TYPE_CHECKING:
+    from viewsphere.store.samples.dataset import Dataset
 
 CREDITS = "CREDITS.md"
 """Name of the file."""

@@ -15,7 +15,6 @@ from typing import Self, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.normalise import rotation as axes_rotation
 from viewsphere.composing.seeds import generator
 from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics, Orbit, PoseFile, read_poses
 from viewsphere.errors import RecipeError
@@ -439,6 +438,8 @@ def _shot_name(shot: Arranged) -> str:
 def world_turn(viewpoints: PoseList, file: PoseFile) -> Float:
     """Our world from a file's, (3, 3)."""
     up = viewpoints.up or file.up
+    from viewsphere.assets.normalise import rotation as axes_rotation  # which loads meshes
+
     return axes_rotation(up, viewpoints.forward or ("-z" if up[1] == "y" else "-y"), "viewpoints")
 
 

@@ -30,6 +30,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from viewsphere.errors import UserError
 from viewsphere.formats.coco.categories import keeps_ids, notes
@@ -42,7 +43,9 @@ from viewsphere.formats.shared.export_files import put
 from viewsphere.model.channel import missing
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.store import Dataset
+
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
 
 CHANNELS = ("rgb",)
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import chain
+from typing import TYPE_CHECKING
 
 from viewsphere.formats.coco.options import Options
-from viewsphere.store import Category, Dataset
+
+if TYPE_CHECKING:
+    from viewsphere.store import Category, Dataset
 
 _NAMES = {
     1: "person bicycle car motorcycle airplane bus train truck boat",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,9 @@ from viewsphere.formats.shared.export_files import Expected
 from viewsphere.formats.shared.paper import faces, json_bytes, transformation_matrix
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
-from viewsphere.store import Dataset
+
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
 
 FOLDER_SIZE = 10_000
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.entries import CAPTIONS, Entry
@@ -15,8 +15,10 @@ from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.points import category_points, has_label, point_names
 from viewsphere.formats.coco.said import Licences, imported_categories, imported_info, imported_info_of_parts
 from viewsphere.formats.shared.paper import json_bytes, vehicles
-from viewsphere.store import Dataset
 from viewsphere.store.credits import credited
+
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
 
 
 def file_name(split: str, kind: str = "instances") -> str:

@@ -8,14 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from viewsphere.formats.coco.said import imported_categories
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.sample import ObjectAnnotation
-from viewsphere.store import Category, Dataset
+
+if TYPE_CHECKING:
+    from viewsphere.store import Category, Dataset
 
 KEYPOINTS = "keypoints"
 """The label whose points are exported where a data set has it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewsphere.aside import temporary
 from viewsphere.formats.coco.entries import Entries, Entry, files, seen
@@ -15,7 +15,9 @@ from viewsphere.formats.shared.export_files import Expected, check_files, models
 from viewsphere.formats.shared.json_proof import check_json
 from viewsphere.formats.shared.json_rows import Where
 from viewsphere.plugins.format import Remark
-from viewsphere.store import Dataset
+
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
 
 OPENED: tuple[Where, ...] = ((), ("categories",), ("models",), ("images",), ("annotations",))
 """What of an instances file is compared, and read, item by item."""

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
-from viewsphere.store import Dataset
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
+
 
 OWN = {"id", "name", "supercategory"}
 """Keys of categories that the plan has in other places."""

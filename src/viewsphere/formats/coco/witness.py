@@ -8,7 +8,7 @@ import json
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from viewsphere.formats.shared.json_rows import rows
 from viewsphere.geometry.mask import encode_rle, mask_box
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import Remark
-from viewsphere.store import Dataset
+
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
 
 MOST_FRAMES = 2000
 """Frames of a split that are looked at, spread evenly: COCOeval keeps all of them in memory."""
