@@ -29,6 +29,8 @@ from pathlib import Path
 import grimp
 
 from viewsphere import _HOMES
+from viewsphere.model.channel import DEFAULT_CHANNELS, PICTURES
+from viewsphere.model.shot import Shot
 from viewsphere.plugins.registry import SEAMS
 
 ROOT = Path(__file__).parent.parent
@@ -43,6 +45,7 @@ LISTS = {
     "formats": "viewsphere.formats.",
     "families": "viewsphere.zoo.",
     "places": "viewsphere.zoo.",
+    "things": "viewsphere.zoo.",
     "zoo": "viewsphere.zoo.",
     "loadable": "viewsphere.",
     "plugins": "viewsphere.",
@@ -121,7 +124,17 @@ class Modules:
             package, _, name = module.rpartition(".")
             if package in homes and not name.startswith("_") and name != "shared":
                 self.plugins[name].add(module)
-        self._needs = {module: graph.find_modules_directly_imported_by(module) | self._named(module) for module in self.all}
+        self.needs = {module: graph.find_modules_directly_imported_by(module) | self._named(module) for module in self.all}
+        for loader, meant in self._implied().items():
+            self.needs[loader] |= meant
+
+    def _implied(self) -> dict[str, set[str]]:
+        """By the module that loads them: the plug-ins that a recipe means without naming them."""
+        samplers = {module for module in self.all if module.startswith(f"{SEAMS['samplers'].package}.")}
+        defaults = self.plugins[Shot.model_fields["engine"].default].union(
+            *(self.plugins[name] for name in DEFAULT_CHANNELS if name not in PICTURES)
+        )
+        return {"viewsphere.planning.plan": samplers, "viewsphere.run.stages": defaults}
 
     def _named(self, module: str) -> set[str]:
         """What a module's strings name: dotted paths, and in a plug-in the others of its kind and those it works with."""
@@ -162,12 +175,12 @@ class Modules:
         listed = text.calls & LISTS.keys()
         for kind in listed - {"names"} or listed:  # `names("labels")` lists labels alone
             used |= {module for modules in self.plugins.values() for module in modules if module.startswith(LISTS[kind])}
-        return used
+        return used | ({"viewsphere.model.notebook"} if used else set())  # which the package's own file imports
 
     def affected(self, changed: Iterable[str]) -> set[str]:
         """These modules and all that need them."""
         users = defaultdict[str, set[str]](set)
-        for module, needs in self._needs.items():
+        for module, needs in self.needs.items():
             for needed in needs:
                 users[needed].add(module)
         return closure(changed, lambda module: users.get(module, ()))

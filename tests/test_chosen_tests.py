@@ -60,6 +60,27 @@ def test_a_change_chooses_what_reaches_it(chosen, changed, there, not_there):
     assert not set(not_there) & set(found)
 
 
+LOADED = """
+import sys, pytest
+status = pytest.main(["-q", "-p", "no:xdist", "-m", "not slow", sys.argv[1]])
+print("loaded", *(name for name in sys.modules if name.startswith("viewsphere")))
+sys.exit(status)
+"""
+
+
+@pytest.mark.parametrize("file", ["test_smallness.py", "planning/test_models.py", "zoo/test_boat.py", "geometry/test_box.py"])
+def test_what_tests_load_is_what_they_reach(chosen, file):
+    run = subprocess.run([sys.executable, "-c", LOADED, f"tests/{file}"], cwd=ROOT, capture_output=True, text=True)
+    assert run.returncode == 0, run.stdout
+    loaded = set(run.stdout.splitlines()[-1].split()[1:])
+    modules, tests = chosen.Modules(), chosen.Tests()
+    used = set().union(*(modules.used_by(tests.texts[node]) for node in tests.reached(f"tests/{file}")))
+    reached = chosen.closure(used, lambda module: modules.needs[module])
+    packages = {module.rsplit(".", depth)[0] for module in reached for depth in range(1, 1 + module.count("."))}
+    assert len(loaded) > 20
+    assert loaded & modules.all <= reached | packages  # a package's own file is changed for all that is in it
+
+
 @pytest.mark.parametrize(
     "changed",
     ["pyproject.toml", ".ci/run", "scripts/test", "tests/conftest.py", "tests/zoo/conftest.py", "tests/small.py",
