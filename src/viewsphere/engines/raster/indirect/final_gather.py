@@ -13,8 +13,8 @@ from viewsphere.engines.raster.indirect.emissive_triangles import Lanterns
 from viewsphere.engines.raster.indirect.kernels_probes import SKY, send_around
 from viewsphere.engines.raster.indirect.patch_rays import PatchRays
 from viewsphere.engines.raster.indirect.radiosity_patches import Patches, Rays
+from viewsphere.engines.raster.lightmaps import kernels_lightmap as kernels
 from viewsphere.engines.raster.lightmaps.lightmaps import Charts, charts_of
-from viewsphere.engines.raster.lightmaps.lightmaps import kernels_lightmap as kernels
 from viewsphere.engines.raster.lightmaps.vertex_light import NEAR, Facets, Sites, numbered, openness, vertex_light_of
 from viewsphere.engines.raster.records import NO_LIGHTMAP, Float32, Int32, Lightmap
 from viewsphere.engines.raster.reflections.tracing import Tree, cast

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster.indirect.directions import domes
-from viewsphere.engines.raster.lightmaps.lightmaps import kernels_lightmap as kernels
+from viewsphere.engines.raster.lightmaps import kernels_lightmap as kernels
 from viewsphere.engines.raster.records import Float32, Int32
 
 Float = NDArray[np.float64]

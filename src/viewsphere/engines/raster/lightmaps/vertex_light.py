@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from viewsphere.engines.raster.indirect.directions import domes
 from viewsphere.engines.raster.indirect.patch_rays import axes_along
+from viewsphere.engines.raster.lightmaps import kernels_sites as kernels
 from viewsphere.engines.raster.lightmaps.kernels_lightmap import ALONG, COLUMNS, WEIGHT, count_in
 from viewsphere.engines.raster.lightmaps.kernels_vertex_light import FACET, NONE
-from viewsphere.engines.raster.lightmaps.lightmaps import kernels_sites as kernels
 from viewsphere.engines.raster.records import Float32, Int32
 from viewsphere.engines.raster.reflections.tracing import Tree, cast
 
