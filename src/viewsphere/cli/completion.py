@@ -32,14 +32,14 @@ def formats(incomplete: str) -> list[str]:
 
 
 def drawings() -> list[str]:
-    """What `preview` draws; the labels' files have to be imported to know."""
+    """Labels that `preview` draws; listing them imports the labels' files."""
     from viewsphere.labels import drawings as known
 
     return [drawing.name for drawing in known()]
 
 
 def starts() -> list[str]:
-    """What `viewsphere new` can start."""
+    """Kinds of recipes that `viewsphere new` writes."""
     return list(kinds())
 
 

@@ -11,7 +11,7 @@ from viewsphere.cli.terminal import complain
 from viewsphere.errors import UserError
 
 UsageError = cast("type[Exception]", typer.BadParameter.__base__)
-"""What typer raises for arguments that it cannot use; it exports this class by no name that all its versions have."""
+"""Typer's error for unusable arguments; no name exports it in all versions."""
 
 
 def explain(error: Any) -> None:

@@ -1,4 +1,4 @@
-"""What a camera looks at, how the names of its poses are cut, how it shakes: what kinds of viewpoints have in common."""
+"""The fields that all kinds of viewpoints share: target, bins of pose names, shake."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ DistanceAround = Annotated[
     Annotated[FillBetween, Tag("fill")] | Annotated[Positive, Field(le=FARTHEST), Tag("metres")],
     Discriminator(_form_of_distance),
 ]
-"""What a distance of a grid, of random viewpoints, and of viewpoints around one may be: metres, or a share to be filled."""
+"""Types of the distance of a grid, of random and of normal viewpoints: metres, or a share of the picture."""
 
 
 def _divides_turn(value: float) -> float:
@@ -110,7 +110,7 @@ Bins = Annotated[
 
 
 class Shake(Frozen):
-    """How much a camera is shaken by the hand that holds it: smooth noise about and along each of its axes."""
+    """The shake of a hand-held camera: smooth noise about and along each of its axes."""
 
     degrees: Annotated[Number, Field(ge=0, le=90)] = Field(
         default=0.0, description="largest rotation about each of its axes, degrees"
@@ -125,7 +125,7 @@ SHAKE = "under time: a hand that is not still: degrees and mm at most, nothing f
 
 
 class Aimed(Frozen):
-    """What all kinds of viewpoints have that may stand still."""
+    """Base of the kinds of viewpoints that can stand still."""
 
     target: Annotated[
         Annotated[Literal["center", "follow"], Tag("text")] | Annotated[Point, Tag("list")], Discriminator(shape_of)

@@ -16,7 +16,7 @@ VALUE = "*"
 
 
 class LabelRule(Frozen):
-    """Which objects of the file are labelled, and as what. With what is parented to it, an object is one object."""
+    """A rule that labels objects of the file. An object includes its children."""
 
     name: Pattern | None = Field(default=None, description="pattern of objects' names, such as Car*")
     collection: Pattern | None = Field(default=None, description="or of the collections that objects are in")

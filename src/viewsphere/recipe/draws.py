@@ -102,7 +102,7 @@ class Distribution(Brief):
 
     @property
     def kind(self) -> str:
-        """Which of the four kinds this distribution is."""
+        """The kind of this distribution, one of four."""
         return next(name for name in KINDS if getattr(self, name) is not None)
 
     def draw(self, rng_of: RngOf, path: Steps) -> Any:
@@ -231,12 +231,12 @@ class _Reader(NamedTuple):
 
 
 def _means_choice(value: Mapping[Any, Any]) -> bool:
-    """Whether a mapping is a choice of entries, perhaps with a misspelt `choice`, rather than an entry."""
+    """True if a mapping is a choice of entries, perhaps with a misspelt `choice`, rather than an entry."""
     return "choice" in value or any(nearest(key, ("choice",)) for key in value)
 
 
 def _ordered(low: Any, high: Any) -> bool:
-    """Whether no component of `low` is above that of `high`; components that are distributions do not count."""
+    """True if no component of `low` is above that of `high`; components that are distributions do not count."""
     if isinstance(low, tuple) and isinstance(high, tuple):
         return all(_ordered(a, b) for a, b in zip(cast(tuple[Any, ...], low), cast(tuple[Any, ...], high), strict=False))
     return not isinstance(low, (int, float)) or not isinstance(high, (int, float)) or low <= high
@@ -347,7 +347,7 @@ def drawn(value: T, rng_of: RngOf, path: Steps = ()) -> T:
 
 
 def is_random(value: object) -> bool:
-    """Whether there is a distribution in a value."""
+    """True if a value contains a distribution."""
     if isinstance(value, tuple):
         return any(map(is_random, cast(tuple[Any, ...], value)))
     return isinstance(value, Distribution) or (isinstance(value, Frozen) and any(is_random(part) for _, part in value))

@@ -26,7 +26,7 @@ Names = Collection[str]
 
 
 class Entry(Frozen):
-    """What a recipe says of a part of the scene."""
+    """Base of a recipe's entries for parts of the scene."""
 
     part: ClassVar[type[Frozen]]
 
@@ -72,7 +72,7 @@ def words_of(part: type[Frozen], name: str) -> list[str]:
 
 
 def is_drawn_color(value: Any) -> bool:
-    """Whether a value is a colour with distributions: one over whole colours, or a list with one for a component."""
+    """True if a value is a colour with distributions: one over whole colours, or a list with one for a component."""
     if isinstance(value, Mapping):
         return not value.keys().isdisjoint(KINDS)
     parts = cast(tuple[Any, ...], value) if isinstance(value, (list, tuple)) else ()
@@ -151,6 +151,6 @@ def _field(field: FieldInfo, optional: bool) -> Any:
 
 
 def _has(kind: Any, *marks: str) -> bool:
-    """Whether a type, or a type within it, has one of the marks."""
+    """True if a type, or a type within it, has one of the marks."""
     args = get_args(kind)
     return any(mark in args for mark in marks) or any(_has(arg, *marks) for arg in args)

@@ -20,7 +20,7 @@ from viewsphere.urls import RemotePath, download, files_below, located
 
 PREFIX = "fetching-"
 PLAN = "store/plan.json"
-"""What every data set has."""
+"""A file that every data set has."""
 
 
 def fetched(path: str | os.PathLike[str]) -> Path:

@@ -1,4 +1,4 @@
-"""How the light of a recipe's scene becomes a picture: background, smoother, view, effects; and the camera's jitter."""
+"""The entries that turn light into a picture: background, smoother, view, effects; and the camera's jitter."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Entry = TypeVar("Entry", bound=Frozen)
 
 
 class PerFrame(Frozen):
-    """What may be drawn anew for every frame at no cost."""
+    """Base of the entries that can be drawn for every frame at no cost."""
 
     draw: Draw = Field(
         default="per_frame",
@@ -38,7 +38,7 @@ def once_a_sequence(entry: Entry) -> Entry:
 
 
 class BackgroundEntry(entry_of(Background, optional=("color", "image"), fixed=("transparent",)), PerFrame):
-    """What is seen where nothing else is; the sky when nothing is given."""
+    """The background behind everything; the sky by default."""
 
     images: Picture | None = Field(default=None, description="folder of images to draw from")
     environment: bool = Field(
@@ -61,7 +61,7 @@ class BackgroundEntry(entry_of(Background, optional=("color", "image"), fixed=("
 
     @property
     def is_sky(self) -> bool:
-        """Whether the sky is the background."""
+        """True if the sky is the background."""
         return not any(getattr(self, name) for name in SOURCES if name != "environment")
 
 
@@ -83,7 +83,7 @@ BackgroundField = Annotated[
 
 
 class SmootherEntry(entry_of(Smoother), PerFrame):
-    """What is done to the border between the targets and their background."""
+    """Softening of the border between the targets and their background."""
 
 
 Stops = Annotated[
@@ -102,16 +102,16 @@ class ViewEntry(entry_of(ViewTransform), PerFrame):
 
 
 class EffectsEntry(entry_of(Effects, without=("seed",)), PerFrame):
-    """What a camera does to its picture; strengths are 0 (nothing) to 1 (as much as ever makes sense)."""
+    """Camera effects; strengths are 0 (none) to 1 (the strongest useful effect)."""
 
     @property
     def is_noisy(self) -> bool:
-        """Whether the effects may include noise, which differs in every frame."""
+        """True if the effects can include noise, which differs in every frame."""
         return any(isinstance(value, Distribution) or value > 0 for value in (self.shot_noise, self.read_noise))
 
 
 class JitterEntry(PerFrame):
-    """What is added to the numbers of every viewpoint."""
+    """Random offsets added to every viewpoint."""
 
     azimuth_deg: Coordinate = Field(default=0.0, description="degrees")
     elevation_deg: Coordinate = Field(default=0.0, description="degrees, not beyond the poles")

@@ -1,4 +1,4 @@
-"""How a recipe, a call or a command line names formats, and the options that each is written with."""
+"""Names and options of formats, from a recipe, a call or a command line."""
 
 from __future__ import annotations
 

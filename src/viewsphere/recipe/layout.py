@@ -93,10 +93,10 @@ def placer_of(layout: Layout) -> str:
 
 
 def options_of(layout: Layout) -> dict[str, JsonValue]:
-    """What the recipe says to the placer."""
+    """The placer's options from the recipe."""
     return layout.options if isinstance(layout, LayoutEntry) else {}
 
 
 def spots_of(layout: Layout) -> tuple[Spot, ...]:
-    """Where each stands, as far as the recipe says."""
+    """The places that the recipe lists."""
     return layout if isinstance(layout, tuple) else ()

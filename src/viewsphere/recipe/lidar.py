@@ -130,7 +130,7 @@ class LidarEntry(Frozen):
         return tuple(high + (low - high) * i / (self.rings - 1) for i in range(self.rings))
 
     def measuring(self, seed: int) -> Lidar:
-        """How it measures, with draws that follow from a seed."""
+        """The measuring device, with draws that follow from a seed."""
         return Lidar(
             range=self.range,
             reference_range=self.reference_range,

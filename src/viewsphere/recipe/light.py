@@ -187,7 +187,7 @@ class At(Frozen):
 
 
 class _Lamp(entry_of(Light)):
-    """What all lamps have."""
+    """Base of all lamps."""
 
     count: Drawn[Annotated[Natural, Field(le=64)]] = Field(default=1, description="number of such lamps, each drawn separately")
 

@@ -182,12 +182,12 @@ class ModelEntry(Brief):
 
     @property
     def is_labelled(self) -> bool:
-        """Whether its models are objects of the data set, no distractors."""
+        """True if its models are labelled objects, not distractors."""
         return self.labels != "background"
 
     @property
     def credit(self) -> Credit | None:
-        """What the entry says of whose its models are; None if nothing."""
+        """The entry's credit for its models, or None."""
         credit = Credit(licence=self.licence, attribution=self.attribution, source_url=self.source_url)
         return None if credit == Credit() else credit
 

@@ -72,5 +72,5 @@ def listed(motions: Motions | None, field: str) -> Iterator[tuple[str, MotionEnt
 
 
 def has_clip(motions: Motions | None) -> bool:
-    """Whether the animation of a model's file is among the motions."""
+    """True if the animation of a model's file is among the motions."""
     return any(entry.kind == "clip" for _, entry in listed(motions, ""))

@@ -63,7 +63,7 @@ Share = Annotated[
 
 
 class Splits(Frozen):
-    """How the frames are divided: `by`, and every split's share, or the keys of its models."""
+    """The splits of the frames: `by`, and every split's share or the keys of its models."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Share] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -330,12 +330,12 @@ class Recipe(Shown, Frozen):
 
     @property
     def is_new_each_frame(self) -> bool:
-        """Whether anything that frames of one shot must share is drawn anew for every frame."""
+        """True if data shared by all frames of one shot is drawn for every frame."""
         return any(one.scene.is_new_each_frame for one in self.conditions.values())
 
     @property
     def lasting_seed(self) -> int:
-        """What models and splits follow from: the seed as it was written."""
+        """The seed of models and splits, as written in the recipe."""
         return self.seed if self._lasting_seed is None else self._lasting_seed
 
     @property

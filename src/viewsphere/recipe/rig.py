@@ -35,7 +35,7 @@ def _is_of_lists(value: object) -> bool:
 
 
 class SensorEntry(Frozen):
-    """Where a sensor is mounted, and what of its lens and channels is not the recipe's."""
+    """A sensor's mounting, and its own lens and channels."""
 
     position: Place = Field(default=(0.0, 0.0, 0.0), description=f"[x, y, z] in metres; {AXES}")
     rotation: Rotation | None = Field(
@@ -81,7 +81,7 @@ class SensorEntry(Frozen):
 
     @property
     def has_lens(self) -> bool:
-        """Whether it says anything of its lens or its size."""
+        """True if it sets its lens or its size."""
         return any(getattr(self, name, None) is not None for name in LENS_FIELDS)
 
     def lens(self, camera: CameraEntry) -> CameraEntry:
@@ -127,7 +127,7 @@ class SensorList(Frozen):
 
     @property
     def has_lidar(self) -> bool:
-        """Whether one of them is a LiDAR."""
+        """True if one of them is a LiDAR."""
         return any(entry.lidar is not None for entry in self.sensors.values())
 
 

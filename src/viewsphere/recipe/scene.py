@@ -149,7 +149,7 @@ class CameraEntry(Frozen):
 
     @property
     def is_random(self) -> bool:
-        """Whether anything of the lens is drawn."""
+        """True if any part of the lens is drawn."""
         return is_random(self)
 
     @property
@@ -287,12 +287,12 @@ class SceneEntry(Frozen):
 
     @property
     def has_ground(self) -> bool:
-        """Whether there may be a ground that hides what is behind it."""
+        """True if there can be an opaque ground."""
         return any(map(self._hides, alternatives(self.ground)))
 
     @property
     def always_has_ground(self) -> bool:
-        """Whether there is a ground that hides what is behind it, whatever is drawn."""
+        """True if every draw has an opaque ground."""
         return all(map(self._hides, alternatives(self.ground)))
 
     def _hides(self, ground: GroundEntry | Literal["auto", "on", "off"]) -> bool:
@@ -302,17 +302,17 @@ class SceneEntry(Frozen):
 
     @property
     def is_composed(self) -> bool:
-        """Whether the scene holds more than a model and the ground: then everything stands on world z = 0."""
+        """True if the scene holds more than a model and the ground: then everything stands on world z = 0."""
         return bool(self.place or self.blend or self.company or self.planes)
 
     @property
     def is_moved_each_frame(self) -> bool:
-        """Whether the surroundings (place, distractors, billboards, variants) are drawn anew for every frame, or sequence."""
+        """True if the surroundings (place, distractors, billboards, variants) are drawn for every frame or sequence."""
         return any(entry.draw in ("per_frame", "per_sequence") for _, entry in self._around)
 
     @property
     def _around(self) -> Iterator[tuple[str, PlaceEntry | CompanyEntry | PlaneEntry | VariantEntry]]:
-        """What stands around the targets and is drawn, each with its field."""
+        """The drawn surroundings of the targets, each with its field."""
         if self.place is not None:
             yield "place", self.place
         if self.company is not None:
@@ -353,20 +353,20 @@ class SceneEntry(Frozen):
 
     @property
     def is_new_each_frame(self) -> bool:
-        """Whether anything that frames of one shot must share is drawn anew for every frame."""
+        """True if data shared by all frames of one shot is drawn for every frame."""
         lit = (self.sun, self.sky, self.lights, self.ground, self.materials, *(getattr(self, name) for name in WEATHER))
         drawn = is_random(lit) or self._has_folder or self._has_grain
         return self.is_moved_each_frame or (self.draw == "per_frame" and drawn)
 
     @property
     def _has_grain(self) -> bool:
-        """Whether the ground or a model is made of a material whose grain is drawn."""
+        """True if the ground or a model has a material with random grain."""
         grounds = [ground for ground in alternatives(self.ground) if isinstance(ground, GroundEntry)]
         return any(ground.material is not None for ground in grounds) or any(m.texture is not None for m in self.materials)
 
     @property
     def _has_folder(self) -> bool:
-        """Whether a sky or a material takes its picture from a folder."""
+        """True if a sky or a material draws its picture from a folder."""
         if any(material.images is not None for material in self.materials):
             return True
         skies = [sky for sky in alternatives(self.sky) if isinstance(sky, HdriSky)]
@@ -374,14 +374,14 @@ class SceneEntry(Frozen):
 
     @property
     def has_fixed_scenery(self) -> bool:
-        """Whether the scene has scenery (a place, billboards, a .blend file) that is the same for all models."""
+        """True if the scene has scenery (a place, billboards, a .blend file) that is the same for all models."""
         variants = () if self.blend is None else self.blend.variants.values()
         drawn = [entry for entry in (self.place, *self.planes, *variants) if entry is not None]
         return bool(drawn or self.blend) and all(entry.draw == "fixed" for entry in drawn)
 
 
 class EngineEntry(Frozen):
-    """What paints the pictures: a name, and options that the engine itself checks."""
+    """The renderer: a name, and options that the engine itself checks."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, JsonValue] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]

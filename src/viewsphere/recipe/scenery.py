@@ -28,7 +28,7 @@ OF_FILES = ("origin", "up", "forward", "unit", "category")
 
 
 class PlaceEntry(Brief):
-    """Where the targets stand."""
+    """The place in which the targets stand."""
 
     UNSAID = ("parked", "walkers", "motion")
 
@@ -63,7 +63,7 @@ class PlaceEntry(Brief):
 
     @property
     def is_room(self) -> bool:
-        """Whether it is a place of the zoo whose module says INDOORS."""
+        """True if it is an indoor place of the zoo."""
         return self.name in plugins.places() and getattr(plugins.place(self.name), "INDOORS", False)
 
     @property
@@ -141,7 +141,7 @@ class CompanyEntry(Brief):
 
 
 class Around(Frozen):
-    """Where a plane may stand: at random around the origin, its picture turned to it."""
+    """A random position of a plane around the origin, facing it."""
 
     distance: Interval = Field(description="metres from the origin")
     azimuth: Interval = Field(

@@ -1,4 +1,4 @@
-"""How the models of a recipe become scenes, where that is not each model alone."""
+"""The entry that makes scenes of several models."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ScenesEntry(Frozen):
 
     @property
     def spots(self) -> tuple[Spot, ...]:
-        """Where each stands, as far as the recipe says."""
+        """The places that the recipe lists."""
         return spots_of(self.layout)
 
     @property

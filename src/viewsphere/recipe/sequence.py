@@ -13,7 +13,7 @@ MOST_INSTANTS = 1_000_000
 
 
 class TimeEntry(Frozen):
-    """How many pictures a sequence has, and how fast they follow one another."""
+    """The number of pictures in a sequence, and their rate."""
 
     frames: Annotated[Count, Field(le=MOST_INSTANTS)] | None = Field(
         default=None, description="number of instants in each sequence; or set seconds"

@@ -1,4 +1,4 @@
-"""What a user says of one model in a file beside it: `mug.glb.viewsphere.yaml` of `mug.glb`."""
+"""A user's facts about one model in a file beside it: `mug.glb.viewsphere.yaml` for `mug.glb`."""
 
 from __future__ import annotations
 

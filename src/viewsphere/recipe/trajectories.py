@@ -50,10 +50,10 @@ def ends(drift: float | tuple[float, float]) -> tuple[float, float]:
 
 
 class Moving(Frozen):
-    """What all motions of the camera have."""
+    """Base of all motions of the camera."""
 
     target: ClassVar[Literal["center"]] = "center"
-    """What still kinds of viewpoints look at; `look` stands in its place here."""
+    """The target of static viewpoints; trajectories use `look` instead."""
 
     bins: Bins = 45.0
     shake: Shake | None = Field(default=None, description=SHAKE)

@@ -44,7 +44,7 @@ AxisValues = float | tuple[float, ...] | Range
 
 
 def axis_count(values: AxisValues, *, turn: bool = False) -> int:
-    """How many values an axis has; with `turn`, a range's last value is dropped if it is the first after 360 degrees."""
+    """The number of values on an axis; with `turn`, a range's last value is dropped if it is the first after 360 degrees."""
     if isinstance(values, Range):
         repeats = turn and values.count > 1 and abs(values.value(values.count - 1) - values.start - 360) < 1e-6
         return values.count - repeats

@@ -1,4 +1,4 @@
-"""What frames shall show of their models."""
+"""The wanted visibility and truncation of a frame's models."""
 
 from __future__ import annotations
 
@@ -35,6 +35,6 @@ class WantedEntry(Frozen):
         return self
 
     def miss(self, visibility: float, truncation: float) -> float:
-        """How far a frame is from what is wanted, the sum of both shares' distances; 0 where it is as wanted."""
+        """The sum of a frame's distances from both wanted ranges; 0 within them."""
         pairs = ((self.visibility, visibility), (self.truncation, truncation))
         return sum(max(ends[0] - value, value - ends[1], 0.0) for ends, value in pairs if ends is not None)

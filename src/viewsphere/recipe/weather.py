@@ -27,7 +27,7 @@ class FogEntry(entry_of(Fog)):
 
 
 class _FallingEntry(Frozen):
-    """What rain and snow have in common besides."""
+    """The further fields that rain and snow share."""
 
     color: Drawn[Light] | None = Field(
         default=None, description="radiance of drops or flakes: linear [r, g, b]; by default the sky's"
