@@ -429,5 +429,7 @@ TYPO = EXAMPLES["One row an object"]
 def test_a_misspelt_format_is_refused_before_anything_is_rendered(install, code, message, tmp_path):
     file = install("formats", "csv_boxes", code)
     with pytest.raises(PluginError, match=f"^{re.escape(str(file))}: {message}"):
+        plan(small_recipe(formats=["csv_boxes"]))
+    with pytest.raises(PluginError, match=message):
         generate(small_recipe(formats=["csv_boxes"]), tmp_path / "out")
     assert not list((tmp_path / "out").rglob("*.png"))

@@ -20,6 +20,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.suggestions import suggestion
 from viewsphere.planning.models import count_models
 from viewsphere.plugins.engine import EngineSpec
+from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.light import NightSky
@@ -68,6 +69,8 @@ def check_names(recipe: Recipe) -> None:
     _check_plugin("engine", "engines", recipe.engine.name)
     for i, entry in enumerate(recipe.formats):
         _check_plugin(f"formats[{i}]", "formats", entry.name)
+        if plugins.is_third_party("formats", entry.name):
+            plugins.load(FormatSpec, entry.name)  # raises for a faulty one; our own are loaded when they are written
         if entry.options:
             entry.arguments(f"formats[{i}].{entry.name}")
     company = recipe.scene.company
