@@ -42,7 +42,7 @@ settings.load_profile("repeatable")
 
 
 WEIGHT = {"slow": 10, "shipped": 30}
-"""Of a test with this mark, beside one without: shares of the CPU seconds of all tests, measured on two cores."""
+"""Of a test with this mark, beside one without: rough shares of CPU seconds, estimated."""
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -11,10 +11,8 @@ from built_once import built_once
 from command_line import viewsphere
 from small import ROOT
 
-MOST_PIXELS = 4e6
-"""Of a recipe that is rendered whole. A larger one takes from 20 seconds to minutes, and its frames differ little; that it is
-written in its formats and passes is tested with smaller pictures (`test_like`, `test_scene_recipes`).
-"""
+MOST_PIXELS = 13e6
+"""Of a recipe that is rendered whole; a larger one takes minutes, and its frames differ little."""
 
 FIRST = 2
 """Frames of a large recipe: the first shows that it renders, the second that time or the camera goes on."""

@@ -18,7 +18,7 @@ from viewsphere.engines.raster.indirect import bounces as baking
 from viewsphere.engines.raster.indirect import final_gather as gathering
 from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
 from viewsphere.engines.raster.indirect.kernels_probes import look_up
-from viewsphere.engines.raster.lightmaps.lightmaps import lightmaps
+from viewsphere.engines.raster.lightmaps import lightmaps
 from viewsphere.engines.raster.options import parse_options
 from viewsphere.engines.raster.records import Bounces
 from viewsphere.engines.raster.shading.painting import paint

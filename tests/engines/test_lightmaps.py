@@ -13,7 +13,8 @@ from viewsphere.engines.raster.indirect import final_gather as gathering
 from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
 from viewsphere.engines.raster.indirect.kernels_probes import look_up
 from viewsphere.engines.raster.lightmaps import kernels_lightmap as kernels
-from viewsphere.engines.raster.lightmaps.lightmaps import CELL, MOST, TURNS, charts_of, lightmaps
+from viewsphere.engines.raster.lightmaps import lightmaps
+from viewsphere.engines.raster.lightmaps.lightmaps import CELL, MOST, TURNS, charts_of
 from viewsphere.engines.raster.reflections.tracing import cast, tree_of
 from viewsphere.model.scene import Scene, Sun
 

@@ -13,9 +13,10 @@ from test_raster import DARK, box, camera, mesh_of, rectangle
 from shots import painted
 from viewsphere.engines.raster.indirect import bounces as baking
 from viewsphere.engines.raster.indirect.kernels_probes import look_up
+from viewsphere.engines.raster.lightmaps import vertex_light
 from viewsphere.engines.raster.lightmaps.kernels_lightmap import WEIGHT
 from viewsphere.engines.raster.lightmaps.kernels_vertex_light import NONE, read_vertices
-from viewsphere.engines.raster.lightmaps.lightmaps import charts_of, vertex_light
+from viewsphere.engines.raster.lightmaps.lightmaps import charts_of
 from viewsphere.engines.raster.lightmaps.vertex_light import vertex_light_of
 from viewsphere.engines.raster.records import NO_LIGHTMAP
 from viewsphere.engines.raster.reflections.tracing import tree_of

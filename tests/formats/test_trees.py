@@ -13,9 +13,10 @@ from viewsphere import Dataset, plugins
 from viewsphere.errors import UserError
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import export, writable_formats
+from viewsphere.run.exporting import export
 from viewsphere.run.preparing import Views
 from viewsphere.run.scope import refusals, scope_of
+from viewsphere.run.writable import writable_formats
 from viewsphere.store import Choice
 from viewsphere.store.shots.checksums import CHECKSUMS
 from worlds import WORLDS
