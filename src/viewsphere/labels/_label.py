@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from viewsphere.labels._sight import Sight
 else:
-    Sight = Any  # which loads the rasterizer; the fields' types are evaluated when the classes are made
+    ImageDraw = Sight = Any  # these load Pillow and the rasterizer; the fields' types are evaluated when the classes are made
 
 Array = NDArray[Any]
 Picture = NDArray[np.uint8]
