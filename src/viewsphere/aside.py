@@ -164,7 +164,9 @@ def left_by_dead(place: Path, prefix: str = "") -> Iterator[Path]:
 
 
 def lives(folder: Path) -> bool | None:
-    """Whether the maker of a folder that lies where it made it, without a prefix, is at work; None where that is not known."""
+    """Return whether the maker of a folder that lies where it made it, without a prefix, is at work; None where that is not
+    known.
+    """
     is_own = folder.name.startswith(f"{socket.gethostname()}~")
     try:
         with _locked(folder / LOCK, OPEN) as taken:
@@ -196,8 +198,8 @@ def _lock_of(folder: Path, is_sure: bool) -> int:
 
 @contextmanager
 def _locked(file: Path, flags: int) -> Generator[bool]:
-    """Whether a lock is this process's while the block lasts, False where that cannot be known; raises BlockingIOError where
-    it is another's.
+    """Return whether a lock is this process's while the block lasts, False where that cannot be known; raises BlockingIOError
+    where it is another's.
     """
     try:
         lock = os.open(file, flags)
@@ -233,7 +235,7 @@ def _take(lock: int) -> bool:
 
 
 def _is_stale(folder: Path) -> bool:
-    """Whether nothing in a folder that has a lock has changed for `STALE_S`."""
+    """Return whether nothing in a folder that has a lock has changed for `STALE_S`."""
     try:
         last = max(path.lstat().st_mtime for path in (folder, folder / LOCK, *folder.rglob("*")))
     except OSError:  # it has none, or is being changed

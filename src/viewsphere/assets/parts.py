@@ -54,7 +54,7 @@ def taken(mesh: Mesh, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
 
 
 def is_taken(names: Sequence[str], parts: Parts) -> NDArray[np.bool_]:
-    """Whether each part (N,) is one of those."""
+    """Return whether each part (N,) is one of those."""
     only = None if parts.only is None else frozenset(map(own_part, parts.only))
     without = frozenset(map(own_part, parts.without))
     return np.array([(only is None or _is_of(name, only)) and not _is_of(name, without) for name in names], np.bool_)
@@ -66,7 +66,7 @@ def own_part(name: str) -> str:
 
 
 def _is_of(part: str, objects: frozenset[str]) -> bool:
-    """Whether a part belongs to one of the objects: it is the object, or one that it instances."""
+    """Return whether a part belongs to one of the objects: it is the object, or one that it instances."""
     pieces = part.split("/")
     return any("/".join(pieces[: i + 1]) in objects for i in range(len(pieces)))
 

@@ -110,7 +110,7 @@ def animation_of(path: Path, confined: bool) -> Timeline | None:
 
 
 def _may_move(folder: ModelFolder) -> bool:
-    """Whether the format has animations and, of glTF, whose JSON is read here, the file has."""
+    """Return whether the format has animations and, of glTF, whose JSON is read here, the file has."""
     kind = folder.model.suffix[1:].lower()
     if kind not in GLTF:
         return kind in ANIMATED_SUFFIXES

@@ -130,7 +130,7 @@ def probe(python: Path) -> Blender:
 
 
 def _graphics(process: BlenderProcess) -> Graphics:
-    """Whether OpenGL drawing works, tried with Workbench: EEVEE draws the same way, but compiles its shaders first."""
+    """Return whether OpenGL drawing works, tried with Workbench: EEVEE draws the same way, but compiles its shaders first."""
     try:
         return Graphics(process.ask("draw", DRAW_S, renderer="workbench")["driver"])
     except (BlenderError, BlenderDied) as error:

@@ -107,7 +107,7 @@ def kept_map(sample: Sample) -> NDArray[np.int32]:
 
 
 def near(kept: NDArray[np.int32], seen: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Whether a pixel of `kept` (H, W), or one of the eight around it, is what is seen there (H, W)."""
+    """Return whether a pixel of `kept` (H, W), or one of the eight around it, is what is seen there (H, W)."""
     padded = np.pad(kept, 1, mode="edge")
     height, width = kept.shape
     found = np.zeros(kept.shape, np.bool_)

@@ -131,7 +131,7 @@ def _lines(wanted: Path, found: Path) -> Iterator[str]:
 
 
 def _is_same_line(one: str, other: str) -> bool:
-    """Whether two lines hold the same words, and numbers that are the same but for rounding."""
+    """Return whether two lines hold the same words, and numbers that are the same but for rounding."""
     words = one.split(), other.split()
     return len(words[0]) == len(words[1]) and all(a == b or _is_same_number(a, b) for a, b in zip(*words, strict=True))
 

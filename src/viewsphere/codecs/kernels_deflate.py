@@ -101,7 +101,7 @@ def _next_run(words, step, i):
 
 @inner
 def _is_like(words, step, i):
-    """Whether pixel i equals the next one."""
+    """Return whether pixel i equals the next one."""
     second, third = step // 3, 2 * (step // 3)
     a, b, c = U(i), U(i + second), U(i + third)
     s = U(step)
@@ -110,7 +110,7 @@ def _is_like(words, step, i):
 
 @inner
 def _repeats(words, step, j):
-    """Whether each of AHEAD words from j on equals the same word of the pixel before."""
+    """Return whether each of AHEAD words from j on equals the same word of the pixel before."""
     different = np.uint32(0)
     before, own = U(j - step), U(j)
     for k in range(U(AHEAD)):

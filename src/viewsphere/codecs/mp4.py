@@ -144,7 +144,7 @@ def _started(command: list[str], said: IO[bytes]) -> Generator[tuple[subprocess.
 
 
 def _fed(pipe: IO[bytes], parts: Iterator[bytes]) -> bool:
-    """Whether a program took all parts; errors of who makes the parts are raised."""
+    """Return whether a program took all parts; errors of who makes the parts are raised."""
     for part in parts:
         try:
             pipe.write(part)

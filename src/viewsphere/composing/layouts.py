@@ -150,12 +150,12 @@ def check_orientation(orientation: str, field: str) -> None:
 
 
 def has_ways(layout: Layout) -> bool:
-    """Whether the placer knows how things came to where they stand."""
+    """Return whether the placer knows how things came to where they stand."""
     return plugins.load(PlacerSpec, placer_of(layout)).ways is not None
 
 
 def is_slow(layout: Layout) -> bool:
-    """Whether where things stand is not asked before frames are rendered."""
+    """Return whether where things stand is not asked before frames are rendered."""
     return plugins.load(PlacerSpec, placer_of(layout)).is_slow
 
 

@@ -94,7 +94,7 @@ class TimedPoses(RepeatedPoses):
 
 
 def is_animated(recipe: Recipe) -> bool:
-    """Whether the recipe asks for frames of anything."""
+    """Return whether the recipe asks for frames of anything."""
     return _scene_frames(recipe) is not None or any(entry.frames is not None for entry in recipe.models)
 
 

@@ -53,7 +53,7 @@ class Arranged:
 
     @property
     def has_scenery(self) -> bool:
-        """Whether there is any."""
+        """Return whether there is any."""
         return self.targets < len(self.things)
 
     def changed_since(self, before: Arranged) -> list[int]:

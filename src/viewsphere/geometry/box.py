@@ -77,12 +77,14 @@ def clip_to_image(bounds: Bounds, width: int, height: int) -> Bounds | None:
 
 
 def overlap(a: Bounds, b: Bounds) -> bool:
-    """Whether two 2D boxes share more than an edge."""
+    """Return whether two 2D boxes share more than an edge."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def is_behind(camera: Camera, bounds: Float) -> bool:
-    """Whether nothing in a box in the world, its lowest and its highest corner (2, 3), is in front of a pinhole's z = NEAR."""
+    """Return whether nothing in a box in the world, its lowest and its highest corner (2, 3), is in front of a pinhole's z =
+    NEAR.
+    """
     terms = camera.R[2] * bounds
     farthest = float(terms.max(axis=0).sum() + camera.t[2])
     return farthest + ROUNDING * (1 + float(np.abs(terms).max())) < NEAR

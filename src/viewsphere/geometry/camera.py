@@ -136,7 +136,7 @@ def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[n
 
 
 def has_unit_rays(lens: Distortion | None) -> bool:
-    """Whether a lens' rays are unit vectors, which may look anywhere, instead of vectors of z = 1."""
+    """Return whether a lens' rays are unit vectors, which may look anywhere, instead of vectors of z = 1."""
     return lens is not None and lens.model != "brown_conrady"
 
 

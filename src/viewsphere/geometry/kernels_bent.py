@@ -127,7 +127,7 @@ def _farthest(lens, a, b, square):
 
 @inner
 def _may_leave(lens, box, a, b, bend, square):
-    """Whether the picture between two directions may leave the box, if it bends at most by `bend`."""
+    """Return whether the picture between two directions may leave the box, if it bends at most by `bend`."""
     m, out = lens[3], 0.125 * square * bend
     along_u = out * math.sqrt(m[0, 0] * m[0, 0] + m[0, 1] * m[0, 1]) - TOLERANCE
     along_v = out * m[1, 1] - TOLERANCE
@@ -206,7 +206,7 @@ def _volume(a, b, c):
 
 @inner
 def _holds(a, b, c, d):
-    """Whether the ray in direction d meets the triangle a, b, c."""
+    """Return whether the ray in direction d meets the triangle a, b, c."""
     whole, x, y, z = _volume(a, b, c), _volume(d, b, c), _volume(a, d, c), _volume(a, b, d)
     return (whole > 0.0 and x >= 0.0 and y >= 0.0 and z >= 0.0) or (whole < 0.0 and x <= 0.0 and y <= 0.0 and z <= 0.0)
 

@@ -33,7 +33,7 @@ def _steepest(a, b, lowest, highest):
 
 @inner
 def _is_above(a, b, c):
-    """Whether the plane of a triangle passes above the centre, not below."""
+    """Return whether the plane of a triangle passes above the centre, not below."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx

@@ -12,19 +12,19 @@ SLACK = 1e-9
 
 @inner
 def separated(p, q, r, reach):
-    """Whether an interval around 0 ends before three values begin."""
+    """Return whether an interval around 0 ends before three values begin."""
     return min(p, q, r) > reach or max(p, q, r) < -reach
 
 
 @inner
 def edge_apart(s, t, au, av, bu, bv, cu, cv):
-    """Whether an edge (s, t) tells a triangle apart from the square around 0, as seen along an axis."""
+    """Return whether an edge (s, t) tells a triangle apart from the square around 0, as seen along an axis."""
     return separated(s * av - t * au, s * bv - t * bu, s * cv - t * cu, 0.5 * (abs(s) + abs(t)))
 
 
 @inner
 def edges_apart(au, av, bu, bv, cu, cv):
-    """Whether any edge of a triangle tells it apart from the square around 0, as seen along an axis."""
+    """Return whether any edge of a triangle tells it apart from the square around 0, as seen along an axis."""
     return (
         edge_apart(bu - au, bv - av, au, av, bu, bv, cu, cv)
         or edge_apart(cu - bu, cv - bv, au, av, bu, bv, cu, cv)

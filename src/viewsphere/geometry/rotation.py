@@ -119,7 +119,7 @@ def slerp(start: ArrayLike, end: ArrayLike, share: float) -> Float:
 
 
 def _is_rotation(rows: list[list[float]]) -> bool:
-    """Whether the rows are right-handed and orthonormal, about."""
+    """Return whether the rows are right-handed and orthonormal, about."""
     a, b, c = rows
     lengths = all(abs(_dot(row, row) - 1) <= ROTATION_TOLERANCE for row in rows)
     angles = all(abs(_dot(one, other)) <= ROTATION_TOLERANCE for one, other in ((a, b), (b, c), (c, a)))

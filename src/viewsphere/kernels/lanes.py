@@ -35,7 +35,7 @@ class Lanes:
 
     @property
     def is_real(self) -> bool:
-        """Whether the lanes are float32."""
+        """Return whether the lanes are float32."""
         return self.value.type.element == REAL
 
     def like(self, other: Any) -> Any:

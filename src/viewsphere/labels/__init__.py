@@ -176,7 +176,7 @@ def drawable() -> dict[str, Drawing]:
 
 
 def is_in(source: str, sample: Sample) -> bool:
-    """Whether a sample has a label or pass of `drawable`."""
+    """Return whether a sample has a label or pass of `drawable`."""
     return labels()[source].is_in(sample) if source in labels() else source in sample.channels
 
 
@@ -194,5 +194,5 @@ def alone(channels: Container[str]) -> Callable[[Sample, int], Picture] | None:
 
 
 def is_shown(channels: Container[str]) -> bool:
-    """Whether samples with these channels have a picture, or something that stands for it."""
+    """Return whether samples with these channels have a picture, or something that stands for it."""
     return picture_of(channels) is not None or alone(channels) is not None

@@ -79,7 +79,7 @@ def words_of(sight: Sight) -> Mapping[int, Words]:
 
 
 def is_told(o: ObjectAnnotation, least: float) -> bool:
-    """Whether sentences name an object: enough of it is seen."""
+    """Return whether sentences name an object: enough of it is seen."""
     return o.box2d is not None and o.area >= SEEN and o.visibility >= least
 
 
@@ -114,12 +114,12 @@ def size_of(area: int, width: int, height: int) -> str:
 
 
 def is_hidden(o: ObjectAnnotation) -> bool:
-    """Whether much of what is in the picture of an object is hidden."""
+    """Return whether much of what is in the picture of an object is hidden."""
     return o.truncation < 1 and 1 - o.visibility / (1 - o.truncation) >= HIDDEN
 
 
 def is_cut(o: ObjectAnnotation) -> bool:
-    """Whether an object is partly outside the picture."""
+    """Return whether an object is partly outside the picture."""
     return o.truncation >= CUT
 
 
@@ -135,7 +135,7 @@ def side_of(o: ObjectAnnotation) -> str:
 
 
 def has_front(facts: ModelFacts | None) -> bool:
-    """Whether a model is not known to look the same from several sides."""
+    """Return whether a model is not known to look the same from several sides."""
     known = None if facts is None else facts.symmetries
     return known is None or not (known.discrete or known.continuous)
 
@@ -190,7 +190,7 @@ class Company:
 
 
 def _meet(low: NDArray[np.float64], high: NDArray[np.float64]) -> Truths:
-    """Whether ranges have an interior in common, (N, N)."""
+    """Return whether ranges have an interior in common, (N, N)."""
     return (low[:, None] < high) & (low < high[:, None])
 
 

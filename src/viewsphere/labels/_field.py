@@ -37,7 +37,7 @@ class Field:
 
     @property
     def is_regular(self) -> bool:
-        """Whether all its values have one shape."""
+        """Return whether all its values have one shape."""
         return not self.many and -1 not in self.shape
 
     def plain(self, value: Any) -> Any:
@@ -95,7 +95,7 @@ class Field:
         return self.type in {int, float} and _is_number(value)
 
     def equals(self, one: Any, other: Any) -> bool:
-        """Whether two values are the same number for number; NaN equals itself."""
+        """Return whether two values are the same number for number; NaN equals itself."""
         if one is None or other is None:
             return one is other
         if self.many:
@@ -107,7 +107,7 @@ class Field:
 
 
 def _is_part(value: Any, kind: str) -> bool:
-    """Whether a value is what a dataclass's field holds: a text, numbers or a number."""
+    """Return whether a value is what a dataclass's field holds: a text, numbers or a number."""
     if kind.startswith("tuple"):
         return isinstance(value, tuple) and all(map(_is_number, value))
     return isinstance(value, str) if kind == "str" else _is_number(value)

@@ -63,7 +63,7 @@ class Needs:
 
     @property
     def is_some(self) -> bool:
-        """Whether the label does not follow from what the picture's own camera sees at its instant."""
+        """Return whether the label does not follow from what the picture's own camera sees at its instant."""
         beside = self.rectified or self.rig or self.tracks or self.points or self.lidar or self.chance or self.looks
         return bool(self.instants or self.poses or beside)
 
@@ -126,7 +126,7 @@ class Label(Spec):
     drawing: InstanceOf[Drawing] | None = None
 
     def is_in(self, sample: Sample) -> bool:
-        """Whether a sample has it."""
+        """Return whether a sample has it."""
         return self.name in sample.asked
 
 
@@ -157,7 +157,7 @@ class ChannelLabel(Label):
         return self
 
     def is_in(self, sample: Sample) -> bool:
-        """Whether the sample keeps the channel."""
+        """Return whether the sample keeps the channel."""
         return self.name in sample.channels
 
     @property
@@ -195,11 +195,11 @@ class ObjectLabel(Label):
 
     @property
     def follows(self) -> bool:
-        """Whether it follows from what every data set has: it is there whether it was asked for or not."""
+        """Return whether it follows from what every data set has: it is there whether it was asked for or not."""
         return self.keep is nothing and self.options is None and not self.needs.is_some
 
     def is_in(self, sample: Sample) -> bool:
-        """Whether the sample's objects have it: it was asked for, or did not have to be."""
+        """Return whether the sample's objects have it: it was asked for, or did not have to be."""
         return not self.on_request or self.name in sample.asked or (self.follows and sample.taken is not None)
 
     @staticmethod

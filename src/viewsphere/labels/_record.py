@@ -86,7 +86,7 @@ class Makers:
         return tuple(name for name, label in self.of.items() if label.on_request and label.compute is later and self.has(name))
 
     def has(self, field: str) -> bool:
-        """Whether an object is told to have a field."""
+        """Return whether an object is told to have a field."""
         label = self.of[field]
         return not label.on_request or label.name in self.asked
 

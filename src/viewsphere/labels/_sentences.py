@@ -76,12 +76,12 @@ class Filled:
 
     @property
     def is_whole(self) -> bool:
-        """Whether there are words for all fields."""
+        """Return whether there are words for all fields."""
         return all(self.words.get(name) for name in self.fields)
 
     @property
     def may_be_whole(self) -> bool:
-        """Whether there are words for all fields but those of objects."""
+        """Return whether there are words for all fields but those of objects."""
         return all(self.words.get(name) for name in self.fields.intersection(OF_PICTURE))
 
     def text(self, template: str) -> str:

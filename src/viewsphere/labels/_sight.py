@@ -217,8 +217,8 @@ class Sight:
         return projected_bounds(self.camera, g.places(i), triangles, faces, points, g.is_used[base:end])
 
     def is_unobstructed(self, i: int) -> bool:
-        """Whether nothing can hide any part of the object of id i + 1: its 2D box meets no other object's box, there is no
-        scenery, and the ground cannot lie before it.
+        """Return whether nothing can hide any part of the object of id i + 1: its 2D box meets no other object's box, there
+        is no scenery, and the ground cannot lie before it.
         """
         geometry = self.geometry
         if geometry.has_scenery:

@@ -70,7 +70,7 @@ def _turned(pose: Float, axes: tuple[Continuous, ...]) -> Float:
 
 
 def is_ball(axes: tuple[Continuous, ...]) -> bool:
-    """Whether a model may be turned around axes that are not parallel, and so in any way."""
+    """Return whether a model may be turned around axes that are not parallel, and so in any way."""
     first = np.array(axes[0].axis) if axes else np.zeros(3)
     return any(float(np.abs(np.cross(first, axis.axis)).max()) > 1e-6 for axis in axes)
 

@@ -40,5 +40,5 @@ def word(name: str) -> str:
 
 
 def is_grained(name: str) -> bool:
-    """Whether a material runs along the longest side of what is made of it."""
+    """Return whether a material runs along the longest side of what is made of it."""
     return plugins.load(MaterialSpec, name).grained

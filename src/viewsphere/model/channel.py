@@ -35,7 +35,7 @@ class Channel:
         return (height, width) if self.components == 1 else (height, width, self.components)
 
     def fits(self, array: NDArray[Any], height: int, width: int) -> bool:
-        """Whether an array may be this channel's, for an image of this size."""
+        """Return whether an array may be this channel's, for an image of this size."""
         is_shaped = array.ndim == 1 if self.components == 0 else array.shape == self.shape(height, width)
         return is_shaped and array.dtype == self.dtype
 

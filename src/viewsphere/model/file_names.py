@@ -12,5 +12,5 @@ https://learn.microsoft.com/en-us/windows/win32/fileio/naming-a-file
 
 
 def is_reserved(name: str) -> bool:
-    """Whether Windows takes a name, with any ending, for a device's."""
+    """Return whether Windows takes a name, with any ending, for a device's."""
     return name.partition(".")[0].rstrip(" ").lower() in RESERVED

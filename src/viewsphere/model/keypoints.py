@@ -41,7 +41,7 @@ def _turned(side: re.Match[str]) -> str:
 
 
 def is_name(text: str) -> bool:
-    """Whether a point may be called so."""
+    """Return whether a point may be called so."""
     return 0 < len(text) <= LONGEST_NAME and text.isprintable() and text == text.strip()
 
 

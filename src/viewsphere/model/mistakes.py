@@ -58,7 +58,7 @@ class Marks:
 
 
 def _begins(message: str, written: str) -> bool:
-    """Whether a message begins with this field, or with one inside of it."""
+    """Return whether a message begins with this field, or with one inside of it."""
     return message.startswith(written) and re.match(r"(?:[.[][^:]*)?: ", message[len(written) :]) is not None
 
 
@@ -160,7 +160,9 @@ def told_of(where: str) -> Generator[None]:
 
 
 def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails], fields: Sequence[str]) -> bool:
-    """Whether an error only follows from others: invalid items of a list are not counted, and a misspelt field is missing."""
+    """Return whether an error only follows from others: invalid items of a list are not counted, and a misspelt field is
+    missing.
+    """
     place, depth = error["loc"], len(error["loc"])
     match error["type"]:
         case "too_short":

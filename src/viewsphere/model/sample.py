@@ -125,12 +125,12 @@ class ObjectAnnotation:
 
     @property
     def is_placed(self) -> bool:
-        """Whether the object's place in space is known."""
+        """Return whether the object's place in space is known."""
         return not math.isnan(self.world_from_object[0, 0])
 
     @property
     def is_boxed(self) -> bool:
-        """Whether its place in space and its size are known; of some imported objects only the pose is."""
+        """Return whether its place in space and its size are known; of some imported objects only the pose is."""
         return self.is_placed and not math.isnan(self.size[0])
 
     @property

@@ -158,13 +158,13 @@ class Ground(Brief):
 
     @property
     def has_slabs(self) -> bool:
-        """Whether slabs are seen."""
+        """Return whether slabs are seen."""
         pictured = self.image or self.roughness_image or self.normal_image or self.material
         return self.pattern == "slabs" and not (pictured or self.catcher)
 
     @property
     def is_labelled(self) -> bool:
-        """Whether labels see the ground."""
+        """Return whether labels see the ground."""
         return self.labels or not self.catcher
 
 
@@ -310,5 +310,5 @@ class Scene(Frozen):
 
     @property
     def weather(self) -> bool:
-        """Whether there is any."""
+        """Return whether there is any."""
         return any(getattr(self, name) is not None for name in (*WEATHER, "fog_outdoors") if name != "lamps")

@@ -22,7 +22,7 @@ class Share:
 
     @property
     def is_all(self) -> bool:
-        """Whether it has all of them."""
+        """Return whether it has all of them."""
         return self.of == 1
 
     def __call__(self, things: Iterable[T]) -> Iterator[T]:
@@ -30,7 +30,7 @@ class Share:
         return islice(things, self.number, None, self.of)
 
     def has(self, number: int) -> bool:
-        """Whether the thing of this number, counted from 0, is in it."""
+        """Return whether the thing of this number, counted from 0, is in it."""
         return number % self.of == self.number
 
     def nth(self, place: int) -> int:

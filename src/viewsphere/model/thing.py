@@ -48,7 +48,7 @@ class Motion(Frozen):
 
     @property
     def is_still(self) -> bool:
-        """Whether one pose is for all instants, and no time step is shown."""
+        """Return whether one pose is for all instants, and no time step is shown."""
         return len(self.poses) == 1 and self.steps == (None,) and not self.moves
 
     def at(self, instant: int) -> Matrix4 | None:
@@ -64,7 +64,7 @@ class Motion(Frozen):
         return self if self.is_still else Motion(poses=(self.at(instant),), steps=(self.step_at(instant),))
 
     def lasts(self, instants: int) -> bool:
-        """Whether it says where a thing is, and what it shows, at so many instants."""
+        """Return whether it says where a thing is, and what it shows, at so many instants."""
         return {len(self.poses), len(self.steps)} <= {1, instants}
 
     @staticmethod
@@ -88,12 +88,12 @@ class Thing(Frozen):
 
     @property
     def is_target(self) -> bool:
-        """Whether it is an object that pictures are about, no scenery."""
+        """Return whether it is an object that pictures are about, no scenery."""
         return bool(self.id) and not self.scenery
 
     @property
     def is_there(self) -> bool:
-        """Whether a still thing is there at all; of a moving one, whether it is at first."""
+        """Return whether a still thing is there at all; of a moving one, whether it is at first."""
         return self.motion.poses[0] is not None
 
     @property

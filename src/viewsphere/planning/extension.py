@@ -63,7 +63,7 @@ class Portion(Sendable):
 
     @property
     def adds_nothing(self) -> bool:
-        """Whether all that its recipe asks for was there before."""
+        """Return whether all that its recipe asks for was there before."""
         return not self.part.frames and not self.part.supplies
 
     def remembering(self, store: Store) -> Portion:

@@ -77,7 +77,7 @@ def loadable(spec: type[S]) -> dict[str, S]:
 
 
 def is_third_party(kind: Kind, name: str) -> bool:
-    """Whether an entry point names the plug-in."""
+    """Return whether an entry point names the plug-in."""
     return _entry(kind, name) is not None
 
 

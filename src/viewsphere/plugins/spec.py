@@ -50,7 +50,7 @@ class Spec(Frozen):
 
     @property
     def takes_options(self) -> bool:
-        """Whether functions may be given options after their other values."""
+        """Return whether functions may be given options after their other values."""
         return False
 
 
@@ -61,7 +61,7 @@ class SpecWithOptions(Spec):
 
     @property
     def takes_options(self) -> bool:
-        """Whether the plug-in has options."""
+        """Return whether the plug-in has options."""
         return self.options is not None
 
     def read_options(self, name: str, given: Mapping[str, Any], field: str) -> tuple[Frozen, ...]:

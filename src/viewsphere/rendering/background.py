@@ -42,7 +42,7 @@ SMALLEST = 48
 
 
 def shows_sky(background: Background) -> bool:
-    """Whether the sky is seen where nothing else is."""
+    """Return whether the sky is seen where nothing else is."""
     return not background.transparent and background.color is None and background.image is None
 
 

@@ -114,7 +114,7 @@ def _shots(found: Again, substitute: StandIn | None) -> list[ListedShot]:
 
 
 def _are_listed(found: Again) -> bool:
-    """Whether shots differ in what only listed ones may: their pictures' sizes, and the splits that they say."""
+    """Return whether shots differ in what only listed ones may: their pictures' sizes, and the splits that they say."""
     sizes = {(shot.camera.width, shot.camera.height) for shot in found.shots if shot.camera}
     return len(sizes) > 1 or len({shot.split for shot in found.shots}) > 1
 

@@ -118,15 +118,17 @@ def write(dataset: Dataset, formats: Entries, tell: Listener = unheard, workers:
 
 
 def is_written(entry: FormatEntry, dataset: Dataset, least: float | None) -> bool:
-    """Whether a format's export in a data set's folder is what would be written now, as far as its list of files says."""
+    """Return whether a format's export in a data set's folder is what would be written now, as far as its list of files
+    says.
+    """
     folder = dataset.root / entry.name
     is_whole = written_frames(folder) == len(dataset) and written_options(folder) == entry.whole().options
     return is_whole and not is_out_of_date(entry.name, dataset, least)
 
 
 def is_out_of_date(name: str, dataset: Dataset, least: float | None) -> bool:
-    """Whether a format's export in a data set's folder lacks frames that are there, keeps other annotations than those of what
-    is seen more than `least`, or names other credits than those that are known now.
+    """Return whether a format's export in a data set's folder lacks frames that are there, keeps other annotations than those
+    of what is seen more than `least`, or names other credits than those that are known now.
     """
     spec, folder = plugins.load(FormatSpec, name), dataset.root / name
     if written_frames(folder) not in (None, len(dataset)) or (not spec.keeps_all_objects and written_least(folder) != least):

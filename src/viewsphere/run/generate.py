@@ -411,7 +411,7 @@ class Missing:
         return (row for row in self.portion.rows if not self._lacks_model(row))
 
     def _lacks_model(self, row: Row) -> bool:
-        """Whether a model that was left out is in a shot; a shot that lacks company lands in `skipped`."""
+        """Return whether a model that was left out is in a shot; a shot that lacks company lands in `skipped`."""
         if not self.skipped:
             return False
         if row.subject in self.skipped:

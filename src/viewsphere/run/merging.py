@@ -58,7 +58,7 @@ class _Source:
 
     @property
     def keeps_categories(self) -> bool:
-        """Whether every category id stays what it is."""
+        """Return whether every category id stays what it is."""
         return all(old == new.id for old, new in self.categories.items())
 
     @cached_property
@@ -201,7 +201,7 @@ def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tupl
 
 
 def _tells_names(dataset: Dataset) -> bool:
-    """Whether the data set has sentences about its objects."""
+    """Return whether the data set has sentences about its objects."""
     return any(SENTENCES & set(part.recipe.get("annotations") or ()) for part in dataset.plan.parts)
 
 

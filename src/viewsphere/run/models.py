@@ -44,7 +44,7 @@ class Models:
 
     @cached_property
     def _keeps_looks(self) -> bool:
-        """Whether a label of the data set needs what models look like."""
+        """Return whether a label of the data set needs what models look like."""
         asked = {name for part in self.record.parts for name in part.recipe.get("annotations", ())}
         return any(label.needs.looks for name, label in labels().items() if name in asked)
 

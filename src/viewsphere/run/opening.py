@@ -174,10 +174,10 @@ def _check_versions(store: Store, parts: Iterable[Part]) -> None:
 
 
 def _is_begun(store: Store, found: PlanRecord, number: int) -> bool:
-    """Whether any shot of a part is finished; takes as long as there are finished shots, however many are planned."""
+    """Return whether any shot of a part is finished; takes as long as there are finished shots, however many are planned."""
     return any(found.indices[number].find(key) for key in store.finished())
 
 
 def _is_whole(store: Store, found: PlanRecord, number: int) -> bool:
-    """Whether all shots of a part are finished."""
+    """Return whether all shots of a part are finished."""
     return all(store.has_shot(row.key) for row in found.indices[number])

@@ -90,7 +90,7 @@ class Target:
 
     @property
     def prepares(self) -> bool:
-        """Whether the format makes anything of samples before they are added."""
+        """Return whether the format makes anything of samples before they are added."""
         return self.spec.preparer is not None
 
     def preparer(self) -> Callable[[Sample], Any]:

@@ -45,7 +45,7 @@ class Sights:
         self._keys: dict[int, str] = {}  # of the objects of the views' shot: merged data sets have names of their own
 
     def is_possible(self, sample: Sample) -> bool:
-        """Whether it is known what was seen: the shot is kept, and the objects are placed."""
+        """Return whether it is known what was seen: the shot is kept, and the objects are placed."""
         known = self._scenery.shot(self._scenery.key_of(sample.index)) is not None
         return known and sample.known_camera is not None and all(o.source is None for o in sample.objects)
 

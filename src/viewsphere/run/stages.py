@@ -244,7 +244,7 @@ class Stages:
         self.check_shot(shot.model_copy(update={"instants": (shot.instants[instant],), "things": shot.things_at(instant)}))
 
     def _roofs(self, thing: Thing, point: Float) -> bool:
-        """Whether scenery hides most of the sky from a point in the world."""
+        """Return whether scenery hides most of the sky from a point in the world."""
         mesh = self.model(thing.model, thing.step)
         inside = transform(np.linalg.inv(np.array(thing.world_from_object)), point)
         return sky_occlusion(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY

@@ -54,7 +54,7 @@ class Status:
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is left to be made, but exports."""
+        """Return whether nothing is left to be made, but exports."""
         return not self.missing and not self.models
 
     @property

@@ -70,6 +70,8 @@ def channel_bytes(store: Store) -> Counter[str]:
 
 
 def _is_used(channel: str, formats: Iterable[FormatEntry]) -> bool:
-    """Whether it is a picture, or one of the formats needs it, or does not say what it needs: such a format takes all."""
+    """Return whether it is a picture, or one of the formats needs it, or does not say what it needs: such a format takes
+    all.
+    """
     specs = ((plugins.load(FormatSpec, entry.name), entry) for entry in formats)
     return channel in PICTURES or any(spec.channels is None or channel in needs_of(spec, entry) for spec, entry in specs)

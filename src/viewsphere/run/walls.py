@@ -71,7 +71,7 @@ def _walls(category: str, mesh: Mesh) -> NDArray[np.int32]:
 
 
 def _is_crossed(corners: Float, a: Float, b: Float) -> bool:
-    """Whether the line from a to b (3,) goes through any of the triangles (T, 3, 3): Moeller and Trumbore 1997."""
+    """Return whether the line from a to b (3,) goes through any of the triangles (T, 3, 3): Moeller and Trumbore 1997."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(b - a, second)
     volume = (first * across).sum(axis=1)

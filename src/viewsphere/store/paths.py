@@ -42,7 +42,9 @@ def file_inside(root: Path, relative: str) -> Path:
 
 
 def _is_straight(root: Path, relative: str) -> bool:
-    """Whether nothing on the way from a folder to what lies below it is a link; False, too, where that is not plain to see."""
+    """Return whether nothing on the way from a folder to what lies below it is a link; False, too, where that is not plain to
+    see.
+    """
     if os.name == "nt" or not PLAIN.fullmatch(relative):
         return False
     place = str(root)
@@ -65,7 +67,7 @@ def files_inside(root: Path, folder: Path) -> Sequence[Path]:
 
 
 def is_name(text: object) -> bool:
-    """Whether this is the name of one file or folder: a text without separators that is neither `.` nor `..`."""
+    """Return whether this is the name of one file or folder: a text without separators that is neither `.` nor `..`."""
     return isinstance(text, str) and bool(text.strip(". ")) and not set(text) & set("/\\\0")
 
 

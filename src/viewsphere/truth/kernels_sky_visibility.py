@@ -7,7 +7,7 @@ from viewsphere.kernels.jit import njit
 
 @njit
 def hits_any(vertices, triangles, point, direction):
-    """Whether a ray from a point meets any triangle (Moller and Trumbore 1997)."""
+    """Return whether a ray from a point meets any triangle (Moller and Trumbore 1997)."""
     px, py, pz = point[0], point[1], point[2]
     dx, dy, dz = direction[0], direction[1], direction[2]
     for t in range(triangles.shape[0]):

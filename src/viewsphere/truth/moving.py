@@ -43,7 +43,7 @@ class _Room:
         return changed(self.things, self.meshes, things, meshes)
 
     def fits(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> bool:
-        """Whether these are the same things, there or not there as before, made of the same triangles."""
+        """Return whether these are the same things, there or not there as before, made of the same triangles."""
         held = zip(self.things, self.meshes, things, meshes, strict=True)
         return all(
             (a is b and mesh is other) or (a.is_there == b.is_there and differs_in_shape_only(mesh, other))
@@ -128,7 +128,7 @@ def changes(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], 
 
 
 def differs_in_shape_only(a: Mesh, b: Mesh) -> bool:
-    """Whether meshes differ in where their vertices are, and in their normals, at most."""
+    """Return whether meshes differ in where their vertices are, and in their normals, at most."""
     return a is b or all(_is_same(getattr(a, name), getattr(b, name)) for name in KEPT)
 
 

@@ -39,7 +39,7 @@ class Body:
         return (self.triangles - np.int32(self.base)).reshape(-1)
 
     def has_triangles_of(self, other: Body) -> bool:
-        """Whether both are the same thing, there, and made of the same triangles, wherever its vertices are.
+        """Return whether both are the same thing, there, and made of the same triangles, wherever its vertices are.
 
         Normals divide vertices: corners that share one while two triangles are level need two once they are not. So corners are
         compared by their places: those that are one vertex in either have to be in one place in the other.
@@ -54,7 +54,7 @@ class Body:
         return np.array_equal(self.corners, other.corners) or (self._is_joined_in(other) and other._is_joined_in(self))
 
     def _is_joined_in(self, other: Body) -> bool:
-        """Whether the corners of each vertex are in one place in another body of as many triangles."""
+        """Return whether the corners of each vertex are in one place in another body of as many triangles."""
         corners = self.corners
         first = np.zeros(len(self.places), np.intp)
         first[corners[::-1]] = np.arange(len(corners))[::-1]
@@ -128,12 +128,12 @@ class View:
 
     @property
     def is_pinhole(self) -> bool:
-        """Whether the lens has no distortion."""
+        """Return whether the lens has no distortion."""
         return self.camera.distortion is None
 
     @property
     def has_unit_rays(self) -> bool:
-        """Whether s is measured along rays of length 1, see `truth.visibility.Visibility`."""
+        """Return whether s is measured along rays of length 1, see `truth.visibility.Visibility`."""
         return has_unit_rays(self.camera.distortion)
 
     @property
@@ -171,20 +171,20 @@ class View:
         return self.geometry.coordinates[first:stop]
 
     def has_camera_of(self, other: View) -> bool:
-        """Whether both cameras are the same, and stand in one place."""
+        """Return whether both cameras are the same, and stand in one place."""
         return self.turns_like(other) and np.array_equal(self.camera.t, other.camera.t)
 
     def turns_like(self, other: View) -> bool:
-        """Whether both cameras see all directions in the same pixels."""
+        """Return whether both cameras see all directions in the same pixels."""
         same_lens = self.camera.intrinsics == other.camera.intrinsics
         return same_lens and np.array_equal(self.camera.R, other.camera.R)
 
     def has_ground_of(self, other: View) -> bool:
-        """Whether both views have a ground, and it is one."""
+        """Return whether both views have a ground, and it is one."""
         return self.geometry.ground_z is not None and self.geometry.ground_z == other.geometry.ground_z
 
     def has_sky_of(self, other: View) -> bool:
-        """Whether pixels without a triangle show directions in both views."""
+        """Return whether pixels without a triangle show directions in both views."""
         return self.is_sky_endless and other.is_sky_endless
 
 

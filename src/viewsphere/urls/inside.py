@@ -10,7 +10,7 @@ PLAIN = re.compile(r"[\w+-][\w+.-]*(?:/[\w+-][\w+.-]*)*", re.ASCII)
 
 
 def is_inside(relative: str) -> bool:
-    """Whether a path is relative on every system, and goes up nowhere."""
+    """Return whether a path is relative on every system, and goes up nowhere."""
     if PLAIN.fullmatch(relative):
         return True
     path, on_windows = PurePosixPath(relative), PureWindowsPath(relative)

@@ -126,15 +126,15 @@ class RemotePath(Base):
                 raise
 
     def exists(self, **_: bool) -> bool:
-        """Whether there is a file or a folder."""
+        """Return whether there is a file or a folder."""
         return self._info() is not None
 
     def is_file(self, **_: bool) -> bool:
-        """Whether there is a file."""
+        """Return whether there is a file."""
         return (self._info() or {}).get("type") == "file"
 
     def is_dir(self, **_: bool) -> bool:
-        """Whether anything lies below."""
+        """Return whether anything lies below."""
         return (self._info() or {}).get("type") == "directory"
 
     def is_symlink(self) -> bool:
@@ -150,7 +150,7 @@ class RemotePath(Base):
         return self
 
     def samefile(self, other_path: Any) -> bool:
-        """Whether this is the same path."""
+        """Return whether this is the same path."""
         return self == other_path
 
     def mkdir(self, mode: int = 0o777, parents: bool = False, exist_ok: bool = False) -> None:
@@ -210,7 +210,7 @@ class RemotePath(Base):
 
     @property
     def is_shared(self) -> bool:
-        """Whether other processes find the same files there."""
+        """Return whether other processes find the same files there."""
         return self.parts[0] != "memory:"
 
     def _info(self) -> dict[str, Any] | None:
@@ -296,7 +296,7 @@ def shown(error: object) -> str:
 
 
 def _is_refusal(error: Exception) -> bool:
-    """Whether it is about who asks, so that asking again does not help."""
+    """Return whether it is about who asks, so that asking again does not help."""
     return isinstance(error, PermissionError) or "Credential" in type(error).__name__
 
 

@@ -71,7 +71,7 @@ class Query:
 
     @property
     def needs_labels(self) -> bool:
-        """Whether it cannot be answered of frames without columns."""
+        """Return whether it cannot be answered of frames without columns."""
         return self != Query(order=self.order) or self.order not in ORDERS
 
     @staticmethod

@@ -91,7 +91,7 @@ class Address:
 
     @property
     def is_loopback(self) -> bool:
-        """Whether only this machine reaches it."""
+        """Return whether only this machine reaches it."""
         if self.host == "localhost":
             return True
         address = _address(self.host)
@@ -140,7 +140,7 @@ class Server(ThreadingMixIn, TCPServer):
         return f"viewsphere-{self.port}"
 
     def names(self, host: str) -> bool:
-        """Whether a request's Host is this server: a name that a stranger made lead here is not."""
+        """Return whether a request's Host is this server: a name that a stranger made lead here is not."""
         name, port = _parted(host)
         if port != self.port:
             return False
@@ -374,7 +374,7 @@ class _Handler(BaseHTTPRequestHandler):
         return None
 
     def _has_token(self, asked: Mapping[str, str]) -> bool:
-        """Whether the token is in the address, the cookie or the header Authorization, compared in constant time."""
+        """Return whether the token is in the address, the cookie or the header Authorization, compared in constant time."""
         try:
             cookie = SimpleCookie(self.headers.get("Cookie", "")).get(self.server.cookie)
         except CookieError:

@@ -124,7 +124,7 @@ DIRECTIONS = tuple(_directions())
 
 
 def is_alike(one: Looks, other: Looks) -> bool:
-    """Whether two models look the same but for rounding; what somebody said of them does not count."""
+    """Return whether two models look the same but for rounding; what somebody said of them does not count."""
     if [patch.material for patch in one.patches] != [patch.material for patch in other.patches]:
         return False
     pairs = zip(map(_numbers, one.patches), map(_numbers, other.patches), strict=True)
@@ -171,7 +171,7 @@ def _patches(m: Material, spots: _Spots, weights: Float) -> Iterator[Patch]:
 
 
 def _is_plain(spots: _Spots) -> bool:
-    """Whether all points have one colour, whose name is looked up once."""
+    """Return whether all points have one colour, whose name is looked up once."""
     return bool((spots.color == spots.color[0]).all())
 
 

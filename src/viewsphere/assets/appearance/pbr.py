@@ -29,7 +29,7 @@ Pictures = tuple[Image, Image, Image]
 
 
 def is_replaceable(material: Material) -> bool:
-    """Whether a material can be replaced by a substance: glass and what has holes stay what they are."""
+    """Return whether a material can be replaced by a substance: glass and what has holes stay what they are."""
     return material.alpha_mode == "OPAQUE" and not material.transmission
 
 

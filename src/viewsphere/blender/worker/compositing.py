@@ -28,7 +28,7 @@ def fault(scene):
 
 
 def is_used(scene):
-    """Whether a compositor gives the picture: Blender renders nothing for one that asks for no render layers."""
+    """Return whether a compositor gives the picture: Blender renders nothing for one that asks for no render layers."""
     tree = tree_of(scene)
     return tree is not None and _has_output(tree) and _asks_for_layers(tree)
 

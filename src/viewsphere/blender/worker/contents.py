@@ -108,7 +108,7 @@ class _Seeing:
 
 
 def displaces(material):
-    """Whether a material moves the surface that it is on."""
+    """Return whether a material moves the surface that it is on."""
     if material is None or material.node_tree is None or material.displacement_method not in ("DISPLACEMENT", "BOTH"):
         return False
     outputs = (node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
@@ -116,7 +116,7 @@ def displaces(material):
 
 
 def _has_area(item, matrix):
-    """Whether the item, placed by this matrix, has a triangle whose area is not zero."""
+    """Return whether the item, placed by this matrix, has a triangle whose area is not zero."""
     mesh = item.to_mesh() if item.type == "META" else item.data
     try:
         if mesh is None or not len(mesh.loop_triangles):
@@ -162,7 +162,7 @@ def _collections(one):
 
 
 def _shines(owner):
-    """Whether a world or a material gives light, as far as can be told without rendering."""
+    """Return whether a world or a material gives light, as far as can be told without rendering."""
     if owner is None or (isinstance(owner, bpy.types.Material) and not owner.users):
         return False
     tree = owner.node_tree if getattr(owner, "use_nodes", True) else None

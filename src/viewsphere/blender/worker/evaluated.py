@@ -159,14 +159,16 @@ class Gathering:
 
 
 def taken(instance, item):
-    """Whether the camera can see this instance's triangles: it is shown, has faces, and is no shadow catcher or holdout."""
+    """Return whether the camera can see this instance's triangles: it is shown, has faces, and is no shadow catcher or
+    holdout.
+    """
     if not instance.show_self or item.type not in SOLID:
         return False
     return item.visible_camera and not item.is_shadow_catcher and not item.is_holdout
 
 
 def strands(item):
-    """Whether particles are drawn as strands around the item, which are in pictures and in no mesh."""
+    """Return whether particles are drawn as strands around the item, which are in pictures and in no mesh."""
     return item.type == "MESH" and any(
         modifier.type == "PARTICLE_SYSTEM"
         and modifier.show_render

@@ -97,7 +97,7 @@ def _libraries(root):
 
 
 def is_within(path, root):
-    """Whether a file lies in the folder or below, links followed."""
+    """Return whether a file lies in the folder or below, links followed."""
     return Path(path).resolve().is_relative_to(Path(root).resolve())
 
 

@@ -96,7 +96,7 @@ def go_to(scene, frame, after=None):
 
 
 def is_simulated(scene):
-    """Whether the scene has simulations, so that a frame depends on earlier ones."""
+    """Return whether the scene has simulations, so that a frame depends on earlier ones."""
     world = scene.rigidbody_world
     return bool(
         (world is not None and world.enabled and world.collection is not None)
@@ -106,7 +106,7 @@ def is_simulated(scene):
 
 
 def _moves(scene):
-    """Whether there is anything that could change with time."""
+    """Return whether there is anything that could change with time."""
     return bool(
         len(bpy.data.actions)
         or len(bpy.data.cache_files)

@@ -33,7 +33,7 @@ def set_up(scene, settings):
 
 
 def is_drawn(scene):
-    """Whether the scene's renderer draws through OpenGL, and so gives pictures only by way of files."""
+    """Return whether the scene's renderer draws through OpenGL, and so gives pictures only by way of files."""
     return scene.render.engine != "CYCLES"
 
 

@@ -133,7 +133,7 @@ class _Numbering:
 
 
 def _is_born(owner):
-    """Whether the object has particles that depend on time."""
+    """Return whether the object has particles that depend on time."""
     return any(system.settings.type == "EMITTER" for system in owner.particle_systems)
 
 

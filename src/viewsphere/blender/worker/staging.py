@@ -78,7 +78,7 @@ def _mesh(name, told, known, renderer):
 
 
 def is_placed(one):
-    """Whether an object is viewsphere's own, not one of a user's file."""
+    """Return whether an object is viewsphere's own, not one of a user's file."""
     return ORDER in one
 
 

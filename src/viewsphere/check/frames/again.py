@@ -29,7 +29,7 @@ class Again:
         self.not_run: dict[str, str] = {}
 
     def is_possible(self, sample: Sample) -> bool:
-        """Whether it is known what was seen."""
+        """Return whether it is known what was seen."""
         return self._sights.is_possible(sample)
 
     def differences(self, sample: Sample) -> Findings:

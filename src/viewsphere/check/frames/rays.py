@@ -144,7 +144,7 @@ class RayCaster:
         return np.minimum(solid, clear), np.where(clear < solid, of_clear, of_solid)
 
     def _is_in_ground(self, eye: Float) -> bool:
-        """Whether the camera stands in the plane of the ground, of which it then sees nothing."""
+        """Return whether the camera stands in the plane of the ground, of which it then sees nothing."""
         return abs(eye[2] - self._lowest) <= EDGE_ON * (1.0 + float(np.linalg.norm(eye + self._middle)))
 
     def _meets_ground(self, eye: Float, directions: Float, ahead: NDArray[np.bool_]) -> NDArray[np.bool_]:

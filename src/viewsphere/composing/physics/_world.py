@@ -253,7 +253,7 @@ class World:
 
 
 def _are_near(before: Float, now: Float, way: float, angle: float) -> bool:
-    """Whether all bodies went less far, and turned less, between two states (N, 7)."""
+    """Return whether all bodies went less far, and turned less, between two states (N, 7)."""
     gone = np.linalg.norm(now[:, :3] - before[:, :3], axis=1)
     half = np.abs((now[:, 3:] * before[:, 3:]).sum(axis=1)).clip(0, 1)
     return bool(gone.max() < way and 2 * np.arccos(half.min()) < angle)

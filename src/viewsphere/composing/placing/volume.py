@@ -93,8 +93,8 @@ def _pose(
 
 
 def apart(a: Float, b: Float, gap: float) -> bool:
-    """Whether two boxes, their corners (8, 3) however they are turned, are separated by at least a gap: along a side of one of
-    them, or across two of their sides (Gottschalk, Lin, Manocha 1996).
+    """Return whether two boxes, their corners (8, 3) however they are turned, are separated by at least a gap: along a side
+    of one of them, or across two of their sides (Gottschalk, Lin, Manocha 1996).
     """
     sides = [(c[1] - c[0], c[3] - c[0], c[4] - c[0]) for c in (a, b)]
     crosses = (np.cross(s, t) for s, t in product(*sides))

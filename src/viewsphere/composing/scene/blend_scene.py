@@ -198,7 +198,7 @@ class BlendScenery(Sendable):
         return pieces
 
     def shows(self, spec: ModelSpec, frame: int) -> bool:
-        """Whether there is anything of a model that is taken of the file, at one of the frames; True for any other."""
+        """Return whether there is anything of a model that is taken of the file, at one of the frames; True for any other."""
         if spec.parts is None:
             return True
         showing = self.file.showing[frame]

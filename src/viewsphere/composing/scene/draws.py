@@ -72,17 +72,17 @@ class Scenes:
 
     @cached_property
     def is_jittered(self) -> bool:
-        """Whether poses are moved."""
+        """Return whether poses are moved."""
         return self.recipe.scene.jitter != JitterEntry()
 
     @cached_property
     def is_target_moved(self) -> bool:
-        """Whether poses need to know what they look at, because it is moved."""
+        """Return whether poses need to know what they look at, because it is moved."""
         return self.recipe.scene.jitter.target != JitterEntry().target
 
     @cached_property
     def has_finish_per_frame(self) -> bool:
-        """Whether every frame has a finish of its own."""
+        """Return whether every frame has a finish of its own."""
         return self.recipe.scene.effects.is_noisy or any(
             self._draw(part) == "per_frame" and (is_random(part) or getattr(part, "images", None) is not None)
             for part in self._finishing
@@ -303,7 +303,7 @@ def _angles(entry: SunEntry) -> tuple[float, float] | None:
 
 
 def is_night(entry: object) -> bool:
-    """Whether a sun that is given by date, time and place, none of them drawn, is below the horizon."""
+    """Return whether a sun that is given by date, time and place, none of them drawn, is below the horizon."""
     if not isinstance(entry, SunEntry) or is_random((entry.date, entry.time, entry.latitude, entry.longitude)):
         return False
     angles = _angles(entry)

@@ -155,7 +155,7 @@ def _too_large(field: str, found: str, path: str) -> RecipeError:
 
 
 def _is_sideways(image: Image) -> bool:
-    """Whether EXIF says that the camera was turned; what cannot be read says nothing."""
+    """Return whether EXIF says that the camera was turned; what cannot be read says nothing."""
     try:
         return image.getexif().get(0x0112, 1) >= 5
     except Exception:  # the parser of a damaged block raises whatever it meets
@@ -163,7 +163,7 @@ def _is_sideways(image: Image) -> bool:
 
 
 def _ends_well(path: str, kind: str) -> bool:
-    """Whether a file's last bytes are those that end its kind; True where the kind has no such."""
+    """Return whether a file's last bytes are those that end its kind; True where the kind has no such."""
     if kind not in _ENDS:
         return True
     with open_file(Path(path), "MAX_PICTURE_BYTES") as file:

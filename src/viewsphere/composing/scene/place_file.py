@@ -65,7 +65,7 @@ class FileFloor:
         return box_vertices((-width / 2, -length / 2, 0.0), (width / 2, length / 2, 0.0))
 
     def has(self, point: Vector) -> bool:
-        """Whether a point in the place's axes is on it."""
+        """Return whether a point in the place's axes is on it."""
         frame = np.array(self.place_from_floor)
         x, y, z = ((np.array(point) - frame[:3, 3]) @ frame[:3, :3]).tolist()
         return abs(x) <= self.size[0] / 2 and abs(y) <= self.size[1] / 2 and -self.depth - NEAR <= z <= NEAR

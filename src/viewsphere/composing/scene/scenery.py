@@ -142,7 +142,7 @@ def place_surfaces(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tu
 
 
 def is_indoors(recipe: Recipe, entry: PlaceEntry | None) -> bool:
-    """Whether targets are in a room: whether the place's module says INDOORS, or its file."""
+    """Return whether targets are in a room: whether the place's module says INDOORS, or its file."""
     return entry is not None and (entry.is_room if entry.name else _file_offers(recipe, entry).indoors)
 
 

@@ -22,7 +22,7 @@ __all__ = ["RigPose", "Trajectory", "World", "instant", "is_still", "shaken", "s
 
 
 def is_still(viewpoints: Viewpoints) -> bool:
-    """Whether the viewpoints are places at which a camera stays, each for a sequence; otherwise they are one motion."""
+    """Return whether the viewpoints are places at which a camera stays, each for a sequence; otherwise they are one motion."""
     return isinstance(viewpoints, (Grid, Jitter, Sphere, Normal))
 
 

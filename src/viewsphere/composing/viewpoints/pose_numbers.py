@@ -48,7 +48,7 @@ def pose_names(views: Poses) -> Names:
 
 
 def follows_from_recipe(views: Poses) -> bool:
-    """Whether a recipe alone says which poses these are, without any file."""
+    """Return whether a recipe alone says which poses these are, without any file."""
     plain = views.base if isinstance(views, SequencePoses) else views
     return not isinstance(plain, ListedPoses | TimedPoses) and not plain.digest
 
@@ -89,7 +89,7 @@ def first_numbers(there: PlanRecord) -> Indices:
 
 
 def has_poses_of(there: PlanRecord, views: Poses) -> bool:
-    """Whether the data set's poses are these, in this order, as is plain from its recipe."""
+    """Return whether the data set's poses are these, in this order, as is plain from its recipe."""
     brought = [part for part in there.parts if part.new_poses]
     if len(brought) != 1 or brought[0].pose_names is not None or not follows_from_recipe(views):
         return False

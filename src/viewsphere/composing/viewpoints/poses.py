@@ -65,7 +65,7 @@ class Poses(Sequence[Viewpoint]):
 
     @property
     def are_known(self) -> bool:
-        """Whether the recipe alone says where cameras stand."""
+        """Return whether the recipe alone says where cameras stand."""
         return not isinstance(getattr(self.viewpoints, "distance", None), Fill | FillBetween)
 
     def fill(self, index: int) -> float | None:
@@ -187,7 +187,7 @@ class RepeatedPoses(Poses):
 
     @property
     def are_known(self) -> bool:
-        """Whether the poses are."""
+        """Return whether the poses are."""
         return self.base.are_known
 
 

@@ -59,7 +59,7 @@ def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: st
 
 
 def shows_sky(shot: Shot, finish: Finish) -> bool:
-    """Whether a picture of a shot has the sky where nothing else is; `save` needs frames that agree in this."""
+    """Return whether a picture of a shot has the sky where nothing else is; `save` needs frames that agree in this."""
     from viewsphere.engines._blender import saving
 
     return saving.shows_sky(shot, finish)

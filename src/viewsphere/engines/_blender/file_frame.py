@@ -35,7 +35,7 @@ class FileFrame:
 
     @property
     def is_same(self) -> bool:
-        """Whether the file's world is the shot's world, in metres."""
+        """Return whether the file's world is the shot's world, in metres."""
         return self.unit == 1.0 and bool((self.file_from_world == np.eye(4)).all())
 
     def placed(self, world_from_object: ArrayLike) -> list[list[float]]:

@@ -37,7 +37,7 @@ class Common:
 
     @property
     def draws(self) -> bool:
-        """Whether the renderer draws through OpenGL."""
+        """Return whether the renderer draws through OpenGL."""
         return self.renderer != "cycles"
 
 

@@ -69,12 +69,12 @@ def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: st
 
 
 def is_clear(shot: Shot) -> bool:
-    """Whether a shot's pictures have no background at all."""
+    """Return whether a shot's pictures have no background at all."""
     return picture_of(shot.channels) == "rgba"
 
 
 def shows_sky(shot: Shot, finish: Finish) -> bool:
-    """Whether a picture of a shot has the sky where nothing else is."""
+    """Return whether a picture of a shot has the sky where nothing else is."""
     return not is_clear(shot) and finish.background.color is None and finish.background.image is None
 
 

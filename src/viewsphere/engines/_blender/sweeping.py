@@ -26,7 +26,7 @@ class Sweeping:
 
     @property
     def is_still(self) -> bool:
-        """Whether nothing moves, so that the picture is sharp."""
+        """Return whether nothing moves, so that the picture is sharp."""
         return self.request(0) is None
 
     def request(self, view: int) -> dict[str, Any] | None:

@@ -190,11 +190,11 @@ class Kind:
         return level if CONTENTS[name] != "normal" or level == 0 or self._is_matt(index, level) else 0
 
     def _cuts(self, material: Material, texture: Texture) -> bool:
-        """Whether the texture's alpha makes parts of the material transparent."""
+        """Return whether the texture's alpha makes parts of the material transparent."""
         return material.alpha_mode != "OPAQUE" and bool((self.mesh.images[texture.image].pixels[..., 3] < 255).any())
 
     def _can_roughen(self, material: Material) -> bool:
-        """Whether averaged bumps can be turned into roughness: both textures must cover each other texel by texel."""
+        """Return whether averaged bumps can be turned into roughness: both textures must cover each other texel by texel."""
         bumps, rough = material.normal_texture, material.metallic_roughness_texture
         if bumps is None or rough is None or bumps != replace(rough, image=bumps.image):
             return False
@@ -203,7 +203,7 @@ class Kind:
         return len(sizes) == 1 and (repaint is None or repaint.roughness is None)
 
     def _is_matt(self, index: int, level: int) -> bool:
-        """Whether a material is rough enough that its averaged bumps may be added to the roughness (`ROUGHER`)."""
+        """Return whether a material is rough enough that its averaged bumps may be added to the roughness (`ROUGHER`)."""
         if (index, level) not in self._matt:
             own, bumps = self._fourths(self.mesh.materials[index], level)
             self._matt[index, level] = float(bumps.mean()) <= ROUGHER * float(own.mean())

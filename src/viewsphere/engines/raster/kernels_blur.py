@@ -36,7 +36,7 @@ def carry(rays, inverse_depth, triangle, owner, moves, points):
 
 @inner
 def _is_alike(way, row, column, u, v):
-    """Whether a pixel moves about like this."""
+    """Return whether a pixel moves about like this."""
     p, q = way[row, column, 0] - u, way[row, column, 1] - v
     return p * p + q * q <= f4(ALIKE) * (u * u + v * v)
 

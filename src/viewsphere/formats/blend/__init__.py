@@ -86,7 +86,9 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gener
 
 
 def is_camera_view(sample: Sample) -> bool:
-    """Whether a frame can be written: it is a camera's, not a LiDAR's, and this, models and where they stand are known."""
+    """Return whether a frame can be written: it is a camera's, not a LiDAR's, and this, models and where they stand are
+    known.
+    """
     if not (sample.known_camera and sample.known_pose and sample.objects):
         return False
     return not isinstance(sample.known_camera.distortion, Scan) and all(o.model for o in sample.objects)

@@ -51,7 +51,7 @@ def category_ids(dataset: Dataset, options: Options) -> dict[int, int]:
 
 
 def keeps_ids(dataset: Dataset) -> bool:
-    """Whether any of it was imported, so that categories keep their ids."""
+    """Return whether any of it was imported, so that categories keep their ids."""
     return any(part.frames and not part.settings for part in dataset.plan.parts)
 
 

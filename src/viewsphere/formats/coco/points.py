@@ -34,7 +34,7 @@ Names = Mapping[int, tuple[str, ...]]
 
 
 def has_label(dataset: Dataset, name: str) -> bool:
-    """Whether some of a data set's pictures have a label that is given on request."""
+    """Return whether some of a data set's pictures have a label that is given on request."""
     return any(name in part.recipe.get("annotations", ()) for part in dataset.plan.parts)
 
 

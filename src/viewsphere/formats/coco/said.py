@@ -114,7 +114,7 @@ def _told(dataset: Dataset) -> Iterator[Said]:
 
 
 def _is_sound(key: str, value: Any) -> bool:
-    """Whether a category's names of points, each once, and its lines are such; of other keys nothing is known."""
+    """Return whether a category's names of points, each once, and its lines are such; of other keys nothing is known."""
     if key not in ("keypoints", "skeleton"):
         return True
     values = cast(list[Any], value if isinstance(value, list) else [None])

@@ -46,7 +46,7 @@ class Row:
 
     @property
     def is_region(self) -> bool:
-        """Whether it is of a region that evaluations leave out."""
+        """Return whether it is of a region that evaluations leave out."""
         return self.kind == DONT_CARE_TYPE
 
 
@@ -146,6 +146,6 @@ def read_camera(file: Path, size: tuple[int, int]) -> Camera:
 
 
 def _is_pinhole(projection: NDArray[np.float64]) -> bool:
-    """Whether the left three columns are K of a lens that is no point."""
+    """Return whether the left three columns are K of a lens that is no point."""
     k = projection[:, :3]
     return bool(min(k[0, 0], k[1, 1]) >= SHORTEST and k[1, 0] == 0 and (k[2] == (0, 0, 1)).all())

@@ -43,7 +43,7 @@ class _Frame(Listed):
 
     @property
     def is_tracked(self) -> bool:
-        """Whether it is of a sequence."""
+        """Return whether it is of a sequence."""
         return bool(self.sequence)
 
 

@@ -34,7 +34,7 @@ def entries_of(dataset: Dataset, sample: Sample) -> list[Entry]:
 
 
 def _is_of_a_pose(sample: Sample) -> bool:
-    """Whether a sample has a known camera and pose, which the layout needs: it sorts everything by pose."""
+    """Return whether a sample has a known camera and pose, which the layout needs: it sorts everything by pose."""
     return sample.known_camera is not None and sample.known_pose is not None
 
 

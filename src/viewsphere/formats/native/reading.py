@@ -96,7 +96,7 @@ def _load(file: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
 
 
 def _is_name(text: str) -> bool:
-    """Whether a text is the name of one folder, which gets a longer one while it is written."""
+    """Return whether a text is the name of one folder, which gets a longer one while it is written."""
     return is_name(text) and len(text.encode()) <= LONGEST_NAME
 
 
@@ -235,7 +235,7 @@ def _picture(root: Path, relative: PurePosixPath, camera: Camera) -> Path:
 
 
 def _is_depth(file: Path, camera: Camera) -> bool:
-    """Whether a file holds depth as viewsphere keeps it: metres along z, in any of its encodings."""
+    """Return whether a file holds depth as viewsphere keeps it: metres along z, in any of its encodings."""
     try:
         array = decode(channels()["depth"], file)
     except UserError:

@@ -47,7 +47,7 @@ class Seen:
 
     @property
     def is_fine(self) -> bool:
-        """Whether its viewpoint is more than a coarse one."""
+        """Return whether its viewpoint is more than a coarse one."""
         return self.view.get("distance", 0.0) > 0
 
 
@@ -138,7 +138,7 @@ def _seen(file: Path, place: int, said: Mapping[str, Any]) -> Seen:
 
 
 def _is_nothing(value: Any) -> bool:
-    """Whether a field is missing or []."""
+    """Return whether a field is missing or []."""
     return value is None or (isinstance(value, np.ndarray) and not value.size)
 
 

@@ -74,7 +74,7 @@ def _meshes(root: Path, folders: Iterable[str]) -> Iterator[Path]:
 
 
 def _has_faces(ply: Path) -> bool:
-    """Whether a PLY file is a mesh rather than a cloud of points."""
+    """Return whether a PLY file is a mesh rather than a cloud of points."""
     with open_file(ply) as file:
         head, _, rest = file.read(HEAD_BYTES).partition(b"end_header")
     words = [line.split() for line in head.splitlines()]

@@ -64,7 +64,7 @@ class Moment:
 
     @property
     def is_first(self) -> bool:
-        """Whether the sample is the first that there is of its moment."""
+        """Return whether the sample is the first that there is of its moment."""
         return self.sensor == self.there[0]
 
 

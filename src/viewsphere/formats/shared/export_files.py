@@ -120,7 +120,7 @@ def _different(wanted: bytes, found: bytes) -> str | None:
 
 
 def same_bytes(one: Path, other: Path) -> bool:
-    """Whether two files hold the same bytes; hard links of one file do, and are not read."""
+    """Return whether two files hold the same bytes; hard links of one file do, and are not read."""
     if one.samefile(other):
         return True
     if one.stat().st_size != other.stat().st_size:

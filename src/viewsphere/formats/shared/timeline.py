@@ -89,12 +89,12 @@ class Timeline:
             index = row.first + row.count
 
     def is_first(self, sample: Sample) -> bool:
-        """Whether no earlier instant of the sequence has a sample of the same sensor in the data set."""
+        """Return whether no earlier instant of the sequence has a sample of the same sensor in the data set."""
         course = self.course(sample)
         return not any(map(self.has, range(sample.index - course.each, course.first - 1, -course.each)))
 
     def has(self, index: int) -> bool:
-        """Whether a sample is there: finished, and chosen."""
+        """Return whether a sample is there: finished, and chosen."""
         place = bisect_right(self._there, index, key=lambda span: span[0]) - 1
         return place >= 0 and index < self._there[place][1]
 

@@ -93,7 +93,7 @@ def seen(sample: Sample) -> Iterator[tuple[ObjectAnnotation, tuple[int, int, int
 
 
 def moves(o: ObjectAnnotation) -> bool:
-    """Whether an object moves in the world."""
+    """Return whether an object moves in the world."""
     speeds = (o.velocity, o.angular_velocity)
     return any(speed is not None and float(np.abs(speed).max()) > STILL for speed in speeds)
 

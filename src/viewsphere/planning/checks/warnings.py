@@ -171,7 +171,7 @@ def _offset(views: Poses, index: int) -> Float:
 
 
 def _misses(targets: Float, offset: Float, widest: float) -> bool:
-    """Whether the origin is out of a picture that looks at one of the targets (N, 3) from this offset (3,) to it."""
+    """Return whether the origin is out of a picture that looks at one of the targets (N, 3) from this offset (3,) to it."""
     distance = float(np.linalg.norm(offset))
     along = targets @ (offset / distance)
     beside = np.linalg.norm(targets - along[:, None] * (offset / distance), axis=1)

@@ -108,7 +108,7 @@ def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
 
 
 def _is_slow(recipe: Recipe) -> bool:
-    """Whether where things are placed is not asked before frames are rendered."""
+    """Return whether where things are placed is not asked before frames are rendered."""
     company, scenes = recipe.scene.company, recipe.scenes
     layout = company.layout if company is not None else scenes.layout if isinstance(scenes, ScenesEntry) else None
     return layout is not None and is_slow(layout)

@@ -42,7 +42,7 @@ _SETTINGS = ("jpeg", "seed", "motion_angle_deg", "focus")
 
 
 def has_effects(effects: Effects) -> bool:
-    """Whether `apply_effects` would change anything."""
+    """Return whether `apply_effects` would change anything."""
     return any(getattr(effects, name) for name in Effects.model_fields if name not in _SETTINGS)
 
 

@@ -45,7 +45,7 @@ def ground_stamps(ground: Ground) -> tuple[Stamp, ...]:
 
 
 def only_scatters(ground: Ground) -> bool:
-    """Whether the ground mirrors nothing, and no picture says what it is made of."""
+    """Return whether the ground mirrors nothing, and no picture says what it is made of."""
     pictured = ground.material is not None or any(getattr(ground, name) for name in IMAGES)
     return ground.roughness == 1 and ground.metallic == 0 and not pictured
 

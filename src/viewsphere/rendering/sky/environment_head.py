@@ -49,7 +49,7 @@ class HdrHead:
 
     @property
     def is_upright(self) -> bool:
-        """Whether the file's scan lines are rows of the picture, not columns."""
+        """Return whether the file's scan lines are rows of the picture, not columns."""
         return self.first[1:] == b"Y"
 
 

@@ -92,7 +92,7 @@ class Queue:
 
     @property
     def is_done(self) -> bool:
-        """Whether there is surely none to be handed out."""
+        """Return whether there is surely none to be handed out."""
         return not self._left and not self._back and not self._again
 
     @property

@@ -210,7 +210,7 @@ class _Hand:
 
     @property
     def is_idle(self) -> bool:
-        """Whether it has started, and does nothing."""
+        """Return whether it has started, and does nothing."""
         return self.job is None and self.is_ready
 
     def give(self, job: Job) -> None:

@@ -24,19 +24,19 @@ class Place(Protocol):
         ...
 
     def is_foreign(self) -> bool:
-        """Whether there are files which no store has, though nothing tells of a store."""
+        """Return whether there are files which no store has, though nothing tells of a store."""
         ...
 
     def is_begun(self) -> bool:
-        """Whether any shot is there, or another run is at work."""
+        """Return whether any shot is there, or another run is at work."""
         ...
 
     def is_shared(self) -> bool:
-        """Whether other processes find there what this one writes."""
+        """Return whether other processes find there what this one writes."""
         ...
 
     def others_at_work(self) -> bool:
-        """Whether another run is at work; False where nothing is known of others."""
+        """Return whether another run is at work; False where nothing is known of others."""
         ...
 
     def occupied(self) -> AbstractContextManager[Path]:

@@ -144,5 +144,5 @@ def _metres(data: bytes) -> NDArray[np.float32]:
 
 
 def _is_own_png(data: bytes, components: int) -> bool:
-    """Whether the bytes are a PNG of 8-bit RGB or RGBA, as this package writes pictures (PNG specification, 11.2.1)."""
+    """Return whether the bytes are a PNG of 8-bit RGB or RGBA, as this package writes pictures (PNG specification, 11.2.1)."""
     return data[:8] == b"\x89PNG\r\n\x1a\n" and data[24:26] == (b"\x08\x06" if components == 4 else b"\x08\x02")

@@ -21,15 +21,15 @@ class Choice:
 
     @property
     def is_some(self) -> bool:
-        """Whether the choice leaves anything out."""
+        """Return whether the choice leaves anything out."""
         return bool(self.models or self.frames)
 
     def has_model(self, key: str) -> bool:
-        """Whether the choice includes frames of this model."""
+        """Return whether the choice includes frames of this model."""
         return not self.models or any(fnmatchcase(key, pattern) for pattern in self.models)
 
     def may_have(self, beginning: str) -> bool:
-        """Whether a pattern may fit keys that begin so."""
+        """Return whether a pattern may fit keys that begin so."""
         literal = (re.split(r"[*?[]", pattern, maxsplit=1)[0] for pattern in self.models)
         return any(text.startswith(beginning) or beginning.startswith(text) for text in literal)
 

@@ -284,13 +284,15 @@ class Dataset(Shown, Sequence[Sample]):
         return [place for place, sample in shown if any(self._is_chosen(o, model) for o in sample.objects)]
 
     def _is_chosen(self, shown: ObjectAnnotation, model: str | None) -> bool:
-        """Whether an object makes its frame a chosen one: if the frame's model is known, only an object of this model can."""
+        """Return whether an object makes its frame a chosen one: if the frame's model is known, only an object of this model
+        can.
+        """
         if model is None:
             return self.choice.has_model(shown.key) or self.choice.has_model(shown.track)
         return shown.track == model and self.choice.has_model(shown.key)
 
     def _has_chosen_step(self, model: str) -> bool:
-        """Whether the choice names a time step of a model."""
+        """Return whether the choice names a time step of a model."""
         if not self.choice.may_have(step_key(model, 0).rstrip("0")):
             return False
         info = self._info(model)

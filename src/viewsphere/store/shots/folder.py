@@ -278,7 +278,7 @@ class Store:
         return self.folder / "models" / key
 
     def has_shot(self, key: str) -> bool:
-        """Whether this shot is finished: its manifest, written last, is there."""
+        """Return whether this shot is finished: its manifest, written last, is there."""
         return (self.shot_folder(key) / MANIFEST).is_file()
 
     @contextmanager

@@ -201,7 +201,7 @@ class Part:
 
     @property
     def is_product(self) -> bool:
-        """Whether the part's samples show known models at known poses."""
+        """Return whether the part's samples show known models at known poses."""
         return self.sampler == PRODUCT and bool(self.blocks)
 
     @property
@@ -211,7 +211,7 @@ class Part:
 
     @property
     def is_sampled(self) -> bool:
-        """Whether a recipe made it: its subjects, models or scenes, are taken from known poses."""
+        """Return whether a recipe made it: its subjects, models or scenes, are taken from known poses."""
         return self.sampler != IMPORT and bool(self.blocks)
 
     def checked(self) -> Part:

@@ -172,7 +172,7 @@ class ShotRecords:
         return self.shot.kept(self._samples[place][2])
 
     def keeps(self, place: int, channel: str) -> bool:
-        """Whether a channel, that may have been added later, is one of the sample's sensor."""
+        """Return whether a channel, that may have been added later, is one of the sample's sensor."""
         own = self.shot.rig.sensors[self._samples[place][2]].channels
         return own is None or channel in own
 

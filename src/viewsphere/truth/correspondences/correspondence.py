@@ -96,7 +96,9 @@ class Match:
 
     @cached_property
     def state(self) -> NDArray[np.uint8]:
-        """Whether the points are seen there, (H, W) uint8, as `truth.point_raster` says; `states` does several at once."""
+        """Return whether the points are seen there, (H, W) uint8, as `truth.point_raster` says; `states` does several at
+        once.
+        """
         return states([self.placed])[0]
 
     @cached_property

@@ -154,7 +154,7 @@ class Geometry:
 
     @property
     def has_scenery(self) -> bool:
-        """Whether anything but objects and the ground is there."""
+        """Return whether anything but objects and the ground is there."""
         return self.object_count < len(self.vertex_start) - 1
 
     def extent(self, things: int | None = None) -> tuple[Corner, Corner]:

@@ -81,7 +81,7 @@ def instances(seen, objects, ids, area, box):
 
 @inner
 def _goes_on(ids, y, x, own):
-    """Whether the next AHEAD pixels of row y, from x on, show object `own`, too."""
+    """Return whether the next AHEAD pixels of row y, from x on, show object `own`, too."""
     different = np.int32(0)
     for k in range(np.uintp(AHEAD)):
         different |= ids[y, x + k] ^ own

@@ -61,7 +61,7 @@ def cells(q, samples, x0, y0, width, height, cell):
 
 @inner
 def is_surface(cutouts, row, b0, b1, b2):
-    """Whether the point with these barycentrics of cut-out triangle `row` is surface; `cutouts` is `Cutouts.arrays`."""
+    """Return whether the point with these barycentrics of cut-out triangle `row` is surface; `cutouts` is `Cutouts.arrays`."""
     texels, layout, levels, material, corners = cutouts
     c = corners[row]
     m = layout[material[row]]
@@ -173,7 +173,9 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
 
 @inner
 def hidden(nearest, xa, ya, xb, yb, most):
-    """Whether all pixels of a narrow box, and the pixels drawn together with them, show something nearer than 1/z = most."""
+    """Return whether all pixels of a narrow box, and the pixels drawn together with them, show something nearer than 1/z =
+    most.
+    """
     width = nearest.shape[1]
     left, right, is_wide = _fours(xa, xb, width)
     for y in range(ya, yb + 1):
@@ -274,6 +276,6 @@ def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, cutouts, nearest, 
 
 @inner
 def hits_surface(cutouts, cutout, e0, e1, e2):
-    """Whether the triangle is surface where its edge functions have these values: everywhere without a cut-out."""
+    """Return whether the triangle is surface where its edge functions have these values: everywhere without a cut-out."""
     total = e0 + e1 + e2
     return cutout < 0 or (total != 0.0 and is_surface(cutouts, cutout, e0 / total, e1 / total, e2 / total))

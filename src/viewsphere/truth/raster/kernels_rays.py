@@ -102,7 +102,7 @@ def _cell(u, size):
 
 @njit
 def pixel_box(cells, q0, q1, q2):
-    """Whether the triangle is small and on one face, and if so the box of pixels that may see it."""
+    """Return whether the triangle is small and on one face, and if so the box of pixels that may see it."""
     count, size = cells.shape[:2]
     ax, ay, az = abs(q0[0]), abs(q0[1]), abs(q0[2])
     axis = 0 if az >= ax and az >= ay else 1 if ax >= ay else 2
@@ -141,7 +141,7 @@ def _lowest(e, box):
 
 @inner
 def _may_hit(e0, e1, e2, sliver, box):
-    """Whether some ray in the box may pass the test of all three edges; for a sliver also with the other sign."""
+    """Return whether some ray in the box may pass the test of all three edges; for a sliver also with the other sign."""
     if box[0] > box[3]:
         return False
     if _highest(e0, box) >= 0.0 and _highest(e1, box) >= 0.0 and _highest(e2, box) >= 0.0:
@@ -163,7 +163,7 @@ def _bounds(q0, q1, q2, unit):
 
 @njit
 def limits(q0, q1, q2, det, unit):
-    """Whether the triangle's facing is uncertain, and the bounds that 1/s must stay within."""
+    """Return whether the triangle's facing is uncertain, and the bounds that 1/s must stay within."""
     sizes = _distance(q0, ORIGIN) * _distance(q1, ORIGIN) * _distance(q2, ORIGIN)
     sliver = abs(det) < SLIVER * sizes
     return sliver, _bounds(q0, q1, q2, unit) if sliver else ANY_DEPTH

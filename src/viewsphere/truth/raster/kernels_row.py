@@ -29,7 +29,7 @@ def _from(context: Any, builder: Any, kind: Any, array: Any, at: Any, lanes: Any
 
 @intrinsic
 def shows_farther(typing: Any, nearest: Any, at: Any, most: Any) -> Any:
-    """Whether one of the samples from flat index `at` on is farther than 1/z = `most`."""
+    """Return whether one of the samples from flat index `at` on is farther than 1/z = `most`."""
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data, at, most = arguments

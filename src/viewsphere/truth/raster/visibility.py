@@ -127,8 +127,8 @@ def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> V
 
 
 def is_edge_on(geometry: Geometry, camera: Camera) -> bool:
-    """Whether the camera stands in the plane of the ground, as far as rounding can tell: what rays meet of the ground, if
-    anything, is then the camera's own centre.
+    """Return whether the camera stands in the plane of the ground, as far as rounding can tell: what rays meet of the ground,
+    if anything, is then the camera's own centre.
     """
     center = camera.center
     if geometry.ground_z is None:

@@ -161,7 +161,7 @@ class Tracked:
 
     @cached_property
     def state(self) -> NDArray[np.uint8]:
-        """Whether they are seen, (N,) uint8, see `truth.point_raster`; `states` does several at once."""
+        """Return whether they are seen, (N,) uint8, see `truth.point_raster`; `states` does several at once."""
         return states([self.placed])[0]
 
     @cached_property
@@ -189,7 +189,7 @@ class Tracked:
 
     @property
     def _has_ground(self) -> bool:
-        """Whether the ground is where the points found it."""
+        """Return whether the ground is where the points found it."""
         return self.points.ground_z is not None and self.points.ground_z == self.view.geometry.ground_z
 
     @cached_property

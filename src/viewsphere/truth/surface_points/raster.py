@@ -55,7 +55,7 @@ class Placed:
 
 
 def in_lens(xy: Float) -> NDArray[np.bool_]:
-    """Whether the lens has pixels for points: their pixels (..., 2) as `Placed` has them."""
+    """Return whether the lens has pixels for points: their pixels (..., 2) as `Placed` has them."""
     return ~np.isnan(xy[..., 0])
 
 

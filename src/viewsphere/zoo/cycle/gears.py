@@ -34,7 +34,7 @@ class Gears:
 
     @property
     def derailleur(self) -> bool:
-        """Whether the chain can change cogs."""
+        """Return whether the chain can change cogs."""
         return len(self.cogs) > 1
 
 

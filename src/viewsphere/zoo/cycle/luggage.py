@@ -174,7 +174,7 @@ def frame_bag(at: Layout, coats: Coats) -> list[Piece]:
 
 
 def _ccw(outline: Float) -> bool:
-    """Whether a ring in (y, z) runs counter-clockwise seen from +x."""
+    """Return whether a ring in (y, z) runs counter-clockwise seen from +x."""
     y, z = outline[:, 1], outline[:, 2]
     return float(np.sum(y * np.roll(z, -1) - np.roll(y, -1) * z)) > 0
 

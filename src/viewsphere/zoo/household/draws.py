@@ -21,7 +21,7 @@ def uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def chance(rng: np.random.Generator, share: float) -> bool:
-    """Whether something happens that does in this share of all draws."""
+    """Return whether something happens that does in this share of all draws."""
     return bool(rng.random() < share)
 
 

@@ -95,7 +95,7 @@ def across(turn_deg: float) -> Side:
 
 
 def overlap(a: Rectangle, b: Rectangle, gap: float = 0.0) -> bool:
-    """Whether two rectangles are nearer than `gap`, or in one another."""
+    """Return whether two rectangles are nearer than `gap`, or in one another."""
     return a[0] < b[2] + gap and b[0] < a[2] + gap and a[1] < b[3] + gap and b[1] < a[3] + gap
 
 
@@ -286,7 +286,9 @@ class Furnishing:
         return own[0] > x0 + 0.005 and own[1] > y0 + 0.005 and own[2] < x1 - 0.005 and own[3] < y1 - 0.005
 
     def _is_free(self, made: Stand, around: Stand | None = None) -> bool:
-        """Whether there is room for a member, off doors, windows and what stands there, but for what it stands `around`."""
+        """Return whether there is room for a member, off doors, windows and what stands there, but for what it stands
+        `around`.
+        """
         own = made.rectangle
         if not self._inside(own) or any(overlap(own, other) for other in self._doors() + self._windows(made.size[2])):
             return False

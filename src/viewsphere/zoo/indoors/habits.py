@@ -20,7 +20,7 @@ def furnished(room: Room, rng: np.random.Generator) -> Furnishing:
 
 
 def _style(*styles: str, width: float = math.inf, depth: float = math.inf, height: float = math.inf) -> Fits:
-    """Whether a member is of one of these styles (any, without one), and no wider, deeper or higher than that."""
+    """Return whether a member is of one of these styles (any, without one), and no wider, deeper or higher than that."""
 
     def fits(p: Any) -> bool:
         own = extent(p)
@@ -30,12 +30,12 @@ def _style(*styles: str, width: float = math.inf, depth: float = math.inf, heigh
 
 
 def _is_shut(p: Any) -> bool:
-    """Whether no door stands open."""
+    """Return whether no door stands open."""
     return p.ajar == 0
 
 
 def _seat(*kinds: str) -> Fits:
-    """Whether a chair is one of these kinds."""
+    """Return whether a chair is one of these kinds."""
     return lambda p: type(p).__name__ in kinds
 
 

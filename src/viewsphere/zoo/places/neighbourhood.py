@@ -257,7 +257,7 @@ def _trees(p: Neighbourhood, plots: Sequence[Plot], rng: np.random.Generator) ->
 
 
 def _grows(p: Neighbourhood, q: Plot, others: Sequence[_Stand], x: float, y: float, r: float, radius: dict[int, float]) -> bool:
-    """Whether a tree of this radius has room: off the paving, clear of the house, of other trees and of the origin."""
+    """Return whether a tree of this radius has room: off the paving, clear of the house, of other trees and of the origin."""
     apart = all(np.hypot(q.side * x - o.x, y - o.y) > r + radius[o.seed] + 0.6 for o in others)
     off = abs(y - q.driveway) > 2.2 and abs(y - q.door) > 1.3
     return bool(apart and off and x + r < q.front - 1.2 and x - r > GARDEN - 0.6 and np.hypot(x, y) - r > p.clear)

@@ -35,7 +35,7 @@ def table_top(seed: int = 0) -> Place:
 
 
 def _is_wanted(stand: Stand, room: Room) -> bool:
-    """Whether it is a table that is large enough, and free on all sides."""
+    """Return whether it is a table that is large enough, and free on all sides."""
     x0, y0, x1, y1 = stand.rectangle
     apart = min(x0 - room.low[0], y0 - room.low[1], room.high[0] - x1, room.high[1] - y1)
     return stand.family == "table" and stand.size[0] >= LEAST[0] and stand.size[1] >= LEAST[1] and apart >= AROUND

@@ -21,7 +21,7 @@ class Field:
         return ModelError(f"{self.where}: expected {expected}, found {found if len(found) < 60 else found[:57] + '...'}")
 
     def __contains__(self, key: str) -> bool:
-        """Whether this object has the key."""
+        """Return whether this object has the key."""
         return key in self.mapping()
 
     def mapping(self) -> dict[str, Any]:

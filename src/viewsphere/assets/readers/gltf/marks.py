@@ -27,7 +27,7 @@ def read_marks(document: Document, worlds: Mapping[int, Float], parts: Mapping[i
 
 
 def is_line(document: Document, node: Field) -> bool:
-    """Whether a node is a lane that is drawn by lines alone, which nobody shall see."""
+    """Return whether a node is a lane that is drawn by lines alone, which nobody shall see."""
     if kind_of(node.text("name"), _said(node).get(PROPERTY)) != LANE or "mesh" not in node:
         return False
     primitives = document.root.at("meshes", node.integer("mesh")).items("primitives")

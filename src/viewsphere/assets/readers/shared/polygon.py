@@ -109,7 +109,9 @@ class _Ring:
                 self._reflex.setdefault(self._place(points[i]), set()).add(i)
 
     def is_ear(self, i: int) -> bool:
-        """Whether a corner is convex and no other lies in the triangle of it and its neighbours; or it lies on a neighbour."""
+        """Return whether a corner is convex and no other lies in the triangle of it and its neighbours; or it lies on a
+        neighbour.
+        """
         a, b, c = (self.points[k] for k in (self.before[i], i, self.after[i]))
         if b in (a, c):
             return True
@@ -155,5 +157,5 @@ def _turn(a: Point, b: Point, c: Point) -> float:
 
 
 def _holds(a: Point, b: Point, c: Point, p: Point) -> bool:
-    """Whether a triangle, its edges too, holds a point that is none of its corners."""
+    """Return whether a triangle, its edges too, holds a point that is none of its corners."""
     return p not in (a, b, c) and _turn(a, b, p) >= 0 and _turn(b, c, p) >= 0 and _turn(c, a, p) >= 0

@@ -58,7 +58,9 @@ class Footprint:
     half: Float
 
     def apart(self, other: Footprint, gap: float) -> bool:
-        """Whether a side of one of the two separates them by at least `gap`: then nothing of them is nearer than that."""
+        """Return whether a side of one of the two separates them by at least `gap`: then nothing of them is nearer than
+        that.
+        """
         one, two = self.sides, other.sides
         (dx, dy), reach = (two.x - one.x, two.y - one.y), one.radius + two.radius + gap
         if dx * dx + dy * dy >= FAR * reach * reach:
@@ -85,7 +87,7 @@ class Footprint:
         return Circle(self.sides.x, self.sides.y, self.sides.radius, min(self.sides.half), math.sqrt(FAR))
 
     def contains(self, other: Footprint | Outline) -> bool:
-        """Whether all of the other lies in this one."""
+        """Return whether all of the other lies in this one."""
         return bool((np.abs((other.corners - self.center) @ self.axes.T) <= self.half + 1e-9).all())
 
     @property
@@ -102,7 +104,9 @@ class Outline:
     corners: Float
 
     def apart(self, other: Outline, gap: float) -> bool:
-        """Whether a side of one of the two separates them by at least `gap`: then nothing of them is nearer than that."""
+        """Return whether a side of one of the two separates them by at least `gap`: then nothing of them is nearer than
+        that.
+        """
         for polygon in (self, other):
             a, b = self.corners @ polygon.axes.T, other.corners @ polygon.axes.T
             between = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))

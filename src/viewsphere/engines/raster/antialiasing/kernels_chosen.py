@@ -110,7 +110,7 @@ def compare_bent(bent, radiance, marks):
 
 @inner
 def _is_step(radiance, p, q, least):
-    """Whether two pixels' colours or alphas differ by more than this share of the greater."""
+    """Return whether two pixels' colours or alphas differ by more than this share of the greater."""
     differs = False
     for c in range(U(4)):
         one, other = radiance[p, c], radiance[q, c]
@@ -120,7 +120,7 @@ def _is_step(radiance, p, q, least):
 
 @inner
 def _passes(t, s, depth, other, owner, normals):
-    """Whether two pixels pass for the same surface, as in `_differ`."""
+    """Return whether two pixels pass for the same surface, as in `_differ`."""
     if t == s or t < 0 or s < 0:
         return t == s
     a, b, c, t, s = U(0), U(1), U(2), U(t), U(s)

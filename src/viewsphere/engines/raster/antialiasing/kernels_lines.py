@@ -106,7 +106,7 @@ def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
 
 @inner
 def _is_flush(inverse, px, py, t, q, triangles):
-    """Whether 1/z `inverse` at (px, py) lies at most a little behind triangle t's plane."""
+    """Return whether 1/z `inverse` at (px, py) lies at most a little behind triangle t's plane."""
     i0, i1, i2 = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     nx, ny, nz, det = plane((q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2]))
     return det != 0.0 and inverse >= (1.0 - FLUSH) * (nx * px + (ny * py + nz)) / det

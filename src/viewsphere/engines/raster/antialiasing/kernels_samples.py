@@ -218,7 +218,7 @@ def _open_tiles(farthest, blocks, box, edges, most, found):
 
 @inner
 def _is_outside(e, x, y):
-    """Whether all of the tile that begins at (x, y) is outside of an edge."""
+    """Return whether all of the tile that begins at (x, y) is outside of an edge."""
     return max(e[0] * x, e[0] * (x + TILE)) + (max(e[1] * y, e[1] * (y + TILE)) + e[2]) < 0.0
 
 
@@ -299,7 +299,9 @@ def _draw_solid(surface, edges, found, count, points, solid):
 
 @inner
 def _is_before(inverse, t, old, seen):
-    """Whether triangle t is seen instead of triangle `seen`: truth, which draws in order, decides so by `NEARER` alone."""
+    """Return whether triangle t is seen instead of triangle `seen`: truth, which draws in order, decides so by `NEARER`
+    alone.
+    """
     return (inverse > old * NEARER) | ((t < seen) & (inverse * NEARER >= old))
 
 
@@ -364,7 +366,7 @@ def _insert(t, inverse, p, triangles, fragments):
 
 @inner
 def _share_edge(q, triangles, s, t):
-    """Whether two corners of triangle s are where corners of t are."""
+    """Return whether two corners of triangle s are where corners of t are."""
     same = 0
     for i in range(3):
         for j in range(3):
@@ -410,7 +412,7 @@ def draw_rays(q, order, triangles, cutout, cutouts, see_through, unit, table, po
 
 @inner
 def _is_empty(points, box):
-    """Whether no pixel of a box of rays is chosen."""
+    """Return whether no pixel of a box of rays is chosen."""
     grid, pixels, side = points
     xa, ya, xb, yb = box
     empty = True

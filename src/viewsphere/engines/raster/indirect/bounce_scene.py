@@ -150,7 +150,9 @@ class _Roof:
 
 @lru_cache(maxsize=4)
 def _is_roofed(roof: _Roof) -> bool:
-    """Whether most places within a scenery have the underside of something above them; within a solid thing there is none."""
+    """Return whether most places within a scenery have the underside of something above them; within a solid thing there is
+    none.
+    """
     # A tree of what is above is small: of a street nearly nothing is.
     low, high, above, eyes = roof.low, roof.high, roof.above.pop(), _eyes(roof.low, roof.high)
     at = (np.arange(LATTICE) + 0.5) / LATTICE

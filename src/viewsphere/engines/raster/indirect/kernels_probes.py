@@ -129,7 +129,7 @@ def patch(met, far, origins, directions, turn, normals, materials, box, cells, g
 
 @inner
 def _sight(tree, lights, k, which, p, n, stack):
-    """Whether light k reaches a place: 1 or 0. which: a number that says which part of a rectangle is looked at, its
+    """Return whether light k reaches a place: 1 or 0. which: a number that says which part of a rectangle is looked at, its
     middle if negative.
     """
     if lights.kind[k] == DISTANT:

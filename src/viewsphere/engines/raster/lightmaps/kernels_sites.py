@@ -111,7 +111,7 @@ def settle(corners, normals, parts, shares, low, cells, keys, sites, sums, best,
 
 @inner
 def _is_round(vertex, normal):
-    """Whether a triangle of this normal is shaded by this vertex' normal."""
+    """Return whether a triangle of this normal is shaded by this vertex' normal."""
     along = vertex[0] * normal[0] + vertex[1] * normal[1] + vertex[2] * normal[2]
     size = vertex[0] * vertex[0] + vertex[1] * vertex[1] + vertex[2] * vertex[2]
     return size > f4(0.5) and size < f4(2) and along > f4(STRAIGHT)

@@ -91,7 +91,7 @@ def _nodes(boxes: Float, cells: float) -> tuple[NDArray[np.int64], NDArray[np.in
 
 
 def has_planes(corners: Float32, unit: float) -> bool:
-    """Whether any of these triangles (T, 3, 3) lie in a plane that is wide enough for a chart."""
+    """Return whether any of these triangles (T, 3, 3) lie in a plane that is wide enough for a chart."""
     return next(_planes(corners.astype(np.float64), unit), None) is not None
 
 

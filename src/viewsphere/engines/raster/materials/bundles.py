@@ -142,7 +142,7 @@ class BundlePacker:
 
 
 def _is_idle(material: Material, name: str) -> bool:
-    """Whether the material's own factor is 0, so that the texture changes nothing."""
+    """Return whether the material's own factor is 0, so that the texture changes nothing."""
     return {
         "occlusion_texture": material.occlusion_strength == 0,
         "normal_texture": material.normal_scale == 0,

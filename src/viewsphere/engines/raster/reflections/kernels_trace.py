@@ -348,7 +348,7 @@ def cast(tree, origins, directions, turn, limit, met, far):
 
 @njit(_nrt=True)
 def unblocked(tree, origins, ways, clear):
-    """Whether nothing lies between each origin (N, 3) and origin + way (N, 3): 1 or 0, into clear (N,) float32."""
+    """Return whether nothing lies between each origin (N, 3) and origin + way (N, 3): 1 or 0, into clear (N,) float32."""
     stack = np.empty((DEEP, 2), np.float32)
     for i in range(U(origins.shape[0])):
         o = origins[i, U(0)], origins[i, U(1)], origins[i, U(2)]

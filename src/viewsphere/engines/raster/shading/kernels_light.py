@@ -51,7 +51,7 @@ _blend2, _blend4 = blend(2), blend(4)
 
 @inner(fastmath=FAST)
 def _any(count, row, b):
-    """Whether a row has anything above 0. The loop counts, since the compiler vectorises a count."""
+    """Return whether a row has anything above 0. The loop counts, since the compiler vectorises a count."""
     found = 0
     for i in range(count):
         found += 1 if b[row + i] > f4(0) else 0

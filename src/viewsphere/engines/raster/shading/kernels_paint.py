@@ -235,7 +235,9 @@ def catch(view, floor, surrounding, lights, occlusion, slots, triangle, depth, r
 
 @inner
 def _alike(t, s, depth, other, owner, normals):
-    """Whether two places look alike: same owner, planes less than 10 degrees apart, depths (1/z) less than 0.5 % apart."""
+    """Return whether two places look alike: same owner, planes less than 10 degrees apart, depths (1/z) less than 0.5 %
+    apart.
+    """
     if t == s or t < 0 or s < 0:
         return t == s
     a, b, c, t, s = U(0), U(1), U(2), U(t), U(s)

@@ -68,7 +68,7 @@ class Baked:
 
     @property
     def catches(self) -> bool:
-        """Whether the ground is a shadow catcher."""
+        """Return whether the ground is a shadow catcher."""
         return bool(self.floor[4] == 2)
 
 

@@ -115,7 +115,9 @@ def _bound(count, b):
 
 @inner
 def _is_beyond(box, reach, is_ground):
-    """Whether a block's box is outside of a reach (6,): lowest and highest x, y, z. The ground is in reach at any depth."""
+    """Return whether a block's box is outside of a reach (6,): lowest and highest x, y, z. The ground is in reach at any
+    depth.
+    """
     (x0, x1), (y0, y1), (z0, z1) = box
     is_beside = x1 < reach[0] or x0 > reach[1] or y1 < reach[2] or y0 > reach[3]
     return is_beside or (not is_ground and (z1 < reach[4] or z0 > reach[5]))

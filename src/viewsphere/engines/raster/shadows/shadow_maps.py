@@ -224,8 +224,8 @@ def _views(source: _Source, points: Float, casters: Casters, size: int) -> Views
 
 
 def _is_in_bulb(views: Sequence[ShadowView], drawn: Views, radius: float) -> bool:
-    """Whether most of what is seen in these views lies within the ball that shines: a bulb, which would hide all of its light.
-    A table top that cuts through the ball hides half of it at most.
+    """Return whether most of what is seen in these views lies within the ball that shines: a bulb, which would hide all of
+    its light. A table top that cuts through the ball hides half of it at most.
     """
     within, count = 0, 0
     for i, view in enumerate(views):
@@ -236,7 +236,7 @@ def _is_in_bulb(views: Sequence[ShadowView], drawn: Views, radius: float) -> boo
 
 
 def _is_shut_in(views: Sequence[ShadowView], drawn: Views, has_ground: bool) -> bool:
-    """Whether all that is seen in these views ends at a target, or on the ground."""
+    """Return whether all that is seen in these views ends at a target, or on the ground."""
     for i, view in enumerate(views):
         right, up, ahead = view.matrix[0, 2] / view.texels, view.matrix[1, 2] / view.texels, view.matrix[3, 2]
         place = (np.arange(view.size) + 0.5 - view.size / 2) / view.texels

@@ -22,7 +22,7 @@ class Moving:
 
     @property
     def is_still(self) -> bool:
-        """Whether the thing stands at one place all the time, and shows no time step."""
+        """Return whether the thing stands at one place all the time, and shows no time step."""
         return not self._goes and not self._plays and self._first_step is None
 
     def at(self, instant: int) -> Motion:
@@ -41,17 +41,17 @@ class Moving:
 
     @property
     def plays_file(self) -> bool:
-        """Whether the thing shows time steps of its model's file."""
+        """Return whether the thing shows time steps of its model's file."""
         return self.mover.start.timeline is not None
 
     @cached_property
     def _goes(self) -> bool:
-        """Whether it is not at one place all the time."""
+        """Return whether it is not at one place all the time."""
         return _differ(map(self._pose, _here_and_there(self.time.count)))
 
     @cached_property
     def _plays(self) -> bool:
-        """Whether it shows several time steps."""
+        """Return whether it shows several time steps."""
         return self.plays_file and _differ(filter(None, map(self._shown, _here_and_there(self.time.count))))
 
     @cached_property

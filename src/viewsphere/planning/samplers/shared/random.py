@@ -239,7 +239,7 @@ def scene_views(stock: Stock, subject: str) -> Sequence[int]:
 
 
 def are_views_drawn(stock: Stock) -> bool:
-    """Whether scenes are taken from some of the viewpoints each, rather than from all."""
+    """Return whether scenes are taken from some of the viewpoints each, rather than from all."""
     count = scenes_entry(stock.recipe).views
     return count is not None and count < len(stock.views)
 
