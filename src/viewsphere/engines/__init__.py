@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Stage(Protocol):
-    """What an engine built for a shot and keeps warm while time and camera move; instants and sensors count from 0."""
+    """The scene that an engine builds for a shot and reuses while time and camera move; instants and sensors count from 0."""
 
     def at(self, instant: int) -> Geometry:
         """The world-space triangles at an instant."""

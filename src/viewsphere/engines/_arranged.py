@@ -1,4 +1,4 @@
-"""What the stages of all engines have in common: a shot's things, meshes and triangles at each instant."""
+"""The parts that the stages of all engines share: a shot's things, meshes and triangles at each instant."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ STEPS = 16
 
 @dataclass(frozen=True, eq=False)
 class Arranged:
-    """All things of a shot as they stand at an instant. meshes[i] is that of things[i], without triangles if that is not there;
-    `whole` has the triangles of those, too. `geometry` is another object where anything is elsewhere, and only then.
+    """All things of a shot at an instant. meshes[i] is the mesh of things[i], without triangles if that thing is not there.
 
-    moving: which of the things are not still in the shot, or while its shutter is open; known: meshes that stand for `whole`
-    where much depends on a mesh: between two time steps the nearer one's; is_sequence: whether the shot is part of one, else
-    it has pictures that have nothing to do with one another.
+    `whole` has the triangles of absent things, too. `geometry` is a new object only if some thing is elsewhere.
+
+    moving: the things that move in the shot, or while its shutter is open. known: meshes that stand for `whole` where much
+    depends on a mesh; between two time steps, this is the nearer step's mesh. is_sequence: whether the shot is part of a
+    sequence; otherwise its pictures are unrelated.
     """
 
     things: tuple[Thing, ...]
@@ -48,7 +49,7 @@ class Arranged:
 
     @cached_property
     def targets(self) -> int:
-        """How many of the things, which come first, are not scenery."""
+        """The number of targets: the things that are not scenery, which come first."""
         return sum(not thing.scenery for thing in self.things)
 
     @property
@@ -57,13 +58,13 @@ class Arranged:
         return self.targets < len(self.things)
 
     def changed_since(self, before: Arranged) -> list[int]:
-        """Which of the same things are elsewhere, or deformed."""
+        """Return the indices of the same things that are elsewhere, or deformed."""
         return changed(before.things, before.whole, self.things, self.whole)
 
 
 @dataclass(frozen=True)
 class Look:
-    """What a mesh is of: a model at a time step, with its changes to materials."""
+    """The appearance of a mesh: a model at a time step, with its changes to materials."""
 
     model: ModelSpec
     step: TimeStep

@@ -1,4 +1,4 @@
-"""What shines at night: lamps of a place as spotlights, what glows already brighter, and some windows."""
+"""The lights of a night: lamps of a place as spotlights, brighter glowing surfaces, and some lit windows."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def lamplight(scene: Scene, things: Sequence[Thing], meshes: Sequence[Mesh], mid
 
 
 def _lenses(thing: Thing, mesh: Mesh) -> list[Float]:
-    """Where light begins below the lens of a thing, world metres; none where it has none, or is not there."""
+    """Return the places, in world metres, where light begins below a thing's lens; none if it has no lens or is not there."""
     if LENS not in mesh.parts or not thing.is_there:
         return []
     own = mesh.triangles[mesh.triangle_part == mesh.parts.index(LENS)]
@@ -108,7 +108,7 @@ def _with_windows(mesh: Mesh, thing: Thing, share: float) -> Mesh:
 
 
 def _are_lit(mesh: Mesh, own: NDArray[np.intp], thing: Thing, share: float) -> NDArray[np.bool_]:
-    """Which of these triangles (n,), window by window, are of lit ones: what is drawn follows from where the thing stands."""
+    """Return a mask of these triangles (n,), true on lit windows; the draw of each window follows from the thing's place."""
     middles = mesh.vertices[mesh.triangles[own]].mean(axis=1)
     step = np.linalg.norm(np.diff(middles, axis=0, prepend=middles[:1]), axis=1)
     window = np.cumsum(step > APART)

@@ -1,4 +1,4 @@
-"""How engines part a picture's light, so that albedo x shading + residual is all of it."""
+"""The split of a picture's light into passes, so that albedo x shading + residual is the whole light."""
 
 from __future__ import annotations
 

@@ -29,8 +29,10 @@ def check_script(script: str | None) -> None:
 
 
 def script_request(options: AnyOptions, shot: Shot, things: Sequence[Thing]) -> dict[str, Any] | None:
-    """What the worker is told of the script: its text, what the shot is, and what each of the staged things is, in the order of
-    the objects in the request of the scene; None without a script.
+    """Return the worker's request for the script, None without a script.
+
+    The request has the script's text, the shot's key and frames, and an entry for each staged thing. The entries are in the
+    order of the objects in the scene's request.
     """
     if options.script is None:
         return None

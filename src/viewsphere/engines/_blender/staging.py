@@ -183,7 +183,7 @@ class CyclesStage:
         return self.arrangements.at(instant).geometry
 
     def arrangement(self, instant: int) -> Arrangement:
-        """All things as they stand at an instant; the last answer is kept."""
+        """The arrangement of all things at an instant; the stage keeps the last one."""
         now = self.arrangements.at(instant)
         if now.geometry not in self._arranged:
             self._arranged.clear()
@@ -236,7 +236,7 @@ class CyclesStage:
         return rendered | {name: finished(rendered["picture"], background, finish, seen)}
 
     def _light(self, instant: int, sensor: int, visibility: Visibility, light: Float32) -> dict[str, Float32]:
-        """All `LIGHT_PASSES`, of the light that was rendered. Cycles counts a shadow catcher in the albedo: it is left out."""
+        """Return all `LIGHT_PASSES` of the rendered light, without shadow catchers, which Cycles counts in the albedo."""
         albedo, diffuse, residual, emission = np.split(light, 4, axis=-1)
         ground = self.shot.scene.ground
         if ground is not None:
@@ -323,7 +323,7 @@ class Arrangement:
 
     @property
     def named(self) -> str:
-        """What errors name: the .blend file that is the scene, else the models."""
+        """The name for error messages: the .blend file if it is the scene, else the models."""
         blend = self.shot.scene.blend
         return ", ".join(sorted({p.model.key for p in self.things})) if blend is None else blend.file
 

@@ -1,4 +1,4 @@
-"""What moves while the shutter is open, as Blender's worker is told it: Blender blurs the picture itself."""
+"""The motion while the shutter is open, as the request for Blender's worker: Blender blurs the picture itself."""
 
 from __future__ import annotations
 

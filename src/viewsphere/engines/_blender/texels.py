@@ -75,8 +75,10 @@ CONTENTS: Mapping[str, Content] = {
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """How finely a picture covers a surface. texels (T,): texels per metre of each triangle, along the direction with the
-    fewest, ascending; area (T,): square metres of the triangles up to this one.
+    """The density of a picture's texels on a surface.
+
+    texels (T,): texels per metre of each triangle, along the direction with the fewest, ascending; area (T,): square metres
+    of the triangles up to this one.
     """
 
     texels: Float
@@ -100,7 +102,7 @@ class Density:
         return cls(texels[order], np.cumsum(area[order]))
 
     def halvings(self, pixels: float) -> int:
-        """How often the picture may be halved where a metre covers so many pixels."""
+        """Return the number of times the picture may be halved where a metre covers `pixels` pixels."""
         if not len(self.texels) or not math.isfinite(pixels):
             return 0
         first = int(np.searchsorted(self.area * pixels**2, UNSEEN, side="right"))

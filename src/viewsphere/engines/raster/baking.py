@@ -1,4 +1,4 @@
-"""All that pictures of an instant are painted from, and what of it outlives the instant."""
+"""The data from which the engine paints pictures of an instant, and the part of the data that outlives the instant."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from viewsphere.truth.raster.geometry import Geometry, with_blended_colors
 
 @dataclass(frozen=True, eq=False)
 class Packed:
-    """What things are made of, as they are arranged. kind, owner, see_through, blended: see `Baked`; maps: of a sequence."""
+    """The materials and surfaces of arranged things. kind, owner, see_through, blended: see `Baked`; maps: of a sequence."""
 
     arranged: Arranged
     lengths: Lengths
@@ -71,7 +71,7 @@ class Packed:
 
 
 def pack(arranged: Arranged, ground: Ground | None, lengths: Lengths, materials: Materials | None = None) -> Packed:
-    """All of it anew but for the materials, if they are known."""
+    """Pack everything anew; materials are reused if you give them."""
     geometry, meshes = arranged.geometry, arranged.meshes
     if materials is None:
         materials = pack_materials(arranged.whole, ground, lengths, arranged.targets, arranged.things)
@@ -116,8 +116,9 @@ def sequence_lengths(meshes: Sequence[Mesh]) -> Lengths:
 
 
 def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, halls: Halls) -> Baked:
-    """What pictures of things are painted from, as they are arranged. `shades` keeps what targets of a sequence hide, `halls`
-    what throws light.
+    """Return the data from which the engine paints pictures of arranged things.
+
+    `shades` keeps the occlusion by targets of a sequence, `halls` the surfaces that throw light.
     """
     geometry, surfaces, lengths = packed.arranged.geometry, packed.surfaces, packed.lengths
     has_ground = scene.ground is not None

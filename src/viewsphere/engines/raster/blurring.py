@@ -52,8 +52,10 @@ class Blur:
         return self.arrangements.shot
 
     def count(self, geometry: Geometry, visibility: Visibility) -> int:
-        """How many pictures are averaged, 1 where nothing blurs: by the longest way of what the instant's own picture shows. It
-        depends on the instant alone, not on the shot that it is in.
+        """Return the number of pictures to average, 1 if nothing blurs.
+
+        The number follows from the longest motion of any point that the instant's own picture shows. It depends on the instant
+        alone, not on the shot around it.
         """
         if not self._shot.shutter or self._stands():
             return 1
@@ -110,8 +112,9 @@ class Blur:
         return [thing.world_from_object for thing in things]
 
     def _way(self, geometry: Geometry, visibility: Visibility, now: float, start: float, end: float) -> Float32:
-        """What the pixels show at one moment moves by this (H, W, 2), in pixels, from a second moment to a third; 0 where the
-        lens does not show it at both. Meshes that deform move as if they did not.
+        """Return the motion (H, W, 2), in pixels, of the points that the pixels show at the moment `now`, from `start` to `end`.
+
+        The motion is 0 where the lens does not show the point at both moments. Deforming meshes move as if they were rigid.
         """
         camera, poses = self._camera(now), self._poses(now)
         rays = pixel_rays(camera.intrinsics)

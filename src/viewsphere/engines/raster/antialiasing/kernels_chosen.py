@@ -1,9 +1,8 @@
-"""Which pixels are drawn again with several points each, and what is known of these pixels before; `kernels_samples` draws
-them.
+"""The choice of pixels to redraw with several points each, and their data so far; `kernels_samples` redraws them.
 
-Chosen pixels are numbered row by row. `grid` (H, W) int32 holds a chosen pixel's number, and for any other pixel ~k, where k is
-the number of the next chosen one, so that a triangle finds the pixels it may cover in a row at once; `pixels` ends with a
-sentinel.
+Chosen pixels are numbered row by row. `grid` (H, W) int32 holds the number of a chosen pixel. For any other pixel it holds
+~k, where k is the number of the next chosen pixel. So a triangle finds all pixels of a row that it may cover at once.
+`pixels` ends with a sentinel.
 """
 
 from __future__ import annotations
@@ -58,7 +57,7 @@ def compare(triangle, depth, owner, normals, room, owners, beside, above):
 
 @lanewise
 def _differ(reals: Rows, p: Any, q: Any, wholes: Rows, k: Any, m: Any, stride: Any, flags: Rows, at: Any) -> None:
-    """Where the pixels whose data `compare` has put at p and k show another surface than the pixels at q and m.
+    """Flag the pixels whose data `compare` has put at p and k, if they show another surface than the pixels at q and m.
 
     The surface is the same if owners are equal, and planes and depths differ by less than ALIKE and LEVEL allow.
     """

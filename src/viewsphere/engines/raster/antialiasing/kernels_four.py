@@ -20,7 +20,7 @@ _WHOLE = ir.IntType(32)
 def nearer(
     typing: Any, edges: Any, plane: Any, bounds: Any, x: Any, y: Any, offsets: Any, nearest: Any, row: Any, inverse: Any
 ) -> Any:
-    """Which samples of the pixel at (x, y) a triangle covers in front of nearest[row]: one bit for each sample.
+    """Return the samples of the pixel at (x, y) that a triangle covers in front of nearest[row], as one bit for each sample.
 
     edges: three times coefficients (a, b, c), a x + b y + c >= 0 inside; plane: coefficients of 1/z, which stays within
     `bounds`; offsets (2, 4) float64; inverse (4,) float32 is filled with 1/z at all samples.

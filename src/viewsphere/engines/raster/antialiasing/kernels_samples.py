@@ -178,7 +178,7 @@ def _draw_wide(surface, edges, checked, box, most, found, points, cutouts, trian
 
 @inner
 def _is_hidden(tiles, xa, ya, xb, yb, most):
-    """Whether, by the tiles' minima, no pixel of the box shows anything farther than `most`."""
+    """Return whether, by the tiles' minima, no pixel of the box shows anything farther than `most`."""
     for row in range(U(ya // TILE), U(yb // TILE + 1)):
         for column in range(U(xa // TILE), U(xb // TILE + 1)):
             if tiles[row, column] < most:

@@ -1,4 +1,4 @@
-"""Which things of a scene throw light at one another."""
+"""The choice of a scene's things that throw light at one another."""
 
 from __future__ import annotations
 
@@ -112,13 +112,13 @@ def _thrown(still: list[int], own: tuple[tuple[Thing, ...], tuple[Mesh, ...]], r
 
 
 def _corners(rows: Rows, i: int, which: NDArray[np.intp]) -> Float32:
-    """Where the corners of these triangles (n,) of thing i are, (n, 3, 3)."""
+    """Return the places of the corners of these triangles (n,) of thing i, (n, 3, 3)."""
     part = rows.part(i)
     return part.vertices[part.triangles[which], 11:14]
 
 
 def _above(rows: Rows, parts: list[tuple[int, NDArray[np.intp]]], height: np.float32) -> Float32:
-    """Those of them, in all parts, that reach higher, (n, 3, 3)."""
+    """Return the corners, (n, 3, 3), of those triangles of all parts that reach above the height."""
     every = (_corners(rows, *part) for part in parts)
     return np.concatenate([corners[corners[..., 2].max(axis=1) > height] for corners in every])
 
@@ -132,7 +132,7 @@ def _still(arranged: Arranged) -> list[int]:
 
 
 def _eyes(low: Float32, high: Float32) -> np.float32:
-    """How high one looks up from in a place between two corners."""
+    """Return the eye height from which a viewer looks up in a place between two corners."""
     return np.float32(low[2] + EYES * (high[2] - low[2]))
 
 

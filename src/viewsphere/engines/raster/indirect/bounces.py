@@ -129,15 +129,16 @@ class Hall:
 
     @cached_property
     def owns(self) -> NDArray[np.bool_]:
-        """Which of the surfaces' triangles are its own, (T,)."""
+        """A mask of the surfaces' triangles, (T,), true for the hall's own."""
         own = np.zeros(len(self.surfaces.material), np.bool_)
         own[self.which] = True
         return own
 
 
 class _Seen(NamedTuple):
-    """What depends on no light. volumes: finest first; below: rays of the ground's map; look, around: of the lightmap and of
-    the patches beside it.
+    """The parts of a bake that depend on no light.
+
+    volumes: finest first; below: rays of the ground's map; look: of the lightmap; around: of the patches beside the lightmap.
     """
 
     bounces: Bounces
@@ -274,8 +275,10 @@ def _baked(lighting: _Lighting) -> Bounces:
 
 
 def _further(first: Float32, second: Float32, third: Float32) -> Float32:
-    """What all further bounces add to patches, (M, 3), to which the last three added so much: any two of them add the same
-    share of what the two before did. Of single ones that is not so: a sunlit wall and a shaded one that faces it take turns.
+    """Return the light that all further bounces add to patches, (M, 3), from the light that the last three bounces added.
+
+    Any two consecutive bounces add the same share of the two before. Single bounces do not: a sunlit wall and a shaded wall
+    that faces it take turns.
     """
     share = np.divide(third, first, out=np.ones_like(third), where=first > 0).clip(0, MOST_SENT_ON)
     return ((second + third) * share / (1 - share)).astype(np.float32)
@@ -291,7 +294,7 @@ def _settle(seen: _Seen, light: Float32, views: Float32) -> None:
 
 
 def _gathering(seen: _Seen, surrounding: Surrounding, lanterns: Lanterns, emitted: Float32, off: float) -> Gathering | None:
-    """How light is gathered on flat surfaces and beside them, None where there are none."""
+    """Return the gathering of light on flat surfaces and beside them, None if there are no such surfaces."""
     if seen.look is None or seen.around is None:
         return None
     return Gathering.of(seen.look, seen.around, seen.patches, surrounding, seen.tree, lanterns, TURNS, emitted, off)
@@ -310,7 +313,7 @@ def _on_ground(
 
 
 def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32, off: float) -> tuple[Float32, Float32]:
-    """What arrives at the probes from what shines by itself: irradiance, as `Bounces.light`, and sums of what rays see."""
+    """Return the light of emitters at the probes: irradiance, as `Bounces.light`, and sums of the light that rays see."""
     light = np.zeros_like(seen.bounces.light)
     views = np.zeros((len(light), NODES, 4), np.float32)
     if not len(lanterns.points):

@@ -1,5 +1,7 @@
-"""How light is gathered where probes are too coarse: at the nodes of lightmaps, at sites on what is not flat, and at patches
-that have no part in the lightmaps.
+"""The gathering of light where probes are too coarse.
+
+Light is gathered at the nodes of lightmaps, at sites on surfaces that are not flat, and at patches without a part in the
+lightmaps.
 """
 
 from __future__ import annotations
@@ -57,8 +59,9 @@ class Spots(NamedTuple):
     def from_afar(
         self, ids: Int32, surrounding: Surrounding, tree: Tree, lanterns: Lanterns, turns: int, emitted: Float32, off: float
     ) -> Float32:
-        """What comes from the sky, the ground far away and lanterns, which send `emitted` (M, 3): (N, COLUMNS). ids (K, N): the
-        patches that the rays hit.
+        """Return the light of the sky, the distant ground and lanterns, (N, COLUMNS). Lanterns send `emitted` (M, 3).
+
+        ids (K, N): the patches that the rays hit.
         """
         rays, light = self.rays, np.zeros((len(self.counted), kernels.COLUMNS), np.float32)
         kernels.see(ids, rays.turn, self.local, _sky(surrounding, rays, ids), surrounding.below, light)
@@ -93,7 +96,7 @@ class Round(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What depends on no light: of flat surfaces, and of all others, None if there are none."""
+    """The parts of the gathering that depend on no light: of flat surfaces, and of all others, None if there are no others."""
 
     charts: Charts
     nodes: Spots
@@ -101,7 +104,7 @@ class Look(NamedTuple):
 
     @property
     def rays(self) -> list[Rays]:
-        """All rays, the nodes' first."""
+        """The rays of the nodes, then those of the sites."""
         return [self.nodes.rays, *([self.round.spots.rays] if self.round else [])]
 
     def alone(self, patches: Patches) -> Int32:
@@ -121,7 +124,10 @@ def look(
     is_inside_out: bool,
     is_fine: bool,
 ) -> Look | None:
-    """What nodes and sites of triangles (T, 3) see, None if none of them is wide and flat. vertices: see `Surfaces`."""
+    """Return the view from nodes and sites of triangles (T, 3), None if no triangle is wide and flat.
+
+    vertices: see `Surfaces`.
+    """
     more = FINER if is_fine else 1
     charts = charts_of(vertices[triangles, 11:14], unit, NODE_RAYS * more)
     if charts is None:

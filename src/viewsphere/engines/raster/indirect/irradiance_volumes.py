@@ -61,7 +61,7 @@ class Grid(NamedTuple):
 
     @property
     def last(self) -> Float:
-        """Where the last probe is, (3,)."""
+        """The place of the last probe, (3,)."""
         return self.corner + (self.shape[::-1] - 1) / self.cells
 
     def resting(self, ground_z: float) -> Grid:
@@ -96,7 +96,7 @@ class Volume:
 
     @property
     def buried(self) -> NDArray[np.bool_]:
-        """Which probes are within things, (N,)."""
+        """A mask of the probes within things, (N,)."""
         return self.rank == 0
 
 
@@ -117,7 +117,7 @@ def rays_of_probes(grids: tuple[Grid, ...], has_charts: bool) -> Float32:
 
 
 def volume_of(grid: Grid, tree: Tree, normals: Float32, directions: Float32, is_finest: bool) -> Volume:
-    """What probes see of a tree's triangles, whose normals these are, (T, 3)."""
+    """Return the volume of probes that see a tree's triangles. normals (T, 3): of the triangles."""
     points, turn, own = _points(grid)
     met, far = cast(tree, points, directions, turn, np.inf)
     buried = np.empty(len(points), np.uint8)
@@ -164,7 +164,10 @@ def join(inner: Volume, outer: Volume, known: Iterable[tuple[Float32, Float32]])
 
 
 def _shares(part: Float32, screens: Float32) -> Float32:
-    """How much each corner of its cell counts for a place that is so far within, (n, 3): (n, 8), as in `kernels_bounce`."""
+    """Return the weights, (n, 8), of a cell's corners at places within the cell, in the order of `kernels_bounce`.
+
+    part (n, 3): how far within the cell each place is.
+    """
     bits = np.indices((2, 2, 2)).reshape(3, 8)[::-1]
     near_by = np.prod([np.where(bits[k], part[:, k : k + 1], 1 - part[:, k : k + 1]) for k in range(3)], axis=0) + 1e-4
     planes = screens.reshape(len(part), -1, 8)
@@ -207,8 +210,9 @@ def _part(low: Float, high: Float, unit: float) -> tuple[Float, Float]:
 
 
 def _points(grid: Grid) -> tuple[Float32, Int32, Int32]:
-    """All probes (N, 3), those of one turn together; each one's turn, of which any two by two by two have all, and its place in
-    the volume.
+    """Return the places of all probes (N, 3), sorted by turn, with each probe's turn and its index in the volume.
+
+    Any two by two by two neighbouring probes have all turns.
     """
     at = np.indices(tuple(grid.shape.tolist())).reshape(3, -1).T[:, ::-1]
     turn = at % 2 @ [1, 2, 4]

@@ -121,7 +121,10 @@ def _place(frame, columns, rows, layers, b):
 
 @intrinsic
 def _look(typing, screens, cell, x, y, z, b, at):
-    """How much of a place (in cells from a cell's first corner) each corner of the cell sees; multiplies eight rows of b."""
+    """Multiply eight rows of b by the share of a place that each corner of its cell sees.
+
+    x, y, z: the place, in cells from the cell's first corner.
+    """
 
     def code(context, builder, signature, arguments):
         table, target = (context.make_array(signature.args[n])(context, builder, arguments[n]).data for n in (0, 5))
@@ -222,7 +225,7 @@ def _read_floor(count, floor, frame, b):
 
 @lanewise
 def _darken(b):
-    """What a texture of occlusion says counts for this light, too."""
+    """Darken this light, too, by the value of an occlusion texture."""
     for row, lean in ((GLOW_R, LEAN_R), (GLOW_G, LEAN_G), (GLOW_B, LEAN_B)):
         b[row] = b[lean] = b[row] * b[AO]
     b[INSIDE] = 0
@@ -230,7 +233,7 @@ def _darken(b):
 
 @inner(fastmath=FAST)
 def dim_by_near(start, count, slots, near, b):
-    """What is nearer to the samples `slots` than probes know, in place of the part of their light that it takes away."""
+    """Replace the probes' light that near surfaces block from the samples `slots` by the near surfaces' own light."""
     for i in range(U(count)):
         own = near[U(slots[U(start) + i])]
         known = max(b[U(INSIDE) + i], b[U(MAPPED) + i]) * b[U(OPEN) + i]  # as much as there is of the probes' light

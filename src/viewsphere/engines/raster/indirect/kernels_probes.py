@@ -1,8 +1,8 @@
-"""What the probes of a volume see, from the rays that were cast from them.
+"""The view of a volume's probes, from the rays that were cast from them.
 
-What rays hit is gathered in patches: places that are close together, of one material, and look the same way. The light that
-patches send to probes, and probes to patches, is exchanged until it no longer changes (Goral, Torrance, Greenberg and Battaile
-1984; irradiance volumes as Greger, Shirley, Hubbard and Greenberg 1998).
+Ray hits are gathered in patches: places that are close together, of one material, and look the same way. Patches and probes
+exchange light until it no longer changes (Goral, Torrance, Greenberg and Battaile 1984; irradiance volumes as Greger,
+Shirley, Hubbard and Greenberg 1998).
 """
 
 from __future__ import annotations
@@ -210,12 +210,13 @@ def shade_hits(
     answers,
     arrived,
 ):
-    """What the places (M, 3) that rays of directions `ways` (M, 3) hit are made of, all on the ground or none, as wide as
-    `pixels` (M,): reflectance, emitted light and, where there is room, opacity, answers (M, 6) or (M, 7); irradiance of all
-    lights, arrived (M, 3).
+    """Fill in the material and the light of the places (M, 3) that rays of directions `ways` (M, 3) hit.
 
-    off: how far from a surface shadows are cast. Rectangular lights are seen at one place each: another one for each hit if
-    this `is_varied`, which means over many hits are free of, else in their middle.
+    All places are on the ground, or none is; `pixels` (M,) are their widths. answers (M, 6) or (M, 7): reflectance, emitted
+    light and, where there is room, opacity; arrived (M, 3): irradiance of all lights.
+
+    off: the distance from a surface at which shadows begin. Each hit sees a rectangular light at one place. If `is_varied`,
+    this is another place for each hit, so that means over many hits are unbiased; otherwise it is the light's middle.
     """
     b, stack = np.zeros(ROWS * BLOCK, np.float32), np.empty((DEEP, 2), np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -278,9 +279,10 @@ def look_up(bounces, places, normals, triangles, glow, inside):
 
 @njit(fastmath=FAST)
 def send(ids, turn, own, weights, sky, far_ground, sent, light):
-    """What arrives at the probes: irradiance, rows `own` (N,) of light (N, 28), from patches that send
-    `sent` (M, 3), the sky (W, K, 3) and the ground far away (3,). weights (W, K, 9): of each direction in the terms of
-    irradiance.
+    """Write the irradiance of probes into rows `own` (N,) of light (N, 28).
+
+    It comes from patches that send `sent` (M, 3), the sky (W, K, 3) and the distant ground (3,). weights (W, K, 9): of each
+    direction in the terms of irradiance.
     """
     light[:] = f4(0)
     for k in range(U(ids.shape[0])):
@@ -318,8 +320,10 @@ def blur(light, opens, step, out):
 
 @njit(_nrt=True)
 def choose(rank, shape, light, chosen):
-    """Which probe each knows the light of, into chosen (N,) int32: itself, but a buried one that of a neighbour, of the highest
-    rank there is (see `screen`): one that is darker than most, since light that leaks is seen more than darkness.
+    """Write the probe whose light each probe uses into chosen (N,) int32: the probe itself, or, for a buried one, a neighbour.
+
+    The neighbour has the highest rank available (see `screen`), and is darker than most of that rank: leaked light is more
+    visible than darkness.
     """
     layers, rows, columns = shape[0], shape[1], shape[2]
     levels, places = np.empty(27, np.float32), np.empty(27, np.int32)
@@ -347,7 +351,7 @@ def choose(rank, shape, light, chosen):
 
 @inner
 def _octant(d):
-    """Which of the eight cells around a probe a direction goes to: bit k is set where it goes up axis k."""
+    """Return the one of the eight cells around a probe that a direction goes to: bit k is set if it goes up axis k."""
     octant = 0
     for axis in range(3):
         octant += (1 << axis) if d[axis] >= f4(0) else 0
@@ -403,7 +407,7 @@ def _cell_of(octant, at, rows, columns):
 
 @njit
 def bury(met, far, directions, turn, own, normals, cells, buried):
-    """Which probes are within a thing, into buried (N,) uint8: 2 within a small one, 1 within one of any size, else 0."""
+    """Mark probes within things in buried (N,) uint8: 2 within a small thing, 1 within one of any size, else 0."""
     for i in range(met.shape[1]):
         inner_sides = close = shut = 0
         for k in range(directions.shape[1]):

@@ -1,4 +1,4 @@
-"""What a probe sees in each direction: light that things send it, and how much they leave of the sky and of the ground.
+"""A probe's view in each direction: the light that things send, and the share of sky and ground that they leave visible.
 
 Directions are the nodes of an octahedron unfolded to a square (Cigolle et al. 2014, *A Survey of Efficient Representations for
 Independent Unit Vectors*), between which a value is bilinear: about as blurred as a mirror of roughness 0.5 shows it. At the
@@ -73,8 +73,10 @@ def add_view(own, fold, x, y, z, red, green, blue, seen):
 
 @njit
 def send_views(ids, turn, own, directions, patch_is_ground, sent, fold, views):
-    """What probes see along rays, into views (N, NODES, 4): light of patches that send `sent` (M, 3), and 1 where the sky or
-    the ground is; of each node that `fold` (NODES,) names the sum over all rays. Other arguments as in `kernels_probes.send`.
+    """Write the probes' views along rays into views (N, NODES, 4): the patches' light, and 1 where the sky or the ground is.
+
+    Patches send `sent` (M, 3). Each node that `fold` (NODES,) names holds the sum over all rays. Other arguments as in
+    `kernels_probes.send`.
     """
     views[:] = f4(0)
     for k in range(ids.shape[0]):

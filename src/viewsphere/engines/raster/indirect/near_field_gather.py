@@ -1,8 +1,8 @@
-"""What is nearer to the samples of a picture than probes know: gathered by short rays from each sample (`bounces: fine`).
+"""The near surfaces that probes miss: each sample of a picture gathers them with short rays (`bounces: fine`).
 
 The last bounce of light is followed from the picture itself (final gathering, Reichert 1992), about as far as probes are apart:
-leaves shade leaves, an awning the shop below it. What the rays meet sends what its patch sends; where they meet nothing, the
-probes' light arrives.
+leaves shade leaves, an awning the shop below it. A surface that a ray meets sends the light of its patch; where a ray meets
+nothing, the probes' light arrives.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def with_near(
 
 
 def _turn(view: PictureRays, slots: Int32) -> Int32:
-    """How the rays of samples are turned: in all ways within a tile of pixels."""
+    """Return the turn of each sample's rays; a tile of pixels has all turns."""
     if len(view.places):
         return slots % (TILE * TILE)
     row, column = np.divmod(slots, np.int32(view.columns))
@@ -66,7 +66,10 @@ def _turn(view: PictureRays, slots: Int32) -> Int32:
 
 
 def _seen_at(view: PictureRays, slots: Int32, depth: Float32) -> tuple[Float32, Float32]:
-    """Where samples (N,) see something, (N, 3), and their rays, (N, 3), in the stage's axes; depth (S,): see `with_near`."""
+    """Return the places (N, 3) that samples (N,) show, and their rays (N, 3), in the stage's axes.
+
+    depth (S,): see `with_near`.
+    """
     if len(view.rays):
         rays = view.rays[slots]
     else:

@@ -26,7 +26,7 @@ SOME = 4096
 
 
 class PatchRays(NamedTuple):
-    """which, share (N,): the patch of each origin, and its share of this patch; normals (N, 3)."""
+    """The rays of patches. which, share (N,): the patch of each origin, and its share of this patch; normals (N, 3)."""
 
     which: Int32
     share: Float32
@@ -36,8 +36,9 @@ class PatchRays(NamedTuple):
     def from_afar(
         self, ids: Int32, surrounding: Surrounding, tree: Tree, lanterns: Lanterns, turns: int, emitted: Float32, off: float
     ) -> Float32:
-        """What comes to these origins, which hit patches `ids` (K, N), from the sky, the ground far away, and lanterns that
-        send `emitted` (M, 3): radiance of white matt surfaces, (N, 3).
+        """Return the light of the sky, the distant ground and lanterns at these origins: radiance of white matt surfaces, (N, 3).
+
+        The rays of the origins hit patches `ids` (K, N). Lanterns send `emitted` (M, 3).
         """
         light = np.zeros((len(self.which), 3), np.float32)
         for start in range(0, len(light), SOME):

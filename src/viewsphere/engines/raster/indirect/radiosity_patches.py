@@ -46,7 +46,10 @@ class Rays(NamedTuple):
 
 
 class Lit(NamedTuple):
-    """What patches send by themselves: reflectance (M, 3), emitted radiance (M, 3), irradiance of lamps and sun (M, 3)."""
+    """The light that patches send by themselves.
+
+    Its fields are reflectance (M, 3), emitted radiance (M, 3), and irradiance of lamps and sun (M, 3).
+    """
 
     reflectance: Float32
     emitted: Float32
@@ -68,7 +71,7 @@ class Patches:
 
     @property
     def is_ground(self) -> NDArray[np.bool_]:
-        """Which patches lie on the ground, (M,)."""
+        """A mask of the patches that lie on the ground, (M,)."""
         return self.table.triangle[: self.count, 0] == kernels.GROUND
 
     @property
@@ -104,8 +107,10 @@ class Patches:
         lights: Lights,
         off: float,
     ) -> Lit:
-        """What they are made of, and the light of lamps and sun. which (T,): those of the surfaces' triangles that rays meet;
-        `off`: how far from surfaces shadows begin; `albedo`: see `Surrounding`.
+        """Return the patches' materials, and the light of lamps and sun on them.
+
+        which (T,): the indices of the surfaces' triangles that rays meet; `off`: the distance from surfaces at which shadows
+        begin; `albedo`: see `Surrounding`.
         """
         table = self.table
         rows, columns = np.nonzero(np.arange(kernels.HITS) < table.known[: self.count, None])
