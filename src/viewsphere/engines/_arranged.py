@@ -26,7 +26,7 @@ STEPS = 16
 
 @dataclass(frozen=True, eq=False)
 class Arranged:
-    """All things of a shot at an instant. meshes[i] is the mesh of things[i], without triangles if that thing is not there.
+    """The things of a shot at an instant. meshes[i] is the mesh of things[i], without triangles if that thing is not there.
 
     `whole` has the triangles of absent things, too. `geometry` is a new object only if some thing is elsewhere.
 

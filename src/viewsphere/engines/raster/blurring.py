@@ -112,7 +112,7 @@ class Blur:
         return [thing.world_from_object for thing in things]
 
     def _way(self, geometry: Geometry, visibility: Visibility, now: float, start: float, end: float) -> Float32:
-        """Return the motion (H, W, 2), in pixels, of the points that the pixels show at the moment `now`, from `start` to `end`.
+        """Return the motion (H, W, 2), in pixels, of the points that the pixels show at `now`, from `start` to `end`.
 
         The motion is 0 where the lens does not show the point at both moments. Deforming meshes move as if they were rigid.
         """

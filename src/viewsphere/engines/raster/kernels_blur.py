@@ -1,4 +1,4 @@
-"""Where the points that pixels show go while the shutter is open, and pictures smeared along the way."""
+"""The motion of visible points while the shutter is open, and pictures smeared along it."""
 
 from __future__ import annotations
 

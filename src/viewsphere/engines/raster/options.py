@@ -30,7 +30,7 @@ class Options:
 
     @property
     def times(self) -> int:
-        """How many times as many pixels each way are painted; edges have four samples in each."""
+        """The factor by which the picture is painted larger in each direction; edges have four samples in each such pixel."""
         return max(math.isqrt(self.antialias // 4), 1)
 
     def for_width(self, pixels: int) -> int:

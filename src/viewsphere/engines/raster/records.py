@@ -15,7 +15,7 @@ Int32 = NDArray[np.int32]
 
 
 class Surfaces(NamedTuple):
-    """What the triangles are made of.
+    """The materials and vertices of the triangles.
 
     vertices (V, 16): shading normal, both uv sets, linear colour and alpha, position, two unused (a row is
     a cache line); triangles (T, 3) uint32; material (T,) int32; normals (T, 3): geometric, unit; looks (M, LOOKS): columns
@@ -31,7 +31,7 @@ class Surfaces(NamedTuple):
 
 
 class Textures(NamedTuple):
-    """All mip levels of all textures in one array, as bundles: textures that a material looks up together.
+    """The mip levels of all textures in one array, as bundles: textures that a material looks up together.
 
     texels (N,) uint16: for linear light and data 65,535 means 1; for components of normals 32,768 means 0 and 65,535 means 1;
     behind the last texel there is room for reading three planes at once. levels (X, 16, 3) int32: first word, width and height
@@ -82,9 +82,11 @@ class Lightmap(NamedTuple):
 
 
 class PatchLight(NamedTuple):
-    """What patches send. keys (S,) uint64, patch (S,) int32: their table, see `kernels_probes.patch`; light (M, 3): of each,
-    radiance, -1 for lanterns, whose light arrives as probes know it; frame (7,): the box of the probes, and how many patches
-    there are in a length; materials (T,): of the triangles that rays meet, as they were numbered when the table was made.
+    """The light that patches send.
+
+    keys (S,) uint64, patch (S,) int32: their table, see `kernels_probes.patch`; light (M, 3): the radiance of each patch, -1
+    for lanterns, whose light arrives by the probes; frame (7,): the box of the probes, and the number of patches in a length;
+    materials (T,): of the triangles that rays meet, numbered as when the table was made.
     """
 
     keys: NDArray[np.uint64]

@@ -53,7 +53,7 @@ class RasterStage:
 
     @property
     def shot(self) -> Shot:
-        """What is painted."""
+        """The shot that the stage paints."""
         return self.arrangements.shot
 
     def of(self, shot: Shot) -> RasterStage:
@@ -65,7 +65,7 @@ class RasterStage:
         return self.arrangements.at(instant).geometry
 
     def baked(self, instant: int) -> Baked:
-        """What pictures of an instant are painted from; the last one is kept."""
+        """Return the data from which pictures of an instant are painted; the stage keeps the last one."""
         arranged = self.arrangements.at(instant)
         key = arranged.geometry, arranged.is_sequence
         if key not in self._baked:
@@ -74,7 +74,7 @@ class RasterStage:
         return self._baked[key]
 
     def _pack(self, arranged: Arranged) -> Packed:
-        """What things are made of as they are arranged, and what was packed for another instant written over."""
+        """Return the packed materials and surfaces of arranged things, which replace those of the last instant."""
         ground, lengths = self.shot.scene.ground, self._lengths if arranged.is_sequence else still_lengths(arranged)
         self._packed[:] = [self._packed[0].at(arranged, ground, lengths) if self._packed else pack(arranged, ground, lengths)]
         return self._packed[0]
@@ -106,7 +106,7 @@ class RasterStage:
         return {name: painted[name] for name in names}
 
     def _light(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, Float32]:
-        """All `LIGHT_PASSES`, with the sky where the picture has it; (H, W, 3) each."""
+        """Return all `LIGHT_PASSES`, with the sky where the picture has it; (H, W, 3) each."""
         camera, is_lit = self.shot.camera(instant, sensor), "shading" in names or "residual" in names
         finish = self.shot.finish(instant).with_background(picture_of(names) == "rgba")
         has_sky = shows_sky(finish.background)

@@ -36,9 +36,10 @@ class PatchRays(NamedTuple):
     def from_afar(
         self, ids: Int32, surrounding: Surrounding, tree: Tree, lanterns: Lanterns, turns: int, emitted: Float32, off: float
     ) -> Float32:
-        """Return the light of the sky, the distant ground and lanterns at these origins: radiance of white matt surfaces, (N, 3).
+        """Return the light of the sky, the distant ground and lanterns at these origins, (N, 3).
 
-        The rays of the origins hit patches `ids` (K, N). Lanterns send `emitted` (M, 3).
+        The light is radiance of white matt surfaces. The rays of the origins hit patches `ids` (K, N). Lanterns send
+        `emitted` (M, 3).
         """
         light = np.zeros((len(self.which), 3), np.float32)
         for start in range(0, len(light), SOME):

@@ -32,8 +32,9 @@ _blend = blend(COLUMNS)
 
 @njit(_nrt=True)
 def pieces(corners, count):
-    """Which piece each triangle belongs to, (T,): the least triangle that it hangs together with by common corners (T, 3),
-    which have numbers below `count`.
+    """Return the piece of each triangle, (T,): the least triangle that is connected to it by common corners (T, 3).
+
+    The corners' numbers are below `count`.
     """
     first, piece = np.full(count, -1), np.arange(corners.shape[0])
     for i in range(corners.shape[0]):
@@ -97,8 +98,10 @@ def _shrink(t, inset):
 
 @njit
 def settle(triangles, chart, charts, inset, places, distances):
-    """Where nodes look from: into places (N, 2) the place of their chart that is nearest to each, in cells, `inset` from its
-    border; distances (N,), first infinite: the square of how far away it is.
+    """Write the place from which each node looks into places (N, 2), in cells.
+
+    The place is the point of the node's chart that is nearest to the node, `inset` from the chart's border. distances (N,),
+    first infinite: the square of the distance to the place.
 
     triangles (T, 3, 2): corners in cells, which are moved; chart (T,); charts: see `Lightmap`.
     """
@@ -118,7 +121,7 @@ def settle(triangles, chart, charts, inset, places, distances):
 
 @njit
 def count_in(met, far, directions, turn, normals, cell, is_inside_out, weights):
-    """How much each node counts, into weights (N,): hardly, where it is within a thing, or where all is near.
+    """Write the weight of each node into weights (N,): HARDLY for a node within a thing or in a narrow place, else 1.
 
     met, far (K, N), directions (W, K, 3), turn (N,): see `kernels_trace.cast`; normals (T, 3); cell: its size.
     """
@@ -136,11 +139,11 @@ def count_in(met, far, directions, turn, normals, cell, is_inside_out, weights):
 
 @njit(fastmath=FAST)
 def see(ids, turn, local, sky, below, nodes):
-    """What comes from the sky (W, K, 3) and the ground far away (3,) to nodes (N, COLUMNS).
+    """Add the light of the sky (W, K, 3) and the distant ground (3,) to nodes (N, COLUMNS).
 
-    Light along the normal is radiance of a white matt surface; for one that is tilted by a little, its normal's parts
-    along both axes times the light along the axes come to it. ids (K, N): patches that cosine-weighted rays meet; local
-    (R, K, 3): directions in the axes of the chart, of each way to turn them, turn modulo R.
+    Light along the normal is the radiance of a white matt surface. A slightly tilted surface adds the light along both axes,
+    times its normal's parts along them. ids (K, N): patches that cosine-weighted rays meet; local (R, K, 3): directions in the
+    chart's axes, of each way to turn them, turn modulo R.
     """
     turns = U(local.shape[0])
     per = f4(1) / f4(ids.shape[0])

@@ -88,8 +88,10 @@ def group(corners, normals, parts, shares, low, cells, keys, sites, sums):
 
 @njit
 def settle(corners, normals, parts, shares, low, cells, keys, sites, sums, best, places, facing):
-    """Where each site is and which way it faces, into places, facing (N, 3): as the part of a triangle that is the most like
-    all its parts. best (N,): infinite; the others as `group` left them.
+    """Write the place and the normal of each site into places, facing (N, 3).
+
+    They are those of the triangle's part that is most like all parts of the site. best (N,): infinite; the other arrays as
+    `group` left them.
     """
     for t in range(parts.shape[0]):
         n = normals[t]
@@ -161,7 +163,10 @@ def lay(triangles, corners, smooth, normals, parts, numbers, index, places, faci
 
 @inner(fastmath=FAST)
 def _share(dx, dy, dz, n, m, cells):
-    """How much a site that is (dx, dy, dz) away, with normal m, counts for a point with normal n, wherever it is along them."""
+    """Return the weight of a site with normal m for a point with normal n, at any distance along their planes.
+
+    dx, dy, dz: from the one to the other.
+    """
     like = n[0] * m[0] + n[1] * m[1] + n[2] * m[2] - f4(LIKE)
     if like <= f4(0):
         return f4(0)

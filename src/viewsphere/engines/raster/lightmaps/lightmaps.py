@@ -55,9 +55,11 @@ class Chart:
 
 @dataclass(frozen=True, eq=False)
 class Charts:
-    """What depends on no light. charts, chart: see `Lightmap`, of the hall's own triangles; origins (N, 3), turn (N,): of the
-    nodes' rays in directions (W, K, 3), which are `local` (R, K, 3) in axes (W, 3, 3) of the charts; reached (N,): whether
-    anything reads the node: it is near the chart's triangles.
+    """The part of the lightmaps that depends on no light.
+
+    charts, chart: see `Lightmap`, of the hall's own triangles; origins (N, 3), turn (N,): of the nodes' rays in directions
+    (W, K, 3), which are `local` (R, K, 3) in axes (W, 3, 3) of the charts; reached (N,): whether the node is near the chart's
+    triangles, so that some point reads it.
     """
 
     charts: Float32
@@ -96,7 +98,7 @@ def has_planes(corners: Float32, unit: float) -> bool:
 
 
 def _planes(corners: Float, unit: float) -> Iterator[Chart]:
-    """All triangles of each plane, if they are large enough."""
+    """Yield the triangles of each plane that is large enough, as a chart."""
     a, b, c = corners.transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     area = np.sqrt((normals * normals).sum(axis=1)) * (unit * unit / 2)
@@ -139,7 +141,10 @@ def _pieces(chart: Chart, corners: Float, unit: float) -> Iterator[Chart]:
 
 
 def _borders(corner: NDArray[np.int64], flat: Float) -> Float:
-    """How long the edges of each triangle (T,) are that no other one shares. corner (T, 3): the numbers of its corners."""
+    """Return the length of each triangle's edges, (T,), that it shares with no other.
+
+    corner (T, 3): the numbers of its corners.
+    """
     a, b = corner, np.roll(corner, -1, axis=1)
     edges = np.minimum(a, b) * (corner.max() + 1) + np.maximum(a, b)
     _, which, counts = np.unique(edges, return_inverse=True, return_counts=True)

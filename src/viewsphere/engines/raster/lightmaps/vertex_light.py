@@ -45,9 +45,10 @@ THROWN_BACK = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """What depends on no light. low (3,): where the cells begin; keys, sites: their table; places, normals (N, 3): see
-    `kernels_sites.settle`; origins (N, 3), and directions (N, K, 3) of their rays, which are `local` (R, K, 3), site by site,
-    in axes (N, 3, 3).
+    """The part of the light at sites that depends on no light.
+
+    low (3,): the lowest corner of the cells; keys, sites: their table; places, normals (N, 3): see `kernels_sites.settle`;
+    origins (N, 3), and directions (N, K, 3) of their rays, which are `local` (R, K, 3), site by site, in axes (N, 3, 3).
     """
 
     low: Float32
@@ -91,9 +92,10 @@ class Facets:
 
 
 def openness(far: Float32, reach: float) -> Float32:
-    """How much of the light from beyond `reach` arrives at each of N places, (N,), with what nearer things throw back.
+    """Return the share (N,) of the light from beyond `reach` that arrives at N places.
 
-    far (K, N): how far away what is met is, by rays as dense as their cosine to the surface.
+    The share includes the light that nearer things throw back. far (K, N): the distances of the hits of rays as dense as their
+    cosine to the surface.
     """
     return (THROWN_BACK + (1 - THROWN_BACK) * (far > reach).mean(axis=0)).astype(np.float32)
 
@@ -176,8 +178,10 @@ class _Grid:
 
 
 def look_near(tree: Tree, places: Float32, normals: Float32, reach: float, unit: float) -> tuple[Float32, Int32, Float32]:
-    """What is within `reach` of places (P, 3) with these normals: the ways of their rays, (P, K, 3), which triangles these
-    meet, (K, P), -1 for none, and how far away, infinite for none.
+    """Return the rays from places (P, 3) with these normals, and their hits within `reach`.
+
+    The result has the rays' directions (P, K, 3), the triangles that they meet (K, P), -1 for none, and the distances to
+    them, infinite for none.
     """
     each = np.arange(len(places), dtype=np.int32)
     ways = np.matmul(domes(NEAR_RAYS, WAYS).astype(np.float32)[each % WAYS], axes_along(normals))

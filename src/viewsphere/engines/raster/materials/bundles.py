@@ -37,7 +37,7 @@ KEPT_BYTES = 1 << 27
 
 @dataclass(frozen=True)
 class _Use:
-    """Where a texture's channels go: kind of plane, pairs (channel of the image, channel of the plane), whether sRGB."""
+    """The target of a texture's channels: kind of plane, pairs (channel of the image, channel of the plane), whether sRGB."""
 
     kind: int
     channels: tuple[tuple[int, int], ...] = ()
@@ -64,7 +64,7 @@ USES = {
 
 @dataclass(frozen=True)
 class _Content:
-    """What a bundle stores: images and the material's fields that use them. If `weighted`, colours count by their alpha."""
+    """The content of a bundle: images and the material's fields that use them. If `weighted`, colours count by their alpha."""
 
     uses: tuple[tuple[Image, str], ...]
     weighted: bool
@@ -120,7 +120,7 @@ class BundlePacker:
         return found + [-1] * (MOST - len(found))
 
     def pack(self) -> Textures:
-        """All bundles. The arrays must not be written to: the next stage with the same textures shares them."""
+        """Return the packed bundles. Do not write to the arrays: the next stage with the same textures shares them."""
         count = max(len(self._slots), 1)
         levels = np.zeros((count, LEVELS, 3), np.int32)
         modes = np.zeros((count, 14), np.int32)
@@ -180,7 +180,7 @@ class _Kept:
         self._held: WeakValueDictionary[tuple[_Content, ...], Words] = WeakValueDictionary()
 
     def get(self, contents: tuple[_Content, ...]) -> Words:
-        """All levels of these contents one behind the other, and room behind the last for reading PLANES planes at once."""
+        """Return the levels of these contents, one behind the other, with room at the end to read PLANES planes at once."""
         texels = self._held.get(contents)
         if texels is None:
             texels = self._held[contents] = self._packed(contents)

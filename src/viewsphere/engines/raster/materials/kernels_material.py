@@ -1,4 +1,4 @@
-"""What the samples of a block are made of: factors times vertex colours times textures, and normals with their normal maps.
+"""The materials of a block's samples: factors times vertex colours times textures, and normals with their normal maps.
 
 glTF 2.0, section 3.9, and the extensions that `assets.mesh.Material` keeps.
 """
@@ -178,9 +178,9 @@ def _lay_ground(per_length, b):
 
 @lanewise
 def _barycentric_motion(rotation, is_lens, b, c):
-    """How the two barycentric coordinates change from pixel to pixel, across (G_X, H_X) and down (G_Y, H_Y): the derivative of
-    the place where the pixel's ray meets the triangle's plane (Igehy, Tracing Ray Differentials, 1999).
+    """Write the change of the two barycentric coordinates from pixel to pixel, across (G_X, H_X) and down (G_Y, H_Y).
 
+    It is the derivative of the place where the pixel's ray meets the triangle's plane (Igehy, Tracing Ray Differentials, 1999).
     Solved by Cramer's rule: a step on the screen equals a step along the two edges plus one along the ray.
     """
     v, first, second = b.get(VX, VY, VZ), b.get(AX, AY, AZ), b.get(BX, BY, BZ)

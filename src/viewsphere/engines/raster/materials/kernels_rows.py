@@ -1,4 +1,4 @@
-"""What of the shading kernels' vertices changes where something moves."""
+"""The update of the shading kernels' vertices when a thing moves."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from viewsphere.truth.raster.visibility import Visibility, homogeneous, left_out
 
 
 class Lengths(NamedTuple):
-    """What the engine's lengths are in, `unit` metres, and where they begin, `origin` (world metres)."""
+    """The frame of the engine's lengths: their `unit` in metres, and their `origin` in world metres."""
 
     origin: tuple[float, float, float]
     unit: float
@@ -44,7 +44,7 @@ class Materials(NamedTuple):
 
 
 def made_of(meshes: Sequence[Mesh]) -> object:
-    """All that materials are packed from."""
+    """Return the mesh data from which materials are packed."""
     return [(mesh.materials, mesh.images, mesh.uv0 is None, mesh.uv1 is None) for mesh in meshes]
 
 

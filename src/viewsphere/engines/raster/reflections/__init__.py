@@ -1,1 +1,1 @@
-"""What mirrors and glass show."""
+"""The reflections in mirrors and the view through glass."""

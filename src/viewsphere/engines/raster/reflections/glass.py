@@ -35,7 +35,7 @@ NO_GLASS = Glass(
 
 
 def glass_of(rows: Rows) -> Glass:
-    """All triangles that bound solid glass."""
+    """Return the triangles that bound solid glass."""
     surfaces = rows.surfaces
     bends = surfaces.looks[:, L_BENDS] > 0
     if not bends.any():

@@ -1,7 +1,7 @@
-"""What polished level surfaces mirror of things near them, where light bounces: floors, or the top of a table.
+"""The reflections of near things in polished level surfaces, where light bounces: floors, or the top of a table.
 
-Their material mirrors what probes see, which is blurred and a little beside; here the scene's own mirror image takes its place,
-sharp where a thing stands on the surface, and the rougher the more blurred and the less of it.
+Their material mirrors the probes' view, which is blurred and slightly displaced. Here the scene's own mirror image replaces
+it, sharp where a thing stands on the surface. The rougher the surface, the more blurred and the weaker the image.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where mirrors are looked at, what blurs in them, and how it is laid over them."""
+"""The points at which mirrors are seen, the blur of their images, and the overlay of these images on the mirrors."""
 
 from __future__ import annotations
 

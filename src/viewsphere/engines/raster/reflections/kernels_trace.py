@@ -1,6 +1,7 @@
-"""What rays meet first: a tree of boxes around triangles (a bounding volume hierarchy, the surface area heuristic in bins; Wald
-2007), eight of which are looked at in one go (Wald, Benthin and Boulos 2008), for light that is baked once and needs no other
-package.
+"""The first hits of rays, from a tree of boxes around triangles, for light that is baked once and needs no other package.
+
+The tree is a bounding volume hierarchy by the surface area heuristic in bins (Wald 2007). Eight boxes are tested at once
+(Wald, Benthin and Boulos 2008).
 
 Both sides of a triangle are met. All is computed in one order: the same triangles and rays give the same bits.
 """
@@ -224,7 +225,10 @@ def _spread(builder, numbers):
 
 @intrinsic
 def _enters(typing, bounds, node, o, inverse, limit, stack):
-    """Which children of a node a ray enters before `limit`, as bits; how far along it, into the first places of the stack."""
+    """Return the children of a node that a ray enters before `limit`, as bits.
+
+    The distances along the ray go to the first places of the stack.
+    """
 
     def code(context, builder, signature, arguments):
         box = _rows(context, builder, signature, arguments, 6)
@@ -243,8 +247,9 @@ def _enters(typing, bounds, node, o, inverse, limit, stack):
 
 @intrinsic
 def _meets(typing, corners, leaf, o, d, limit, stack):
-    """Which triangles of a leaf (first corner, two edges) a ray meets before `limit`, as bits (Moeller and Trumbore); how far
-    along it, into the first places of the stack.
+    """Return the triangles of a leaf that a ray meets before `limit`, as bits (Moeller and Trumbore).
+
+    A leaf's triangle is its first corner and two edges. The distances along the ray go to the first places of the stack.
     """
 
     def code(context, builder, signature, arguments):

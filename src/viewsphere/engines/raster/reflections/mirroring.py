@@ -1,4 +1,4 @@
-"""What level surfaces mirror: the scene once more, as an eye below them sees it, which the mirror image of the eye does."""
+"""The mirror images in level surfaces: the scene once more, as the eye's mirror image below the surface sees it."""
 
 from __future__ import annotations
 
@@ -25,8 +25,10 @@ BRIGHTEST = 4.0
 
 
 class Mirrored(NamedTuple):
-    """What n pixels mirror: things (n, 3), their radiance; hidden (n, 1), the share of the sky that they hide; sky (n, 3), its
-    radiance; nearness (n,), one over the depth of things from the mirror image of the camera, 0 for none.
+    """The mirror image in n pixels.
+
+    things (n, 3): the radiance of things; hidden (n, 1): the share of the sky that they hide; sky (n, 3): the sky's radiance;
+    nearness (n,): one over the depth of things from the camera's mirror image, 0 for none.
     """
 
     things: Float32
@@ -36,7 +38,7 @@ class Mirrored(NamedTuple):
 
 
 def lying(geometry: Geometry, height: float) -> NDArray[np.bool_]:
-    """Which triangles (T,) lie below a height altogether."""
+    """Return a mask of the triangles (T,) that lie wholly below a height."""
     return geometry.triangle_tops < height
 
 
@@ -52,7 +54,7 @@ def looked_at(camera: Camera, visibility: Visibility, at: NDArray[np.intp]) -> t
 
 
 def mirrored(baked: Baked, camera: Camera, plane: float, left_out: NDArray[np.bool_], at: NDArray[np.intp]) -> Mirrored:
-    """What a mirror at the height `plane` shows in the pixels `at` (n,), without the triangles `left_out` (T,)."""
+    """Return the image of a mirror at the height `plane` in the pixels `at` (n,), without the triangles `left_out` (T,)."""
     below = _below(camera, plane)
     geometry, blended = (_without(geometry, left_out) for geometry in (baked.geometry, baked.blended))
     own = replace(baked, geometry=geometry, blended=blended, is_fine=False)

@@ -1,9 +1,9 @@
-"""What smooth surfaces mirror of the things that stand still, where light bounces: window panes, mirrors, polished metal.
+"""The reflections of still things in smooth surfaces, where light bounces: window panes, mirrors, polished metal.
 
-Their material mirrors what probes see, as blurred as roughness 0.5 shows it. A ray from each pixel finds what is there instead:
-sharp, lit by sun, lamps and what bounces; where light bounces finely, rays in their lobes do so for rougher surfaces, too.
-Targets before scenery and what moves neither mirror in this way nor are mirrored; cut-out textures are solid; where a ray meets
-the ground, what probes say stays. Of level surfaces, the one that shows most has a mirror image of its own, which is of all
+Their material mirrors the probes' view, as blurred as roughness 0.5 shows it. A ray from each pixel finds the reflected thing
+instead: sharp, lit by sun, lamps and bounced light. Where light bounces finely, rays in the lobes of rougher surfaces do so,
+too. Targets before scenery, and moving things, neither mirror in this way nor are mirrored. Cut-out textures are solid. Where
+a ray meets the ground, the probes' light stays. The level surface that shows most has a mirror image of its own, of all
 things (`glossy_reflections`).
 """
 

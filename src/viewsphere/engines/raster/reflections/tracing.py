@@ -46,8 +46,9 @@ def tree_of(corners: Float32) -> Tree:
 
 
 def cast(tree: Tree, origins: Float32, directions: Float32, turn: Int32, limit: float) -> tuple[Int32, Float32]:
-    """What rays from all origins (N, 3) meet first, in the K directions (W, K, 3) of each origin's `turn` (N,): the triangle,
-    (K, N) int32, -1 for nothing before `limit`, and how far away it is, (K, N).
+    """Return the first hit of each ray, as triangle (K, N) int32, -1 for nothing before `limit`, and distance (K, N).
+
+    Rays start at all origins (N, 3), in the K directions (W, K, 3) of each origin's `turn` (N,).
     """
     shape = directions.shape[1], len(origins)
     met, far = np.empty(shape, np.int32), np.empty(shape, np.float32)

@@ -1,7 +1,7 @@
-"""What wet ground mirrors: in puddles sharply, in the film on rough ground drawn out along the picture's columns.
+"""The reflections in wet ground: sharp in puddles, stretched along the picture's columns in the film on rough ground.
 
-What a film is taken to mirror is part of its material: the sky, or where light bounces what probes see, too. Here the scene's
-own mirror image takes its place.
+The material of a film reflects the sky or, where light bounces, the probes' view, too. Here the scene's own mirror image
+replaces this reflection.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where each sample of a block is: position, direction to the viewer, geometric and smooth normal, vertex attributes."""
+"""The geometry of a block's samples: position, direction to the viewer, geometric and smooth normal, vertex attributes."""
 
 from __future__ import annotations
 

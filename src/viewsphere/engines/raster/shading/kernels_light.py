@@ -1,7 +1,7 @@
-"""How a surface answers light: Lambert, GGX and a clear coat, lit by one light at a time and by the surroundings.
+"""The response of a surface to light: Lambert, GGX and a clear coat, lit by one light at a time and by the surroundings.
 
-A layered model with view-dependent weights (Turquin 2019; as Cycles' Principled BSDF): the share of a white surrounding that a
-layer reflects is taken from the layers below it, so that a white surface in a white surrounding vanishes. Walter et al. 2007
+A layered model with view-dependent weights (Turquin 2019; as Cycles' Principled BSDF). The share of a white surrounding that
+a layer reflects is taken from the layers below it. So a white surface in a white surrounding vanishes. Walter et al. 2007
 (GGX), Heitz 2014 (height-correlated Smith), Schlick 1994 (Fresnel), Karis 2013 (split sum, lights that have a size).
 
 Order of the stages: `weigh`, then `add_light` for every light, `ambient`, `compose`.

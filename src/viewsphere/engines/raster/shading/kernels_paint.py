@@ -248,11 +248,12 @@ def _alike(t, s, depth, other, owner, normals):
 
 @njit(_nrt=True)
 def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals, behind, radiance):
-    """Whose colour each sample has, four samples a pixel: that of the nearest pixel's centre that looks alike, or its own.
+    """Return the source of each sample's colour, four samples a pixel: the nearest similar pixel's centre, or the sample.
 
-    In pixels marked in behind (H * W,), if `behind` is not empty, each sample has its own colour, since what lies behind its
-    surface may differ. seen, inverse_depth (H, W), radiance (H * W, 4): at the centres. Returns like (4N,): the centre's pixel,
-    or ~k for a colour of its own; rows (R,): the pixels (indices in `pixels`) with such samples: sample k % 4 of row k // 4.
+    Pixels marked in behind (H * W,), if `behind` is not empty, may have different backgrounds at their samples. So each of
+    their samples has its own colour. seen, inverse_depth (H, W), radiance (H * W, 4): at the centres. Returns like (4N,): the
+    centre's pixel, or ~k for a colour of its own; rows (R,): the pixels (indices in `pixels`) with such samples: sample k % 4
+    of row k // 4.
     """
     height, width = seen.shape
     like, rows = np.empty(triangle.shape[0], np.int32), np.empty(pixels.shape[0], np.int32)

@@ -1,4 +1,4 @@
-"""What a picture's light is made of, and its surfaces: as `kernels_paint.shade`, sample by sample, but kept apart.
+"""The parts of a picture's light, and its surfaces: as `kernels_paint.shade`, sample by sample, but kept apart.
 
 Columns of a split (S, 6) or (S, 9): albedo, emitted light, and, where there is room, diffuse light; premultiplied.
 """
@@ -234,7 +234,7 @@ def _reflect(b):
 
 @inner(fastmath=FAST)
 def _weigh_in_place(count, view, surfaces, textures, surrounding, occlusion, bounces, own, which, b):
-    """All that `ambient` reads of a block of things that has been gathered."""
+    """Fill in the values that `ambient` reads, for a block of things that has been gathered."""
     material(count, view, surfaces, textures, b, which)
     weigh(count, surrounding.albedo, b)
     occlude(count, occlusion, b)

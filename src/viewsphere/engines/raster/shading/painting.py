@@ -35,15 +35,14 @@ NO_SPLIT = np.zeros((0, 0), np.float32)
 
 @dataclass(frozen=True, eq=False)
 class Baked:
-    """All that a picture is painted from; lengths are in `unit`s from `origin`.
+    """The data from which pictures are painted; lengths are in `unit`s from `origin`.
 
     floor (13,): the ground's texture repeats per length, its texture coordinates at the origin, its material, 1 if the ground
-    only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over
-    half their size; its slabs in a repeat, 0 for none. kind
-    (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where neighbouring triangles look alike;
-    see_through (T + 1,). blended: `with_blended_colors`. hall: what
-    throws the light of `bounces`, None if none bounces; tree: of the hall's triangles; is_fine: whether rays from each sample
-    find what is near, and what rough mirrors show.
+    only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over half their size; its
+    slabs in a repeat, 0 for none. kind (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where
+    neighbouring triangles look alike; see_through (T + 1,). blended: `with_blended_colors`. hall: the surfaces that throw the
+    light of `bounces`, None if no light bounces; tree: of the hall's triangles; is_fine: whether rays from each sample find
+    near surfaces, and the reflections in rough mirrors.
     """
 
     geometry: Geometry
@@ -212,7 +211,7 @@ def shade_all(
 
 
 def _veiled(baked: Baked, air: Air, slots: Int32, behind: Int32, inverse_depth: Float32) -> tuple[Int32, Float32]:
-    """Those of samples, and of their `inverse_depth` (n,), that show what is behind, triangles (n,), through the air."""
+    """Return the samples, and their `inverse_depth` (n,), that show their background, triangles (n,), through the air."""
     if not air.is_outdoors:
         return slots, inverse_depth
     is_ground = baked.kind[behind] == kernels_paint.FLOOR

@@ -1,7 +1,7 @@
-"""How much of each light arrives at the samples of a block: distance, cone, and shadows that soften with distance.
+"""The share of each light that arrives at a block's samples: distance, cone, and shadows that soften with distance.
 
 Most samples lie either before everything near them in the shadow map, or behind it: planes that enclose each cell of the map
-tell which. Only the other samples search the map for blockers.
+decide between the two. Only the other samples search the map for blockers.
 
 Area lights: the light vector of a polygon (Lambert 1760).
 """
@@ -43,7 +43,7 @@ def _seen(row, first, x, y, z):
 
 @inner
 def _count_on(count, b):
-    """How many samples with light left lie on a view's map."""
+    """Return the number of samples with light left that lie on a view's map."""
     found = 0
     for i in range(count):
         found += 1 if b[STATE + i] == f4(-1) else 0
@@ -52,7 +52,10 @@ def _count_on(count, b):
 
 @lanewise
 def _see(row, b):
-    """Where a view sees the samples, in texels from its middle: U, V; SOFT, one over the distance along its axis; STATE."""
+    """Write the places of the samples in a view, in texels from its middle: U, V.
+
+    Also write SOFT, one over the distance along the view's axis, and STATE.
+    """
     x, y, z = b.get(PX, PY, PZ)
     w = _seen(row, 12, x, y, z)
     inverse = 1 / most(w, 1e-6)

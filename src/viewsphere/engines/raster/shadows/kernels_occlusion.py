@@ -1,11 +1,11 @@
-"""How much of the sky a place can see: volumes around what hides it and maps of the ground below, and look-ups.
+"""The share of the sky that a place can see: volumes around the things that hide it, maps of the ground below, and look-ups.
 
-Of a still picture all targets have one volume and one map; of a sequence each target has its own, which move along with it.
-What several hide is the product of what each leaves (Malmer, Malmer, Assarsson and Holzschuch 2007).
+In a still picture all targets share one volume and one map. In a sequence each target has its own, which move along with it.
+Several targets together leave the product of the shares that each leaves (Malmer, Malmer, Assarsson and Holzschuch 2007).
 
-A cell of the volume holds, for the directions above the horizon and for those below, the visible share m of the sphere and the
-mean v of the visible directions, the spherical harmonics up to degree 1 (Ramamoorthi and Hanrahan 2001): the cosine-weighted
-share that a surface with normal n can see is m + 2 v . n.
+A cell of the volume holds two sets of numbers, for the directions above the horizon and for those below. They are the visible
+share m of the sphere and the mean v of the visible directions: the spherical harmonics up to degree 1 (Ramamoorthi and
+Hanrahan 2001). The cosine-weighted share that a surface with normal n can see is m + 2 v . n.
 """
 
 from __future__ import annotations

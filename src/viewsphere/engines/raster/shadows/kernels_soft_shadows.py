@@ -1,4 +1,4 @@
-"""How much of a light a sample sees where a view's map shows blockers: a search for blockers, then a filter of that width.
+"""The share of a light that a sample sees where a view's map shows blockers: a blocker search, then a filter of that width.
 
 Percentage-closer soft shadows (Fernando 2005), where a texel blocks only if it lies between the sample and some part of the
 light, as in backprojection (Guennebaud et al. 2006). The filter is a window of the map's own texels, on a coarser level for a

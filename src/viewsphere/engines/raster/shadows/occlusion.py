@@ -74,8 +74,9 @@ IN_PLACE = np.eye(4)
 
 
 class Hidden(NamedTuple):
-    """What some targets hide, in the axes of baking: `Occlusion` of one volume and map, without pose and reach. volume (layers,
-    rows, columns, 8); floor (n, n): the sky's share alone.
+    """The occlusion by some targets, in the axes of baking: `Occlusion` of one volume and map, without pose and reach.
+
+    volume (layers, rows, columns, 8); floor (n, n): the sky's share alone.
     """
 
     volume: Float32
@@ -104,9 +105,9 @@ class _Baking:
 
 
 def bake_occlusion(casters: Casters, has_ground: bool, quality: Quality) -> Occlusion:
-    """What only the targets decide; the light of lamps and sky still misses from the ground's map: `with_ground_light`.
+    """Return the occlusion that depends on the targets alone; `with_ground_light` adds the light of lamps and sky to the floor.
 
-    The last one is kept for the same `casters.targets`.
+    The last result is kept for the same `casters.targets`.
     """
     if quality == "off" or not casters.extent.triangles or not (casters.extent.high - casters.extent.low).max() > 0:
         return NO_OCCLUSION
@@ -123,7 +124,7 @@ def _bake(baking: _Baking) -> Occlusion:
 
 
 def hidden_by(casters: Casters, has_ground: bool, fineness: Fineness) -> Hidden:
-    """What the targets hide from what is near them, and from the ground."""
+    """Return the occlusion by the targets, of the places near them and of the ground."""
     directions, views = _sky_views(casters, fineness.quality)
     volume, corner, cells = _volume(casters, directions, views, fineness)
     floor, floor_frame = np.ones((fineness.floor, fineness.floor), np.float32), np.zeros(7, np.float32)
@@ -134,8 +135,10 @@ def hidden_by(casters: Casters, has_ground: bool, fineness: Fineness) -> Hidden:
 
 
 def joined(hidden: Sequence[Hidden], poses: Sequence[Float], reach: Float, volume: Float32 | None = None) -> Occlusion:
-    """All of these, each where it stands: `poses` (4, 4) are rigid, from the axes of baking to the stage, and `reach` (N, 6)
-    is that of `Occlusion`. volume: what `joined_volumes` gives for them, if that is known.
+    """Join the occlusion of several targets, each at its place.
+
+    `poses` (4, 4) are rigid, from the axes of baking to the stage, and `reach` (N, 6) is that of `Occlusion`. volume: the
+    result of `joined_volumes` for them, if you have it.
     """
     volumes = {id(each.volume): each.volume for each in hidden}
     firsts = dict(zip(volumes, np.cumsum([0, *(v[..., 0].size for v in volumes.values())]).tolist(), strict=False))
@@ -252,7 +255,7 @@ def _volume(casters: Casters, directions: Float32, views: Views, fineness: Finen
 
 
 def _seen(points: Float, views: Views, directions: Float32) -> Float32:
-    """What of these directions each point (N, 3) sees, as coefficients (N, 8)."""
+    """Return the part of these directions that each point (N, 3) sees, as coefficients (N, 8)."""
     seen = np.zeros((len(points), kernels.COEFFICIENTS), np.float32)
     room = np.zeros(ROWS * BLOCK, np.float32)
     kernels.see(np.ascontiguousarray(points, np.float32), views, directions, room, seen)

@@ -1,4 +1,4 @@
-"""All lights of a scene that cast shadows, baked once a stage: what each sends out, and what is nearest to it."""
+"""The lights of a scene that cast shadows, baked once a stage: the light of each, and the surfaces nearest to it."""
 
 from __future__ import annotations
 
@@ -49,8 +49,10 @@ class Extent:
 
 
 class Views(NamedTuple):
-    """What the lights see. form (V, FORM) float32 and grid (V, GRID) int64: columns named in `kernels_shadow`; depth (N,)
-    float32: all levels of all maps, row by row; bounds (M, 4) float32: planes before and behind what is in the maps' cells.
+    """The views from the lights.
+
+    form (V, FORM) float32 and grid (V, GRID) int64: columns named in `kernels_shadow`; depth (N,) float32: all levels of all
+    maps, row by row; bounds (M, 4) float32: planes before and behind the surfaces in the maps' cells.
     """
 
     form: Float32
@@ -98,8 +100,10 @@ class ShadowView:
 
 @dataclass(frozen=True)
 class Casters:
-    """What casts shadows. `scenery` stands for what is scenery, None if there is none, and `targets` for the targets as they
-    are placed, None if unknown: equal where those are equal. In a sequence, `maps` are those of what stands still, and corners
+    """The surfaces that cast shadows.
+
+    `scenery` is a key of the scenery, None if there is none. `targets` is a key of the targets and their places, None if
+    unknown. Keys are equal where scenery or targets are equal. In a sequence, `maps` are those of still things, and corners
     (n, 3) those of the targets' boxes.
     """
 
@@ -135,9 +139,9 @@ class _Source:
 def bake_lights(
     distant: Sequence[Distant], lights: Sequence[AnyLight], casters: Casters, unit: float, has_ground: bool, resolution: int
 ) -> Lights:
-    """All that depends on the lights and on what casts shadows, but not on the camera.
+    """Bake the data that depends on the lights and on the shadow casters, but not on the camera.
 
-    `resolution` is the width of the maps around the targets, `unit` the stage's unit in metres. Lights that are dark, or that
+    `resolution` is the width of the maps around the targets, `unit` the stage's unit in metres. Dark lights, and lights that
     the ground hides altogether, are left out; hemisphere lights too, see `even_light`.
     """
     middle = (casters.extent.low + casters.extent.high) / 2
@@ -285,7 +289,10 @@ def _wide_from_afar(backdrop: _Backdrop) -> Views:
 
 
 def parallel_view(away: Float, middle: Float, span: float, tangent: float, size: int, margin: int = _MARGIN) -> ShadowView:
-    """What a distant light of this half angle's tangent sees in the direction `away`, `span` wide around a point."""
+    """Return the view from a distant light with this tangent of its half angle, in the direction `away`.
+
+    The view is `span` wide around the point `middle`.
+    """
     right, up = _level_axes(away)
     texels = (size - 2 * margin) / span
     matrix = np.zeros((4, 4))
@@ -320,7 +327,7 @@ def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: in
 
 
 def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard: float) -> ShadowView:
-    """What a light at a place sees along the third of these axes, up to this tangent to all sides."""
+    """Return the view from a light at a place along the third of these axes, up to this tangent to all sides."""
     texels = size / 2 / tangent
     matrix = np.zeros((4, 4))
     matrix[:2, :3], matrix[3, :3] = texels * axes[:2], axes[2]
@@ -426,7 +433,7 @@ def _begin(view: ShadowView, tilt: float, casters: Casters, nearest: Float32) ->
 
 
 def _joined(parts: Sequence[Views]) -> Views:
-    """All views of these, in this order."""
+    """Return the views of all these parts, in this order."""
     if len(parts) == 2 and not len(parts[1].form):
         return parts[0]
     texels = np.cumsum([0, *(len(p.depth) for p in parts)])

@@ -27,8 +27,10 @@ Key = tuple[bytes, float, float, int]
 
 @dataclass(frozen=True, eq=False)
 class StillMaps:
-    """What gives the surfaces of each thing that stands still in a sequence, and of the ground; of each that moves; and maps of
-    the former. backdrop: the same of scenery alone.
+    """The surfaces of a sequence's still and moving things, and the maps of the still ones.
+
+    still: a function for each still thing, and for the ground, that gives its surfaces; moving: the same for each moving thing;
+    backdrop: the same maps of scenery alone.
     """
 
     still: tuple[Part, ...]

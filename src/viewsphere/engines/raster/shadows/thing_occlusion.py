@@ -57,8 +57,9 @@ class TargetShades:
     _joined: list[tuple[tuple[Float32, ...], Float32]] = field(default_factory=list[tuple[tuple[Float32, ...], Float32]])
 
     def bake(self, arranged: Arranged, casters: Casters, unit: float, has_ground: bool, quality: Quality) -> Occlusion:
-        """What targets hide where they stand, in a stage of this unit in metres whose origin is the world's; the light of lamps
-        and sky still misses: `with_ground_light`.
+        """Return the occlusion by targets at their places, in a stage of this unit in metres whose origin is the world's.
+
+        The light of lamps and sky is not in the result yet: `with_ground_light` adds it.
         """
         if quality == "off":
             return NO_OCCLUSION
@@ -98,7 +99,7 @@ class TargetShades:
 
 
 def _casting(arranged: Arranged) -> Iterator[int]:
-    """Which targets are there and have a size."""
+    """Yield the indices of the targets that are there and have a size."""
     for i in range(arranged.targets):
         low, high = arranged.geometry.bounds[i]
         if arranged.things[i].is_there and (high - low).max() > 0:
@@ -113,7 +114,7 @@ def _fineness(arranged: Arranged, quality: Quality) -> Fineness:
 
 
 def _rounded_up(world_from_object: Matrix4) -> tuple[float, float, float]:
-    """What is up in a target's own axes, a unit vector of which there are few."""
+    """Return the up direction in a target's own axes, rounded to one of a few unit vectors."""
     up = np.rint(np.array(world_from_object[2][:3]) * TILTS)
     x, y, z = (up / np.sqrt((up * up).sum())).tolist()
     return x, y, z

@@ -129,7 +129,7 @@ def sky_lights(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[Distant,
 
 
 def environment_notes(sky: AnySky) -> tuple[str, ...]:
-    """What had to be mended in the picture of an environment, a sentence each."""
+    """Return a sentence for each repair of the picture of an environment."""
     return _photographed(_key(sky.file), True).notes if isinstance(sky, Environment) else ()
 
 
@@ -387,7 +387,10 @@ def _frames(size: int) -> Float32:
 
 
 def _gathered(values: Float32, size: int, square: float) -> Float32:
-    """What a wide lobe around each direction receives from a map, (size, size, 4); square: GGX's alpha squared, 1 if matt."""
+    """Return the light that a wide lobe around each direction receives from a map, (size, size, 4).
+
+    square: GGX's alpha squared, 1 if matt.
+    """
     area = _solid_angles(len(values)).reshape(-1, 1)
     source = np.hstack([_directions(len(values)), values.reshape(-1, 4) * area, area]).T.astype(np.float32, order="C")
     out = np.empty((size, size, 4), np.float32)

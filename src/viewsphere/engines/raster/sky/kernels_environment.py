@@ -90,10 +90,11 @@ def octahedral(picture, has_ground, out):
 
 @njit(fastmath=FAST)
 def gathered(source, half, targets, out):
-    """What a wide lobe around each of `targets` (M, 3) receives, (M, 4): the sum over all texels of a map.
+    """Write the light that a wide lobe around each of `targets` (M, 3) receives into out (M, 4).
 
-    source (8, K): directions of texels, their four numbers times their solid angle, that angle. half: half of (GGX's alpha
-    squared less 1); the lobe is that of a ray along the normal times the cosine, so that half = 0 is a matt surface.
+    The light is a sum over all texels of a map. source (8, K): directions of texels, their four numbers times their solid
+    angle, that angle. half: half of (GGX's alpha squared less 1); the lobe is that of a ray along the normal times the
+    cosine, so that half = 0 is a matt surface.
     """
     for i in range(U(targets.shape[0])):
         x, y, z = targets[i, 0], targets[i, 1], targets[i, 2]
@@ -113,7 +114,7 @@ def gathered(source, half, targets, out):
 
 @njit(fastmath={"contract", "nsz"})
 def blurred(texels, levels, samples, frames, out):
-    """What a lobe around each direction receives, (M, 4).
+    """Write the light that a lobe around each direction receives into out (M, 4).
 
     texels, levels: bordered maps, each half the size of the one before; samples (S, 5): x, y, z around the lobe's middle,
     weight (all add up to 1) and mip level; frames (M, 9): two axes across the lobe's middle, and that middle. The four sums are
