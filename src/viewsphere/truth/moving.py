@@ -39,7 +39,7 @@ class _Room:
     geometry: Geometry
 
     def changed(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
-        """Which of the things are elsewhere, or deformed."""
+        """Return the indices of the things that are elsewhere, or deformed."""
         return changed(self.things, self.meshes, things, meshes)
 
     def fits(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> bool:
@@ -114,7 +114,7 @@ class Ring:
 
 
 def changed(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
-    """Which of the same still things are elsewhere now, or have other meshes."""
+    """Return the indices of the same still things that are elsewhere now, or have other meshes."""
     return list(changes(before, own, now, meshes))
 
 
@@ -139,10 +139,12 @@ def _is_same(a: object, b: object) -> bool:
 
 
 def shot_floor(shot: Shot, meshes_at: Callable[[int], Sequence[Mesh]]) -> Floor | None:
-    """How high a shot's ground is, None where nothing says: unless that is fixed, not above what moves is at any instant, nor
-    above `scene.floor`. So its height is one for the whole shot; `meshes_at` gives the mesh of each thing at an instant.
+    """Return the height of a shot's ground, None if nothing determines it.
 
-    Where a sequence is cut into shots, its maker gives a `scene.floor` that is fixed, or that nothing is below in any of them.
+    A fixed `scene.floor` is the height. Otherwise the ground is not above any moving thing at any instant, nor above
+    `scene.floor`. So the shot has one height; `meshes_at` gives the mesh of each thing at an instant.
+
+    If a sequence is cut into shots, its maker gives a `scene.floor` that is fixed, or that no thing is below in any of them.
     """
     floor = shot.scene.floor
     is_fixed = floor is not None and floor.is_fixed
@@ -162,7 +164,7 @@ def shot_floor(shot: Shot, meshes_at: Callable[[int], Sequence[Mesh]]) -> Floor 
 
 @dataclass(eq=False)
 class _Underside:
-    """How low a mesh reaches."""
+    """The underside of a mesh, which gives its lowest point in a pose."""
 
     mesh: Mesh
     _row: Row | None = None

@@ -1,4 +1,4 @@
-"""What the sensors of a shot may see at its instants, and the points that they follow."""
+"""The views of a shot's sensors at its instants, and the points that the sensors follow."""
 
 from __future__ import annotations
 
@@ -34,8 +34,9 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Painted:
-    """What surfaces look like: the things at an instant with their meshes, which have those pictures that the shot gives them,
-    and the ground, if there is one.
+    """The appearance of surfaces: the things at an instant, with their meshes, and the ground, None without one.
+
+    The meshes have the pictures that the shot gives them.
     """
 
     things: Sequence[Thing]
@@ -58,7 +59,7 @@ class Followed:
 
     @cached_property
     def rows(self) -> NDArray[np.void]:
-        """What of each point's track stays the same, (N,) of `viewsphere.model.tracks.TRACK`; the rest is 0."""
+        """The constant part of each point's track, (N,) of `viewsphere.model.tracks.TRACK`; the rest is 0."""
         out = np.zeros(len(self.query), TRACK)
         out["instant"], out["query"], out["object"] = self.query[:, 0], self.query[:, 1:], self.object
         return out
@@ -96,7 +97,7 @@ class ShotViews:
         return known[1]
 
     def view(self, instant: int, sensor: int) -> View:
-        """What a sensor may see at an instant; the last views are kept."""
+        """Return the view of a sensor at an instant; the last views are kept."""
         geometry = self.labelled(instant)
         view = self._views.pop((instant, sensor), None)
         if view is None or view.geometry is not geometry:
@@ -115,7 +116,7 @@ class ShotViews:
 
     @property
     def _instants(self) -> int:
-        """How many instants' views are there at once: still pictures are not compared with those of other instants."""
+        """The number of instants whose views are kept at once; still pictures are not compared with those of other instants."""
         return ROOMS if self.shot.sequence else 1
 
     @cached_property
@@ -173,7 +174,7 @@ class ShotViews:
         return Followed(np.concatenate(queries), np.concatenate(objects), SurfacePoints.joined(points))
 
     def _positions(self, tracks: Tracks, at: int, view: View, sensor: int) -> Float:
-        """Where points are picked in a picture, (N, 2) pixels."""
+        """Return the positions of the points that are picked in a picture, (N, 2) pixels."""
         width, height = view.camera.width, view.camera.height
         if tracks.grid is not None:
             x, y = (np.arange(tracks.grid / 2, size, tracks.grid) for size in (width, height))
@@ -213,8 +214,10 @@ def _drawn(view: View, count: int, on_objects: bool, rng: np.random.Generator) -
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """Where all is at an instant: seconds of the sequence, world from each of the objects 1, 2, ... (None: it is not there),
-    the cameras of all sensors in the rig's order, and which of them is the picture's own.
+    """The poses and cameras at an instant.
+
+    Its fields are the seconds of the sequence; world from each of the objects 1, 2, ... (None: it is not there); the cameras of
+    all sensors in the rig's order; and the number of the picture's own sensor.
     """
 
     seconds: float
@@ -248,7 +251,7 @@ class SampleViews:
         return self.views.shot.rig.partner(self.sensor_number)
 
     def moment(self, instants: int) -> Moment | None:
-        """Where all is so many instants later, None where the shot does not have that instant."""
+        """Return the poses and cameras so many instants later, None if the shot does not have that instant."""
         shot, instant = self.views.shot, self.views.shot.instant_after(self.instant, instants)
         if instant is None:
             return None
@@ -271,7 +274,7 @@ class SampleViews:
 
     @property
     def finish(self) -> Finish:
-        """How light becomes the sample's picture."""
+        """The finish that turns light into the sample's picture."""
         return self.views.shot.finish(self.instant)
 
     @property
@@ -280,8 +283,10 @@ class SampleViews:
         return self.views.shot.rig.sensors[self.sensor_number]
 
     def turning(self, seconds: float) -> Turning:
-        """How things and the sensor move while its columns are measured one after another, within so many seconds around the
-        instant: straight on between instants, as while a shutter is open; before the first and after the last as they went.
+        """Return the motion of things and sensor while its columns are measured, within so many seconds around the instant.
+
+        The motion is straight between instants, as while a shutter is open. Before the first instant and after the last, it
+        continues unchanged.
         """
         shot, width = self.views.shot, self.sensor.intrinsics.width
         moments = ((np.arange(width) + 0.5) / width - 0.5) * seconds
@@ -316,7 +321,7 @@ class SampleViews:
 
     @property
     def painted(self) -> Painted:
-        """What surfaces look like at the instant. Raises RecipeError for a picture that cannot be read."""
+        """Return the appearance of surfaces at the instant. Raises RecipeError for a picture that cannot be read."""
         shot, mesh_of = self.views.shot, self.views.mesh_of
         if mesh_of is None:
             raise ValueError(f"shot {shot.key}: expected its meshes, found none")

@@ -1,4 +1,4 @@
-"""Whether a point lies inside a mesh, as a camera in a house does."""
+"""The share of the sky that a mesh hides from a point, such as a house from a camera inside it."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class View:
 
     @cached_property
     def corners(self) -> Float:
-        """All vertices before the perspective division, as `truth.visibility.homogeneous` gives them."""
+        """The vertices before the perspective division, from `truth.visibility.homogeneous`."""
         return homogeneous(self.geometry, self.camera)
 
     @cached_property
@@ -99,7 +99,7 @@ class View:
 
     @cached_property
     def visibility(self) -> Visibility:
-        """What the camera sees."""
+        """The triangles and the depth that the camera sees."""
         return rasterize(self.geometry, self.camera, corners=self.corners, keeps_exact=self.is_compared)
 
     @cached_property
@@ -147,13 +147,17 @@ class View:
         return Body(i, self.things[i], self.geometry.triangles[first:stop], self.geometry.vertex_start[i], self._own_axes(i))
 
     def bodies(self, things: NDArray[np.int32]) -> tuple[Body, ...]:
-        """Those of the things in a list of their positions, which may hold numbers below 0, too; they outlast the geometry."""
+        """Return the bodies of the things in a list of their positions; the bodies outlast the geometry.
+
+        The list may hold numbers below 0, too.
+        """
         found = (self.body(i) for i in np.unique(things[things >= 0]).tolist())
         return tuple(replace(body, places=body.places.copy()) if body.thing.step else body for body in found)
 
     def change(self, i: int, other: View) -> Change:
-        """What thing i of this view did until another: moved (or stood still), deformed, or gone, which it is, too, where it is
-        not there, or is made of other triangles.
+        """Return the change of thing i from this view to another: moved (or stood still), deformed, or gone.
+
+        A thing is also gone if it is not there, or is made of other triangles.
         """
         if i >= len(other.things):
             return "gone"

@@ -1,1 +1,1 @@
-"""Where what a pixel shows is in another picture."""
+"""The correspondences between pictures: the place in one picture of each point that a pixel of another shows."""

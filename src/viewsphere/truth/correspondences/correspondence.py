@@ -54,7 +54,7 @@ class Match:
 
     @cached_property
     def flow(self) -> NDArray[np.float32]:
-        """How far `xy` is from the centres of the pixels, (H, W, 2)."""
+        """The offset of `xy` from the centres of the pixels, (H, W, 2)."""
         from viewsphere.truth.correspondences import kernels_correspond as kernels
 
         out = np.empty((*self._inverse.shape, 2), np.float32)
@@ -68,8 +68,9 @@ class Match:
 
     @cached_property
     def xyz(self) -> Float:
-        """Where the points are then, in the other camera's axes, (H, W, 3) metres; NaN of what is nowhere; of the sky
-        (NaN, NaN, inf).
+        """The places of the points at the other instant, in the other camera's axes, (H, W, 3) metres.
+
+        They are NaN for points that are nowhere then, and (NaN, NaN, inf) for the sky.
         """
         out = self._moved(self._maps.turn, np.float64)
         out[(self._inverse == 0.0) & (self.placed.near == 0.0), 2] = np.inf
@@ -121,7 +122,7 @@ class Match:
 
     @property
     def _pixels(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Float, Float, NDArray[np.int32]]:
-        """What all kernels are told of the pixels and of their things."""
+        """The arguments on pixels and things that all kernels take."""
         inverse, rays = self._inverse.reshape(-1), self.view.rays.reshape(-1)
         return self.visibility.triangle, self.view.owners, inverse, rays, self._maps.kinds
 
@@ -153,7 +154,7 @@ class Match:
         return xy, near, rays
 
     def _shows(self, kind: int) -> NDArray[np.bool_]:
-        """Which pixels show a thing of this kind, (H, W)."""
+        """Return a mask of the pixels that show a thing of this kind, (H, W)."""
         owners = np.append(self.view.owners, len(self._maps.kinds) - 1)  # the last is the sky's
         return (self._maps.kinds == kind)[owners][self.visibility.triangle]
 

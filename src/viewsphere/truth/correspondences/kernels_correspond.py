@@ -1,11 +1,11 @@
-"""Where the points that pixels show are in another view: of what is rigid one matrix a thing, no vertex is read.
+"""The places, in another view, of the points that pixels show: rigid things need one matrix each, and read no vertex.
 
-A pixel's point is p / i in front of its camera: p the pixel (x, y, 1) or its ray, i = 1/s; so a rigid motion, and a projection
+A pixel's point is p / i in front of its camera: p the pixel (x, y, 1) or its ray, i = 1/s. So a rigid motion, and a projection
 after it, is q = M (p, i) with one matrix (3, 4) for all points of a thing. i = 0 is a direction: so the sky's formula is the
 same.
 
-But for `seen` (H, W) all arrays of pixels are flat, the components of a pixel beside one another: compilers make vectors of a
-loop over pixels only where they know how far apart its numbers are.
+All arrays of pixels except `seen` (H, W) are flat, with the components of a pixel beside one another. Compilers vectorise a
+loop over pixels only if the distance between its numbers is constant.
 """
 
 from __future__ import annotations
@@ -215,7 +215,10 @@ def _row_of_flow(m, inverse, y, row, first, stop, out):
 
 @njit
 def from_centers(xy, width, out):
-    """How far positions xy (H W 2,) of a picture of this width are from the centres of their pixels, (H W 2,) float32."""
+    """Write the offsets of positions xy (H W 2,) from the centres of their pixels into out (H W 2,) float32.
+
+    width: of the picture.
+    """
     for row in range(0, xy.shape[0] // 2, width):
         py = row // width + 0.5
         for i in range(width):

@@ -17,7 +17,7 @@ KINDS = {"moved": RIGID, "deformed": OTHER, "gone": GONE}
 
 @dataclass(frozen=True, eq=False)
 class Maps:
-    """What things, then the ground and the sky did from one view to another.
+    """The motions of things, then of the ground and the sky, from one view to another.
 
     `kinds` (n + 2,) int32 as in `kernels_correspond`; camera axes there are turn x + shift, x those here: (n + 2, 3, 3) and
     (n + 2, 3), the sky's without a shift.
@@ -41,7 +41,7 @@ class Maps:
 
 
 def maps_between(here: View, there: View) -> Maps:
-    """What things did from one view to another.
+    """Return the motions of things from one view to another.
 
     Shifts are composed of differences of near places, not of far ones: exact however far away the origin is.
     """

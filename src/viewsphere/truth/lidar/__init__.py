@@ -1,1 +1,1 @@
-"""What a turning LiDAR measures."""
+"""The measurements of a turning LiDAR."""

@@ -1,4 +1,4 @@
-"""Where, and at which angles, a LiDAR's rays meet surfaces."""
+"""The places and the angles at which a LiDAR's rays meet surfaces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the rays of a LiDAR meet, all at once, or column after column while things and sensor move."""
+"""The hits of a LiDAR's rays, all at once, or column after column while things and sensor move."""
 
 from __future__ import annotations
 
@@ -26,9 +26,11 @@ GLANCE = np.cos(np.radians(80.0))
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """What rays meet: of each its ring, column and triangle (N,), the distance (N,) metres, the angle (N,), 0 to pi/2,
-    between it and the triangle's normal, with its cosine, and the place (N, 3): world metres at its own moment, and weights
-    of the triangle's corners.
+    """The hits of rays.
+
+    Each hit has its ring, column and triangle (N,), and the distance (N,) in metres. The angle (N,), 0 to pi/2, lies between
+    the ray and the triangle's normal; `cosine` (N,) is its cosine. The place (N, 3) is in world metres at the hit's own
+    moment, and weights are those of the triangle's corners.
     """
 
     ring: NDArray[np.intp]
@@ -43,8 +45,10 @@ class Hits:
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """How all moves while columns are measured: `rotation` (W, 3, 3) and `shift` (W, 3) from the world to the sensor at each
-    column's moment; `moved`: of each thing that moves, by its position, (W, 4, 4) from where it is at the instant to then.
+    """The motion of things and sensor while columns are measured.
+
+    `rotation` (W, 3, 3) and `shift` (W, 3) lead from the world to the sensor at each column's moment. `moved` has, by the
+    position of each moving thing, the motion (W, 4, 4) from its place at the instant to its place at that moment.
     """
 
     rotation: Float
@@ -53,7 +57,7 @@ class Turning:
 
 
 def still_hits(geometry: Geometry, camera: Camera, visibility: Visibility) -> Hits:
-    """What all rays meet at the instant; `visibility` is `rasterize(geometry, camera)`."""
+    """Return the hits of all rays at the instant; `visibility` is `rasterize(geometry, camera)`."""
     ring, column = np.nonzero(visibility.inverse_depth > 0)
     triangle = visibility.triangle[ring, column]
     distance = 1.0 / visibility.inverse_depth[ring, column].astype(np.float64)
@@ -65,10 +69,10 @@ def still_hits(geometry: Geometry, camera: Camera, visibility: Visibility) -> Hi
 
 
 def swept_hits(geometry: Geometry, camera: Camera, turning: Turning) -> Hits:
-    """What each column's rays meet at its own moment.
+    """Return the hits of each column's rays at its own moment.
 
-    Which triangle a ray meets is looked up in the middle of its sector; where it meets the triangle's plane follows from its
-    own moment. So points are exact but at outlines, which are off by as much as half a sector's motion.
+    The triangle that a ray meets is looked up in the middle of its sector. The place on the triangle's plane follows from the
+    ray's own moment. So points are exact except at outlines, which are off by at most half a sector's motion.
     """
     width, parts = camera.width, list[Hits]()
     edges = np.unique(np.linspace(0, width, SECTORS + 1).round().astype(int)).tolist()
@@ -85,7 +89,10 @@ def swept_hits(geometry: Geometry, camera: Camera, turning: Turning) -> Hits:
 
 
 def _moved(geometry: Geometry, camera: Camera, turning: Turning, column: int) -> Float:
-    """All vertices where they are at a column's moment, in the axes of the camera then: see `truth.visibility.homogeneous`."""
+    """Return all vertices at their places at a column's moment, in the camera's axes at that moment.
+
+    See `truth.visibility.homogeneous`.
+    """
     from viewsphere.truth.raster import kernels_draw as kernels
 
     q, m = homogeneous(geometry, camera), np.column_stack((camera.R, camera.t))

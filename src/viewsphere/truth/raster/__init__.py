@@ -1,1 +1,1 @@
-"""Which triangle every pixel shows, and how far away."""
+"""The triangle that every pixel shows, and its distance."""

@@ -164,8 +164,9 @@ class Geometry:
 
 @dataclass(eq=False)
 class Facing:
-    """Which way the vertices and triangles of a scene face in the world: arrays that are written to where they are asked for at
-    another instant, so that there is one of each for all instants.
+    """The world normals of a scene's vertices and triangles.
+
+    The arrays are overwritten when another instant asks for them, so that all instants share one of each.
     """
 
     _vertices: NDArray[np.float32] | None = None
@@ -219,7 +220,10 @@ class Facing:
         return self._tops
 
     def _elsewhere(self, name: str, geometry: Geometry, things: Iterable[int] | None = None) -> list[int]:
-        """Which things, of these if any are given, have moved, or deformed, since these arrays were written."""
+        """Return the indices of the things that have moved, or deformed, since these arrays were written.
+
+        things: the things to compare; all by default.
+        """
         if name not in self._shown:
             self._shown[name] = _Shown(np.full_like(geometry.poses, np.nan), list(geometry.meshes))
         shown = self._shown[name]

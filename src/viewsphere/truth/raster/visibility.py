@@ -180,7 +180,7 @@ def in_picture(geometry: Geometry, q: NDArray[np.float64], end: int | None = Non
 
 
 def left_out(geometry: Geometry, q: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which things are left out of `homogeneous` vertices q of all of them."""
+    """Return a mask of the things that are left out of `homogeneous` vertices q of all of them."""
     first = _first_vertices(geometry.vertex_start, len(q))
     return (q[first] == _OUTSIDE).all(axis=1) if len(q) else first < 0
 
@@ -227,8 +227,9 @@ def _project(geometry: Geometry, m: NDArray[np.float64], base: int, stop: int, q
 
 
 def outside(geometry: Geometry, camera: Camera, pixels_from_world: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which things of a geometry lie wholly outside of a pinhole's picture, a pixel away from it, or behind the camera: all
-    corners of their boxes do.
+    """Return a mask of the things that lie wholly outside of a pinhole's picture, a pixel away from it, or behind the camera.
+
+    For such a thing, all corners of its box do so on one side.
     """
     corners = geometry.bounds[:, _CORNERS, np.arange(3)]  # (N, 8, 3)
     with np.errstate(invalid="ignore"):  # of things without triangles

@@ -44,7 +44,7 @@ def stick(geometry: Geometry, triangle: Whole, weights: Float, out: Float) -> Fl
 
 
 def shifts(own: View, other: View) -> Whole:
-    """What is added to the number of a triangle of each thing of a view, and of the ground, to get its number in another."""
+    """Return the shifts of triangle numbers from one view to another, for each thing of a view and for the ground."""
     here, there = own.geometry.triangle_start, other.geometry.triangle_start
     count = min(len(here), len(there)) - 1
     out = np.zeros(len(here), np.int32)

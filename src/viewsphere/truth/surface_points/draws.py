@@ -46,7 +46,7 @@ def points_on_model(view: View, i: int, count: int) -> Drawn:
 
 
 def _triangles(view: View, things: Sequence[int]) -> NDArray[np.int64]:
-    """Those of things that may be seen."""
+    """Return the triangles of things that may be visible."""
     geometry = view.geometry
     spans = [np.arange(geometry.triangle_start[i], geometry.triangle_start[i + 1]) for i in things]
     triangles = np.concatenate([np.zeros(0, np.int64), *spans])

@@ -1,4 +1,4 @@
-"""Which triangle each of any points of a picture meets first: a raster whose samples are the points.
+"""The triangle that each point of a picture meets first: a raster whose samples are arbitrary points.
 
 The points are sorted by pixel, so those of a row's neighbouring pixels are one run; each triangle is tested against the runs
 that its box touches. The test is exact for any point, so points of more pixels than needed do no harm. Known as the irregular

@@ -57,7 +57,7 @@ class SurfacePoints:
         return np.where(self.body >= 0, position[np.maximum(self.body, -1)], self.body)
 
     def in_view(self, view: View) -> Tracked:
-        """Where they are in a view of the same things, at any instant."""
+        """Return the points' places in a view of the same things, at any instant."""
         return Tracked(self, view)
 
     def chosen(self, index: NDArray[np.intp]) -> SurfacePoints:
@@ -67,7 +67,7 @@ class SurfacePoints:
 
     @staticmethod
     def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
-        """All points of several, on the same things; of bodies that have the same triangles the first is kept."""
+        """Join the points of several parts on the same things; of bodies with the same triangles, the first is kept."""
         bodies, numbers = list[Body](), list[Whole]()
         for part in parts:
             at = np.array([*(_number(body, bodies) for body in part.bodies), -1], np.int32)
@@ -113,7 +113,7 @@ def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
 
 
 def _fixed(view: View, thing: Whole, directions: Float) -> Float:
-    """Where the rays in these directions (N, 3) meet the ground, and directions of the sky; 0 for all else."""
+    """Return the places where rays in these directions (N, 3) meet the ground, and directions of the sky; 0 for all else."""
     place = np.zeros(directions.shape)
     sky, ground = thing == SKY, thing == GROUND
     place[sky] = directions[sky] / np.sqrt((directions[sky] ** 2).sum(axis=1, keepdims=True))
@@ -146,7 +146,7 @@ class Tracked:
 
     @cached_property
     def world(self) -> Float:
-        """Where the points are, (N, 3) metres; NaN of the sky, and of what is nowhere."""
+        """The places of the points, (N, 3) metres; NaN for the sky, and for points that are nowhere."""
         points = self.points
         fixed = (points.body == FREE) | ((points.body == GROUND) & self._has_ground)
         out = np.where(fixed[:, None], points.place, np.nan)

@@ -1,6 +1,6 @@
-"""Which triangle of a view each of any points meets first, and so which points are hidden: exact, for any lens.
+"""The triangle of a view that each point meets first, and so the points that are hidden: exact, for any lens.
 
-A distorted lens' points are sorted by pinholes that stand where it stands: one that sees all, or the six sides of a cube.
+A distorted lens' points are sorted by pinholes at the lens's place: one that sees all, or the six sides of a cube.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def placed_at(view: View, points: Float, own: Callable[[], Whole]) -> Placed:
 
 
 def pixels_at(view: View, points: Float) -> tuple[Float, Float, Float | None]:
-    """Where the same points are in the view's picture: xy, near and rays as `Placed` has them."""
+    """Return the places of the same points in the view's picture: xy, near and rays as in `Placed`."""
     xy, _ = project(view.camera.intrinsics, points)
     if view.has_unit_rays:
         x, y, z = points.T
