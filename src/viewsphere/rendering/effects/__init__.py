@@ -1,4 +1,4 @@
-"""What a camera does to its picture; labels never change.
+"""The effects of a camera on its picture; labels never change.
 
 Effects apply in the order of light's way: lines on the objects, lens, sensor, the camera's computer. Pictures are
 display-linear in [0, 1], (H, W, 3), or (H, W, 4) premultiplied, where blurs spread alpha too, while noise and colours leave

@@ -29,7 +29,7 @@ def edge_highlight(picture: Float32, strength: float, seen: Seen) -> Float32:
 
 
 def lines(seen: Seen) -> Float32:
-    """How much of a line each pixel shows, (H, W) float32 in [0, 1].
+    """Return the share of a line in each pixel, (H, W) float32 in [0, 1].
 
     The inverse depth of a plane is linear in the picture, so its second difference is not 0 only at creases and steps.
     """

@@ -1,4 +1,4 @@
-"""What a lens does to colours and light away from its axis."""
+"""The effects of a lens on colours and light away from its axis."""
 
 from __future__ import annotations
 

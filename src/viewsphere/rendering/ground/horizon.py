@@ -1,4 +1,4 @@
-"""Where the ground ends: haze takes it over towards the horizon, on every engine alike."""
+"""The end of the ground: haze covers it towards the horizon, in every engine alike."""
 
 BEGIN, OVER = 30.0, 470.0
 """Distances behind the middle of all placed things, in halves of their extent: where the ground begins to fade into the sky,

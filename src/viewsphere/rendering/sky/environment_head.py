@@ -27,7 +27,7 @@ _LAYOUTS = (("R", "G", "B"), ("r", "g", "b"), ("Y", "Y", "Y"))
 
 @dataclass(frozen=True)
 class ExrHead:
-    """Which part of an OpenEXR file has colours, the names of its red, green and blue, its width and height in pixels."""
+    """The part of an OpenEXR file that has colours: its number, names of red, green and blue, width and height in pixels."""
 
     part: int
     channels: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What weather does to the light of sun and sky: clouds cover them, fog spreads what is left.
+"""The effect of weather on the light of sun and sky: clouds cover them, fog spreads the remaining light.
 
 A layer of optical depth t lets exp(-t / sine of the sun's elevation) of the sun pass as a beam, and of all light
 1 / (1 + 3/4 (1 - g) t), with asymmetry g, as the two-stream approximation has it (Meador and Weaver 1980).

@@ -109,7 +109,7 @@ def _cone(camera: Camera) -> float:
 
 
 def _swing(falling: Falling, shares: Float, seconds: float) -> Float:
-    """How far flakes have swung from their way (N, 3)."""
+    """Return the displacement of flakes from their path by swinging, (N, 3)."""
     if isinstance(falling, Rain):
         return np.zeros((len(shares), 3))
     turn = 2 * math.pi * (shares[:, 1] + (0.25 + 0.5 * shares[:, 2]) * seconds)

@@ -1,4 +1,4 @@
-"""Where drops and flakes are, in cells of air that fall with them, and their streaks in a picture."""
+"""The places of drops and flakes, in cells of air that fall with them, and their streaks in a picture."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def _share(state):
 
 @njit(_nrt=True)
 def scatter(seed, low, high, size, mean, moved, eye, ahead, reach, cosine, most):
-    """What falls in the cells low..high (3,) int64, of `size` metres, that hold `mean` each, as far as cells can be seen.
+    """Return the drops or flakes in the cells low..high (3,) int64, of `size` metres, that hold `mean` each.
 
-    moved (3,): how far the air has come, so that a place in it lies at that place plus `moved` in the world. Cells farther than
+    moved (3,): the displacement of the air: a place in it lies at that place plus `moved` in the world. Cells farther than
     `reach` from the eye, or outside of a cone of this cosine around `ahead` (3,), are left out: a cosine of -1 is everywhere.
     Returns places in the air (N, 3) and three numbers of [0, 1) each (N, 3), N no more than `most`.
     """

@@ -1,4 +1,4 @@
-"""What falls: how many drops or flakes of which size a cubic metre of air holds, how fast they fall, and how they dim light.
+"""The numbers of rain and snow: how many drops or flakes a cubic metre holds by size, their speed, and their extinction.
 
 Rain: N(D) = 8000 exp(-4.1 R^-.21 D) per cubic metre and millimetre (Marshall and Palmer 1948), 200 sqrt(radius) m/s (Garg and
 Nayar, *Vision and Rain*, 2007). Snow: N(D) = 3800 R^-.87 exp(-2.55 R^-.48 D), D of the melted drop (Gunn and Marshall 1958),
@@ -38,7 +38,7 @@ def extinction(falling: Falling) -> float:
 
 
 def number(falling: Falling, low: float, high: float) -> float:
-    """How many a cubic metre holds whose diameter (as a drop) is from `low` to `high` millimetres."""
+    """Return the number of drops or flakes in a cubic metre with diameters (as a drop) from `low` to `high` millimetres."""
     of = sizes(falling)
     return of.most / of.slope * (math.exp(-of.slope * low) - math.exp(-of.slope * high))
 

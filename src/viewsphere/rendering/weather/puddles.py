@@ -1,4 +1,4 @@
-"""Where water stands: noise of low frequency over the world's floor, so that puddles stay while cameras move."""
+"""The places of puddles: noise of low frequency over the world's floor, so that puddles stay while cameras move."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SHORE = 0.035
 
 
 def puddles(wet: Wet, x: Float, y: Float) -> NDArray[np.float32]:
-    """How much water there is at places of the floor, world metres, (n,): 1 a puddle, 0 none."""
+    """Return the share of water at places of the floor, world metres, (n,): 1 in a puddle, 0 without water."""
     if not wet.puddles or not wet.amount:
         return np.zeros(len(x), np.float32)
     level = sum((weight * _noise(wet.seed + i, x * waves, y * waves) for i, (waves, weight) in enumerate(OCTAVES)), np.zeros(1))
