@@ -40,7 +40,7 @@ class Channel:
         return is_shaped and array.dtype == self.dtype
 
     def expected(self, height: int, width: int) -> str:
-        """What fits, in words."""
+        """Return a description of the shape and type that fit."""
         return f"{self.shape(height, width) if self.components else 'rows of'} {np.dtype(self.dtype)}"
 
 

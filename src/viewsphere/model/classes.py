@@ -150,7 +150,7 @@ class SemanticClass:
 
 
 def classes_of(categories: Iterable[tuple[int, str]]) -> tuple[SemanticClass, ...]:
-    """All classes of a data set that has these categories (id, name), stuff first."""
+    """Return the classes of a data set that has these categories (id, name), stuff first."""
     things = [(thing_class(i), name) for i, name in categories]
     colors: list[list[int]] = class_colors(max([FIRST_THING, *(i + 1 for i, _ in things)])).tolist()
     named = [(i, name, False) for name, i in STUFF_IDS.items()] + [(i, name, True) for i, name in things]

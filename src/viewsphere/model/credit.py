@@ -1,4 +1,4 @@
-"""Whose work a model is, and on which terms it may be used."""
+"""The author of a model, and the terms of its licence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What moves while the shutter is open: for motion blur, which pictures show and labels do not."""
+"""The motion while the shutter is open: for motion blur, which pictures show and labels do not."""
 
 from __future__ import annotations
 
@@ -53,8 +53,9 @@ class Sweep(Frozen):
 
 
 class Exposure(Frozen):
-    """All that moves around one instant: for each thing of a shot its sweep, None for one that stands still or is not there;
-    and that of the rig (world from rig), None where it stands still.
+    """The motion around one instant: a sweep for each thing of a shot, and one for the rig (world from rig).
+
+    A sweep is None for a thing that stands still or is not there, and for a rig that stands still.
     """
 
     things: tuple[Sweep | None, ...]

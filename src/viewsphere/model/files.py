@@ -25,9 +25,9 @@ STEP = 0.001
 
 
 class Files(Frozen):
-    """How each channel is written; every file says itself what it is, so data sets may mix them.
+    """The file format of each channel; every file names its own format, so data sets may mix them.
 
-    Labels are exact whatever is chosen, but for `depth: png16`, which rounds.
+    Labels are exact in every format except `depth: png16`, which rounds.
     """
 
     rgb: Literal["png", "jpeg", "webp", "qoi", "jxl"] = Field(

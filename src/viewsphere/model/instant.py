@@ -27,9 +27,9 @@ class Moment(Frozen):
 
 
 class Viewpoint(Brief):
-    """Where a camera stands on a sphere around `target` (world metres; None: the box centre of object 1), and when.
+    """The place of a camera on a sphere around `target` (world metres; None: the box centre of object 1), and its time.
 
-    `fill`, where the distance follows from it: the share of the picture that a model fills, see `composing.filling`.
+    `fill` is the share of the picture that a model fills, if the distance follows from it; see `composing.filling`.
     """
 
     UNSAID = ("fill",)

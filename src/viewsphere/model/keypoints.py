@@ -83,7 +83,7 @@ class Keypoints(Frozen):
         return self
 
     def only(self, names: Collection[str]) -> Keypoints | None:
-        """Those of these names, with the pairs of them; None if there are none."""
+        """Return the keypoints of these names, with the pairs among them; None if there are none."""
         points = {name: place for name, place in self.points.items() if name in names}
         skeleton, flips = (tuple(pair for pair in pairs if points.keys() >= {*pair}) for pairs in (self.skeleton, self.flips))
         return Keypoints(points=points, skeleton=skeleton, flips=flips) if points else None

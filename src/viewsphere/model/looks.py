@@ -1,4 +1,4 @@
-"""What a model looks like, in numbers from which words are made."""
+"""The appearance of a model, in numbers from which words are made."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ Word = Annotated[str, Field(min_length=1, max_length=LONGEST), AfterValidator(_w
 
 
 class Patch(Brief):
-    """What of one material has one basic colour and one word for its material: its share of what is seen of the model; means
-    over it, the colour (linear [r, g, b]), metallic, roughness, and the share of light that is let through; whether a clear
-    coat makes it glossy; and whether it stays what it is where models are made of another material, as it is not opaque.
+    """The parts of a model that have one material, one basic colour and one word for the material.
+
+    Their share is that of the model's visible surface. The means over them are the colour (linear [r, g, b]), metallic,
+    roughness, and the share of light that passes through. `coated`: whether a clear coat makes them glossy. `stays`: whether
+    they keep their material where models are made of another material, because they are not opaque.
     """
 
     UNSAID = ("stays",)

@@ -24,7 +24,7 @@ MOST_LISTED = 80
 
 
 class Place(NamedTuple):
-    """Where a value is written: a file and a line, counted from 1; or the option that sets the value, and 0."""
+    """The place of a value: a file and a line, counted from 1; or the option that sets the value, and 0."""
 
     file: str
     line: int
@@ -77,7 +77,7 @@ class Nearest:
         self._hints: dict[object, str] = {}
 
     def __call__(self, name: object, known: Iterable[str]) -> str:
-        """What `nearest` gives; nothing for names beyond those that are shown."""
+        """Return the result of `nearest`, or an empty string for names beyond those that are shown."""
         if name not in self._hints:
             self._hints[name] = nearest(name, known) if len(self._hints) < MOST_TOLD else ""
         return self._hints[name]
@@ -175,7 +175,7 @@ def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails], fields: Sequen
 
 
 def report(error: ValidationError, data: object, marks: Marks | None = None) -> str:
-    """All mistakes, a line each in the file's order: `recipe.yaml:12: models[0].categry: expected ...`."""
+    """Return the mistakes, a line each in the file's order: `recipe.yaml:12: models[0].categry: expected ...`."""
     found: list[tuple[Place, str]] = []
     for e in error.errors(include_url=False):
         path = _path_in(data, e["loc"]) + _below(e)
@@ -282,7 +282,10 @@ def _no_field(name: str | int, fields: Sequence[str]) -> str:
 
 
 def _listed(found: Any) -> str:
-    """How to write a list of a mapping alone, without what is long or nested in the mapping; nothing for other values."""
+    """Return the hint to write a mapping as a list with one entry, an empty string for other values.
+
+    Long and nested values of the mapping are left out of the hint.
+    """
     if not isinstance(found, Mapping):
         return ""
     value = cast(Mapping[str, Any], found)

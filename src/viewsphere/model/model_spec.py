@@ -1,4 +1,4 @@
-"""Which model, and how its file is turned into an object."""
+"""The identity of a model, and the conversion of its file to an object."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Size = tuple[float, float, float]  # width along X, height along Z, length along
 
 
 class Parts(Frozen):
-    """What is taken of a model that was read: the parts of the objects in `only` (None: all) but for those in `without`.
+    """The parts of a model to keep: those of the objects in `only` (None: all) except those in `without`.
 
     An object's parts are its own and those that it instances: of `Car` these are `Car` and `Car/Wheel`. They stand in the
     rigid axes `file_from_axes` (metres) of the whole model's.
@@ -28,11 +28,11 @@ class Parts(Frozen):
 
 
 class ModelSpec(Brief):
-    """Which model, and how its file is turned into an object that faces -Y with +Z up, in metres.
+    """The identity of a model, and the conversion of its file to an object that faces -Y with +Z up, in metres.
 
-    `source` is a file's absolute path, or `zoo:<family>` with `seed` naming the draw. None for `up`, `forward` or
-    `unit` means what the file (or its format's specification) says. An animated model is turned, scaled and centred as it is at
-    its file's first frame; which time step it shows, and when, its thing's motion says.
+    `source` is a file's absolute path, or `zoo:<family>` with `seed` naming the draw. None for `up`, `forward` or `unit`
+    means the value in the file, or in its format's specification. An animated model is turned, scaled and centred as it is at
+    its file's first frame. The motion of its thing determines the time step that it shows, and when.
     """
 
     UNSAID = ("fps", "sidecar", "symmetries", "keypoints", "color", "material", "size", "faces")

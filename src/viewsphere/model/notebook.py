@@ -1,4 +1,4 @@
-"""What shows itself in notebooks. How it looks, a layer above says, and the package's root tells it here."""
+"""The base class of objects that notebooks show as HTML. The package's root sets the function that makes the HTML."""
 
 from __future__ import annotations
 

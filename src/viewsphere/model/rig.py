@@ -34,7 +34,7 @@ class Sensor(Brief):
     lidar: Lidar | None = None
 
     def kept(self, channels: tuple[str, ...]) -> tuple[str, ...]:
-        """Those of a shot's channels that the sensor keeps, in the shot's order."""
+        """Return the channels of a shot that the sensor keeps, in the shot's order."""
         own = self.channels
         if own is None:
             return tuple(name for name in channels if (name == LIDAR) == (self.lidar is not None))
@@ -65,7 +65,7 @@ class Rig(Frozen):
 
     @property
     def rectified(self) -> tuple[Pair, ...]:
-        """All pairs of sensors with equal pinhole lenses and equal axes, of which one stands along the other's x axis."""
+        """The pairs of sensors with equal pinhole lenses and equal axes, of which one stands along the other's x axis."""
         numbered = permutations(enumerate(self.sensors), 2)
         found = ((i, j, _baseline(left, right)) for (i, left), (j, right) in numbered)
         return tuple(Pair(i, j, baseline) for i, j, baseline in found if baseline is not None)

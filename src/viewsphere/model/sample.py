@@ -120,7 +120,7 @@ class ObjectAnnotation:
             ) from None
 
     def __dir__(self) -> list[str]:
-        """All attributes, the fields in `more` among them."""
+        """Return the names of the attributes, with those of the fields in `more`."""
         return sorted({*object.__dir__(self), *self.more})
 
     @property
@@ -239,11 +239,12 @@ class Sample(Shown):
         return self.files.get(picture_of(self.files) or "")
 
     def point_cloud(self, axes: Axes = "camera", surface: Surface = "visible") -> PointCloud:
-        """What the picture shows as points, with colours, objects, categories and normals as far as channels are kept, in the
-        axes of the camera or the world; of any lens.
+        """Return the picture's visible points, or the points of `surface_samples`, in the axes of the camera or the world.
 
-        surface: visible, a point for each pixel that shows something, row by row, by `depth_ray`, else by `depth`; complete,
-        the points of `surface_samples` on all objects, seen or not, without colours. Raises StoreError where these are not
+        The cloud has colours, objects, categories and normals as far as channels are kept. Any lens is supported.
+
+        surface: visible, a point for each pixel that shows a surface, row by row, by `depth_ray`, else by `depth`; complete,
+        the points of `surface_samples` on all objects, visible or not, without colours. Raises StoreError where these are not
         kept, or the camera is not known; UserError for other axes or surfaces.
         """
         from viewsphere.model.point_cloud import PointCloud
@@ -267,7 +268,7 @@ class Sample(Shown):
             raise StoreError(f"frame {self.index}: {error}") from None
 
     def __dir__(self) -> list[str]:
-        """All attributes, the channels and the fields of labels among them."""
+        """Return the names of the attributes, with those of channels and of the fields of labels."""
         return sorted({*object.__dir__(self), *self.channels, *self.more})
 
     def __getattr__(self, name: str) -> Any:

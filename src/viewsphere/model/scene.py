@@ -77,7 +77,7 @@ AnySky = Annotated[Sky | Daylight | Environment, Field(discriminator="kind")]
 
 
 class Light(Frozen):
-    """What all lamps have."""
+    """The fields that all lamps have."""
 
     strength: Strength = Field(description="irradiance at one metre, facing it; for a hemisphere its radiance")
     color: Color = Field(default=WHITE, description="linear [r, g, b]")
@@ -169,7 +169,7 @@ class Ground(Brief):
 
 
 class Background(Frozen):
-    """What is seen where nothing else is: a plain colour, an image, else the sky.
+    """The picture behind all surfaces: a plain colour, an image, else the sky.
 
     cover: the largest centred part with the frame's proportions; stretch: all of it; crop: a part of the frame's
     proportions, `zoom` times smaller than the largest, at `place` (x, y) of the room there is.
@@ -209,14 +209,14 @@ class ViewTransform(Frozen):
 
 
 class Smoother(Frozen):
-    """What is done to the border between the targets and their background: Dwibedi et al., *Cut, Paste and Learn* (2017)."""
+    """The smoothing of the border between the targets and their background: Dwibedi et al., *Cut, Paste and Learn* (2017)."""
 
     kind: Literal["none", "box", "gaussian", "poisson"] = Field(default="none", description="none, box, gaussian or poisson")
     size: float = Field(default=1.5, gt=0, le=50, description="pixels: half the box' side, or the Gaussian's sigma")
 
 
 class Effects(Frozen):
-    """What a camera does to its picture; strengths are 0 (nothing) to 1 (as much as ever makes sense). Labels never change."""
+    """The camera's effects on its picture; strengths are 0 (no effect) to 1 (the largest sensible one). Labels never change."""
 
     blur: Portion = Field(default=0.0, description="defocus, as a Gaussian")
     motion_blur: Portion = Field(default=0.0, description="blur from camera motion")
@@ -237,7 +237,7 @@ class Effects(Frozen):
 
 
 class Finish(Frozen):
-    """How light becomes a picture: all that costs no new stage, so every frame may have its own."""
+    """The steps from light to a picture: all that need no new stage, so every frame may have its own."""
 
     background: Background = Background()
     smoother: Smoother = Smoother()
@@ -271,7 +271,7 @@ class BlendScene(Frozen):
 
 
 class Floor(Frozen):
-    """How high the ground lies, metres: lower where something is below `height`, unless that `is_fixed`."""
+    """The height of the ground, metres: lower where something is below `height`, unless it `is_fixed`."""
 
     height: float
     is_fixed: bool = False

@@ -42,7 +42,7 @@ class Share:
         return number + (self.number - number) % self.of
 
     def size(self, count: int) -> int:
-        """How many of `count` it has."""
+        """Return the number of items, of `count`, that the share has."""
         return len(range(self.number, count, self.of))
 
     def parted(self, inner: Share) -> Share:

@@ -92,11 +92,11 @@ class Shot(Frozen):
 
     @property
     def objects(self) -> tuple[Thing, ...]:
-        """What is labelled, in the order of the ids."""
+        """The labelled things, in the order of the ids."""
         return tuple(thing for thing in self.things if thing.id)
 
     def targets(self, together: bool) -> tuple[Thing, ...]:
-        """What its pictures are about: the frame's model, or `together` all models of a random scene."""
+        """Return the subjects of the shot's pictures: the frame's model, or `together` all models of a random scene."""
         found = tuple(thing for thing in self.things if thing.is_target)
         return found if together else found[:1]
 
@@ -116,12 +116,13 @@ class Shot(Frozen):
         return found if found < len(self.instants) and self.instants[found].index == wanted else None
 
     def things_at(self, instant: int) -> tuple[Thing, ...]:
-        """All things as they are at an instant, counted from 0 in the shot: standing still there, or not there."""
+        """Return the things as they are at an instant, counted from 0 in the shot: standing still there, or not there."""
         return tuple(thing.at(instant) for thing in self.things)
 
     def poses_at(self, instant: int) -> tuple[Motion, ...]:
-        """Where all that moves is, and which time steps are shown, at an instant counted from 0 in the shot: equal where the
-        world is.
+        """Return the motion of each moving thing at an instant counted from 0 in the shot: its place and its time step.
+
+        The results are equal for instants at which the world is equal.
         """
         return tuple(thing.motion.held(instant) for thing in self.things if not thing.motion.is_still)
 
@@ -153,8 +154,9 @@ class Shot(Frozen):
         return self.rig.sensors[sensor].kept(self.channels)
 
     def things_during(self, instant: int, moment: float) -> tuple[Thing, ...]:
-        """All things as they are a moment (see `Sweep`) after an instant while the shutter is open, standing still there; of
-        two time steps they show the nearer one.
+        """Return the things a moment (see `Sweep`) after an instant, while the shutter is open, standing still there.
+
+        Between two time steps, they show the nearer one.
         """
         exposure, things = self.exposures[instant], self.things_at(instant)
         return tuple(
@@ -170,7 +172,7 @@ class Shot(Frozen):
         return self.model_copy(update={"instants": (then,)}).camera(0, sensor)
 
     def finish(self, instant: int) -> Finish:
-        """How light becomes a picture at an instant."""
+        """Return the finish that turns light into a picture at an instant."""
         return self.instants[instant].finish or self.scene.finish
 
     @property

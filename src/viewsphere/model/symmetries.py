@@ -1,4 +1,4 @@
-"""Which rigid motions leave a model as it is."""
+"""The rigid motions that leave a model unchanged."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Symmetries(Frozen):
     continuous: tuple[Continuous, ...] = Field(default=(), max_length=MOST)
 
     def motions(self, steps: int) -> Iterator[Float]:
-        """All symmetries (4, 4), the identity first, with `steps` turns around each continuous axis."""
+        """Yield the symmetries (4, 4), the identity first, with `steps` turns around each continuous axis."""
         turns = [axis.turned(2 * math.pi * i / steps) for axis in self.continuous for i in range(1, steps)]
         for discrete in (IDENTITY, *self.discrete):
             yield np.array(discrete)

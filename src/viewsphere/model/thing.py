@@ -37,9 +37,11 @@ class TimeStep(Frozen):
 
 
 class Motion(Frozen):
-    """Where a thing is, and which time step of its file it shows: one rigid pose (world from object) for all instants of a
-    shot, or one an instant, None where the thing is not there; and one time step for all instants, or one an instant, None for
-    a model as it rests. What `moves` in a sequence is not still where it rests during a shot.
+    """The place of a thing, and the time step of its file that it shows.
+
+    `poses` has one rigid pose (world from object) for all instants of a shot, or one an instant, None where the thing is not
+    there. `steps` has one time step for all instants, or one an instant, None for a model at rest. A thing of a sequence with
+    `moves` does not count as still, even if it rests during a shot.
     """
 
     poses: tuple[Matrix4 | None, ...] = Field(default=(IDENTITY,), min_length=1)

@@ -22,8 +22,10 @@ invalid.
 
 
 class Tracks(Frozen):
-    """Which points each sensor of a sequence follows: a grid of pixels so far apart, so many pixels drawn `on` objects or on
-    all of the picture, or listed `points`; each picked at every instant of `at`. `seed` is what draws follow from.
+    """The points that each sensor of a sequence follows.
+
+    They are a grid of pixels with this spacing, or `count` pixels drawn `on` objects or on all of the picture, or listed
+    `points`. Each point is picked at every instant of `at`. The draws follow from `seed`.
     """
 
     at: tuple[int, ...] = Field(min_length=1)

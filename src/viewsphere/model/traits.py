@@ -1,4 +1,4 @@
-"""What a model says of itself, beside its triangles."""
+"""The metadata of a model, beside its triangles."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ class Grid:
         return np.column_stack([(m[0, i] * x + m[1, i] * y + m[2, i] * z) / self.cell for i in range(3)])
 
     def points(self, cells: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Where in the world these are, (N, 3) metres: the inverse of `cells`."""
+        """Return the world places of these cell coordinates, (N, 3) metres: the inverse of `cells`."""
         m, (a, b, c) = self.world_from_grid, cells.T * self.cell
         return np.column_stack([m[i, 0] * a + m[i, 1] * b + m[i, 2] * c + m[i, 3] for i in range(3)])
 
@@ -152,8 +152,10 @@ class Occupancy:
 
 @dataclass(frozen=True, eq=False)
 class VoxelGrid:
-    """What is in each cell of a sample's grid, arrays of shape `grid.size` (ahead, up, right): `classes` int32 and `instances`
-    int32, 0 for none; `filled`, `state` uint8 and `indoors` bool, whose codes `RUN` says.
+    """The content of each cell of a sample's grid, arrays of shape `grid.size` (ahead, up, right).
+
+    `classes` int32 and `instances` int32 are 0 for none. The codes of `filled`, `state` uint8 and `indoors` bool are those of
+    `RUN`.
     """
 
     grid: Grid

@@ -41,7 +41,7 @@ class Fog(Frozen):
 
 
 class Falling(Frozen):
-    """What all that falls has."""
+    """The fields that rain and snow share."""
 
     rate: Annotated[float, Field(strict=True, gt=0, le=200)] = Field(default=10.0, description="millimetres of water an hour")
     wind: tuple[Speed, Speed] = Field(default=(0.0, 0.0), description="wind [x, y] in metres a second")
