@@ -1,4 +1,4 @@
-"""What the server answers: each path a page may ask for, and nothing else. No part of a path ever becomes a file's name."""
+"""The server's answers: the paths that a page may request, and no others. No part of a path ever becomes a file's name."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ PAINTERS_AT_ONCE = 4
 
 @dataclass(frozen=True)
 class Answer:
-    """What is sent: the bytes, what they are, and for how many seconds a browser may keep them."""
+    """The body of a response, its media type, and the seconds for which a browser may keep it."""
 
     body: bytes
     kind: str = "application/json"

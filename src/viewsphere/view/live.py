@@ -1,4 +1,4 @@
-"""What is known of a data set while others may still write to it: its finished frames, and the columns of their labels.
+"""The finished frames of a data set that may still grow, and the columns of their labels.
 
 Frames are listed as soon as they are finished, which reads no file; their columns follow, read in the background. Both only
 become longer, in one order: a row of the columns is the frame of that row of the list.
@@ -65,9 +65,9 @@ class Shot:
 
 @dataclass(frozen=True)
 class Known:
-    """All that is known at one time: the listed frames, and the columns of the first of them.
+    """The state of a data set at one time: the listed frames, and the columns of the first of them.
 
-    `frames` are rows of `LISTED`; `damaged` tells of each row of the table whether its records could not be read.
+    `frames` are rows of `LISTED`; `damaged` marks the rows of the table whose records could not be read.
     """
 
     frames: NDArray[Any]
@@ -76,11 +76,11 @@ class Known:
 
     @property
     def read(self) -> int:
-        """How many of the listed frames have columns."""
+        """The number of listed frames with columns."""
         return len(self.damaged)
 
     def first(self, listed: int, read: int) -> Known:
-        """What was known when so many frames were listed, and so many of them read."""
+        """Return the state at which so many frames were listed, and so many of them read."""
         table = self.table
         objects = table.objects[: int(np.searchsorted(table.objects["frame"], read))]
         names = (table.splits, table.subjects, table.models, table.poses)
@@ -127,7 +127,7 @@ class Live:
 
     @property
     def known(self) -> Known:
-        """What is known now; it does not change while others come."""
+        """The current state; it does not change when more frames arrive."""
         with self._lock:
             return Known(self._frames.array, self._columns.table, self._damaged.array)
 
@@ -149,11 +149,11 @@ class Live:
         return dataset.sample_at(row.key, number - row.first)
 
     def times(self) -> list[tuple[float, int]]:
-        """When each listed shot was finished, in seconds since 1970, and its number of frames."""
+        """Return the time at which each listed shot was finished, in seconds since 1970, and its number of frames."""
         return [(shot.made, shot.count) for shot in list(self._shots)]
 
     def failures(self) -> dict[str, str]:
-        """What was left out of the run, and shots that cannot be read: why, by model or shot."""
+        """Return the reasons, by model or shot, for parts left out of the run and for shots that cannot be read."""
         found = dict(self._unreadable)
         try:
             found |= self.dataset.store.skipped()
@@ -162,8 +162,10 @@ class Live:
         return {key: without_folders(why) for key, why in found.items()}
 
     def state(self) -> dict[str, Any]:
-        """How far the data set is, as plain data: frames planned (without those left out), left out, finished and with columns,
-        frames a second, seconds left, failures, and when the newest frame was finished.
+        """Return the progress of the data set as plain data.
+
+        It has the frames planned (without those left out), left out, finished and with columns; frames a second, seconds left,
+        failures, and the age of the newest frame.
         """
         known, failures, now = self.known, self.failures(), time.time()
         left_out = self._left_out(failures)
@@ -183,7 +185,7 @@ class Live:
         }
 
     def _left_out(self, failures: Collection[str]) -> int:
-        """How many frames of the plan will never be there."""
+        """Return the number of the plan's frames that will never be rendered."""
         plan = self.dataset.plan
         shots = (row for row in map(plan.find, failures) if row is not None and row.subject not in failures)
         subjects = sum(index.samples_of(name) for index in plan.indices for name in failures)

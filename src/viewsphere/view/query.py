@@ -1,4 +1,4 @@
-"""Which frames a page asks for, and in which order: filters and sorting over columns, without reading a record."""
+"""The frames that a page requests, and their order: filters and sorting over columns, without reading a record."""
 
 from __future__ import annotations
 
@@ -58,8 +58,9 @@ class Within:
 
 @dataclass(frozen=True)
 class Query:
-    """What frames have to meet: the split and camera themselves, all else one of their objects. An order is one of `ORDERS`, or
-    a measure, descending behind a minus.
+    """The conditions on frames: the split and camera apply to the frame, all others to one of its objects.
+
+    An order is one of `ORDERS`, or a measure, descending behind a minus.
     """
 
     category: int | None = None
@@ -112,7 +113,7 @@ class Query:
         return tuple(one for one in self.within if MEASURES[one.measure].is_of_object != wanted)
 
     def _objects(self, table: FrameTable) -> NDArray[np.bool_] | None:
-        """Which objects meet what is asked of objects; None where nothing is."""
+        """Return a mask of the objects that meet the conditions on objects; None if there are no such conditions."""
         objects = table.objects
         conditions: list[Callable[[], NDArray[np.bool_]]] = []
         if self.category is not None:
@@ -130,8 +131,9 @@ class Query:
         return met
 
     def _sorted(self, table: FrameTable, objects: NDArray[np.bool_] | None) -> NDArray[np.float64]:
-        """What each frame is sorted by, ascending: the least, or behind a minus the greatest, of the objects that are meant;
-        unknown ones come last.
+        """Return the sort key of each frame, ascending; unknown keys come last.
+
+        For a measure of objects, the key is the least value of the matching objects, or behind a minus the greatest.
         """
         measure = MEASURES[self.order.removeprefix("-")]
         sign = -1.0 if self.order.startswith("-") else 1.0

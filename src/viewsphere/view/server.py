@@ -129,7 +129,7 @@ class Server(ThreadingMixIn, TCPServer):
 
     @property
     def url(self) -> str:
-        """What to open in a browser, with the token."""
+        """The address to open in a browser, with the token."""
         host = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(self.address.host, self.address.host)
         host = f"[{host}]" if ":" in host else host
         return f"http://{host}:{self.port}/?{urlencode({'token': self.token})}"
@@ -254,7 +254,7 @@ def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
 
 
 def _refused(address: Address, error: Exception) -> str:
-    """Why one cannot listen at an address, and what to do."""
+    """Return the reason why the server cannot listen at an address, and the fix."""
     code = error.errno if isinstance(error, OSError) else None
     if code == errno.EADDRINUSE:
         return (
@@ -360,7 +360,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(HTTPStatus.OK, answer)
 
     def _refusal(self) -> tuple[HTTPStatus, str] | None:
-        """What is wrong with a request, whatever it asks for."""
+        """Return the error of a request, independent of its path; None for a valid one."""
         hosts = self.headers.get_all("Host", [])
         if len(hosts) != 1:
             return HTTPStatus.BAD_REQUEST, "expected one Host"
