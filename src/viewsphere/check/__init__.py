@@ -177,7 +177,7 @@ def _covered(report: Report, dataset: Dataset, chosen: Chosen, read: int) -> Rep
 
 
 def _by_cycles(compared: Compared, dataset: Dataset, positions: range) -> Report:
-    """What Cycles sees otherwise; records that cannot be read are found by others."""
+    """Return the differences from Cycles' view; other checks report records that cannot be read."""
     findings: list[Finding] = []
     for frame, sample in samples_at(dataset, positions):
         findings += (Finding("cycles", frame, message) for message in compared.differences(sample))

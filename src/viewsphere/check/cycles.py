@@ -38,8 +38,9 @@ class Compared:
             self._engine.check({"python": python} if python else {})
 
     def differences(self, sample: Sample) -> Iterator[str]:
-        """What Cycles sees otherwise than the sample's instance map, beyond edges, or which file cannot be read. Raises
-        UserError where Blender does not answer.
+        """Yield the differences of Cycles' view from the sample's instance map, beyond edges, or the file that cannot be read.
+
+        Raises UserError where Blender does not answer.
         """
         try:
             asked = self._asked(sample)
@@ -90,7 +91,7 @@ class Compared:
         return kept, now, instant, sensor, load
 
     def note(self) -> str:
-        """What was compared, in a line."""
+        """Return a one-line summary of the comparison."""
         left = "".join(f"; {count} left out {why}" for why, count in self._left_out.items())
         return f"Cycles' object indices: {self.frames} frames, {self.pixels} pixels differ, {self.edges} of them on edges{left}"
 

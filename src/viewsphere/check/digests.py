@@ -12,7 +12,7 @@ from viewsphere.store.shots.manifest import Manifest
 
 
 def damaged(dataset: Dataset) -> tuple[int, dict[Path, list[str]]]:
-    """How many files stand in the manifests of finished shots and models; and of each folder with damage what is wrong."""
+    """Return the number of files in the manifests of finished shots and models, and the errors of each damaged folder."""
     folders, found = _folders(dataset), dict[Path, list[str]]()
     with ThreadPoolExecutor(AT_ONCE) as pool:
         counts = 0
@@ -24,7 +24,7 @@ def damaged(dataset: Dataset) -> tuple[int, dict[Path, list[str]]]:
 
 
 def _damage(folder: Path) -> tuple[int, list[str]]:
-    """How many files stand in a folder's manifest, and what is wrong with them."""
+    """Return the number of files in a folder's manifest, and their errors."""
     try:
         manifest = Manifest.read(folder)
     except StoreError as error:
@@ -33,7 +33,7 @@ def _damage(folder: Path) -> tuple[int, list[str]]:
 
 
 def _folders(dataset: Dataset) -> list[Path]:
-    """Those of the finished models, of what was simulated, and of the shots that the plan names."""
+    """Return the folders of the finished models, of the simulations, and of the shots that the plan names."""
     store = dataset.store
     models = [store.model_folder(key) for key in dataset.plan.models]
     shots = [store.shot_folder(key) for key in store.finished() if dataset.plan.find(key) is not None]

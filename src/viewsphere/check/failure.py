@@ -1,4 +1,4 @@
-"""What to say of a proof that broke off."""
+"""The message for a proof that broke off."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from viewsphere.store.credits import CREDITS, write_credits
 
 @dataclass(frozen=True)
 class Repaired:
-    """What was made again, in words, and what `check` says of the data set now; what could not be made again is a finding."""
+    """The repairs, in words, and the report of `check` on the data set now; failed repairs are findings."""
 
     done: tuple[str, ...]
     report: Report
@@ -52,7 +52,7 @@ def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = No
 
 
 class _Mending:
-    """What was made again so far, in words, and what could not be."""
+    """The repairs so far, in words, and the failed ones."""
 
     def __init__(self, dataset: Dataset, mender: Mender) -> None:
         self.done: list[str] = []

@@ -33,7 +33,7 @@ class Again:
         return self._sights.is_possible(sample)
 
     def differences(self, sample: Sample) -> Findings:
-        """What is kept of a sample and what is computed again, where they differ; nothing where scenery is not what it was."""
+        """Yield the differences between a sample's stored and recomputed labels; none if the scenery has changed."""
         sight = self._sights.of(sample, sample.files)
         if sight is None:
             return
@@ -54,7 +54,7 @@ class Again:
             return None
 
     def _pixels(self, sample: Sample, name: str, again: NDArray[Any] | None) -> Iterator[str]:
-        """Where a channel is not what it should be; what cannot be read, or has another size, is said elsewhere."""
+        """Yield the differences of a channel; other checks report a channel that cannot be read, or has another size."""
         if again is None:
             return
         try:

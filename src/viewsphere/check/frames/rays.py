@@ -85,11 +85,11 @@ class RayCaster:
         self._complete = True
 
     def off_surface(self, sample: Sample) -> Iterator[str]:
-        """What stored depth and instances say and the models, seen by Embree, do not.
+        """Yield the contradictions between stored depth and instances, and the models as Embree sees them.
 
-        Each point must lie on the right object, and nothing that cannot be seen through may be in front of it; a point of the
-        background must lie on scenery, or on a ground at the lowest point of all (or lower, where the shot says so); through
-        empty pixels nothing may be seen, the ground neither.
+        Each point must lie on the right object, and no opaque surface may be in front of it. A point of the background must
+        lie on scenery, or on a ground at the lowest point of all (or lower, if the shot says so). Through empty pixels
+        nothing may be visible, the ground neither.
         """
         if not sample.objects:
             return
@@ -148,7 +148,7 @@ class RayCaster:
         return abs(eye[2] - self._lowest) <= EDGE_ON * (1.0 + float(np.linalg.norm(eye + self._middle)))
 
     def _meets_ground(self, eye: Float, directions: Float, ahead: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which rays meet the ground beyond doubt; depth of rays that look back is not kept by all files."""
+        """Return a mask of the rays that certainly meet the ground; not all files keep the depth of rays that look back."""
         height = eye[2] - self._lowest
         steep = np.abs(directions[:, 2]) > LEVEL
         return ahead & steep & (directions[:, 2] * height < 0) & (abs(height) > LEVEL) & self._has_ground

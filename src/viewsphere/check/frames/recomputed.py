@@ -71,7 +71,7 @@ class Recomputed:
 
     @property
     def reasons(self) -> str:
-        """Why parts could not be planned; empty if all could."""
+        """Return the reasons why parts could not be planned; empty if all could."""
         return in_short(self.why_not.values())
 
     def composer(self, number: int) -> Composer | None:

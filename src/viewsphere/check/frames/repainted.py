@@ -51,7 +51,7 @@ class Repainted:
 
     @property
     def reasons(self) -> str:
-        """Why parts could not be painted; empty if all could."""
+        """Return the reasons why parts could not be painted; empty if all could."""
         return in_short(self.why_not.values())
 
     def _of_row(self, row: Row, sample: Sample) -> Iterator[str]:

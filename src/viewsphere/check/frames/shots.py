@@ -17,7 +17,7 @@ from viewsphere.model.shot import Shot
 
 
 def contradictions(sample: Sample, shot: Shot, place: int) -> Iterator[str]:
-    """What a record says otherwise than the sample at a place of its shot, counted from 0."""
+    """Yield the contradictions between a record and the sample at a place of its shot, counted from 0."""
     _, instant, sensor = next(islice(shot.samples, place, None))
     now, camera = shot.instants[instant], shot.camera(instant, sensor)
     if not _is_same_camera(sample.known_camera, camera):

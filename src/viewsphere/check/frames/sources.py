@@ -32,7 +32,7 @@ class Sources:
 
     @property
     def reasons(self) -> str:
-        """Why models could not be made again; empty if all could."""
+        """Return the reasons why models could not be made again; empty if all could."""
         return in_short(self.why_not.values())
 
     @cached_property
