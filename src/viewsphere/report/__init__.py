@@ -104,7 +104,7 @@ def _positions(films: Sequence[Film], table: FrameTable, frames: int) -> list[in
 def report_data(
     dataset: Dataset, table: FrameTable, positions: Sequence[int], proof: Proof | None, tell: Listener
 ) -> dict[str, Any]:
-    """All that the page shows except pictures, as plain data."""
+    """Return the page's content except pictures, as plain data."""
     return {
         "facts": without_folders(facts(dataset, finished(dataset))),
         "summary": summary(dataset, table),
@@ -117,7 +117,7 @@ def report_data(
 
 
 def conventions() -> dict[str, Any]:
-    """What the page knows of any data set, as plain data: the colours of layers, and vertices, edges and faces of boxes."""
+    """Return the page's constants for any data set, as plain data: colours of layers; vertices, edges and faces of boxes."""
     return {
         "keys": {drawing.name: drawing.key for drawing in drawings() if drawing.key},
         "box": {"faces": FACES, "edges": EDGES, "signs": VERTEX_SIGNS},

@@ -1,4 +1,4 @@
-"""Which frames a report shows: the same ones every time, from every model and split, spread over the poses."""
+"""The choice of a report's frames: the same ones every time, from every model and split, spread over the poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a data set comes from: its recipe, versions, and when its frames were made."""
+"""The origin of a data set: its recipe, versions, and the times at which its frames were made."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ PAUSE = 600.0
 
 @dataclass(frozen=True)
 class Timing:
-    """When frames were finished, by the times of their files: first and last as ISO 8601 (UTC), seconds of work between these
-    two without breaks, frames finished in these seconds, number of runs.
+    """The times at which frames were finished, from the times of their files.
+
+    first and last are in ISO 8601 (UTC). seconds: of work between these two, without breaks; frames: finished in these seconds;
+    runs: their number.
     """
 
     first: str
@@ -30,7 +32,7 @@ class Timing:
 
 
 def finished(dataset: Dataset) -> list[tuple[float, int]]:
-    """When each finished shot was written, in seconds since 1970, and its number of frames."""
+    """Return the time at which each finished shot was written, in seconds since 1970, and its number of frames."""
     found: list[tuple[float, int]] = []
     for row in dataset.rows:
         try:
@@ -41,7 +43,7 @@ def finished(dataset: Dataset) -> list[tuple[float, int]]:
 
 
 def timing(found: list[tuple[float, int]]) -> Timing | None:
-    """When shots were written, from what `finished` gives; None where no shot is finished."""
+    """Return the times at which shots were written, from the result of `finished`; None if no shot is finished."""
     if not found:
         return None
     found = sorted(found)

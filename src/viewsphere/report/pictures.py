@@ -157,7 +157,7 @@ Painter = Callable[[Sample, Scale, Mapping[str, Extent]], Layer]
 
 
 def layer_names(sample: Sample) -> list[str]:
-    """Which layers can be drawn of a sample; of one without a picture, for which another stands, that alone."""
+    """Return the names of the layers that can be drawn of a sample; only the picture's, if a stand-in replaces it."""
     if alone(sample.channels) is not None:
         return ["rgb"]
     drawable = ({*PAINTERS} - {"rgb", "coordinates"}) & {*sample.channels}

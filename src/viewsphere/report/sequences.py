@@ -71,7 +71,7 @@ def sequence_data(film: Film, positions: Sequence[int], whole: int) -> dict[str,
 
 
 def extents_of(samples: Sequence[Sample], film: Film) -> Extents:
-    """What the layers of a sequence tell apart, by their names."""
+    """Return the value ranges of a sequence's layers, by their names."""
     known, found = channel_labels(), dict[str, list[Extent]]()
     for i in film.spread(PROBES):
         for sample in (samples[place] for place in film.places[i]):

@@ -62,7 +62,7 @@ Listener = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class FrameTable:
-    """All finished frames in order and their objects, rows of `FRAME` and `OBJECT`, and the names that indices stand for."""
+    """The finished frames in order and their objects, rows of `FRAME` and `OBJECT`, and the names that indices stand for."""
 
     frames: NDArray[Any]
     objects: NDArray[Any]
@@ -80,7 +80,7 @@ class Names:
 
     @property
     def known(self) -> tuple[str, ...]:
-        """All names, in the order of their numbers."""
+        """The names, in the order of their numbers."""
         return tuple(self.codes)
 
     def code(self, name: str) -> int:
@@ -101,7 +101,7 @@ class Rows:
 
     @property
     def array(self) -> NDArray[Any]:
-        """All rows so far."""
+        """The rows so far."""
         return self._held[: self._count]
 
     def extend(self, rows: NDArray[Any]) -> None:
@@ -124,7 +124,7 @@ class Columns:
 
     @property
     def table(self) -> FrameTable:
-        """All rows so far."""
+        """The table of the rows so far."""
         names = (self._splits.known, self._subjects.known, self._models.known, self._poses.known)
         return FrameTable(self._frames.array, self._objects.array, *names)
 
