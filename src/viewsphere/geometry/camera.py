@@ -1,4 +1,4 @@
-"""Where a camera stands and what it sees: orbit viewpoints, pinhole projection, lens distortion.
+"""The geometry of cameras: orbit viewpoints, pinhole projection, lens distortion.
 
 World: right-handed, Z up, metres. Camera axes: x right, y down, z forward (OpenCV). The image spans [0, W] x [0, H];
 pixel (i, j) has its centre at (i + .5, j + .5).
@@ -141,11 +141,12 @@ def has_unit_rays(lens: Distortion | None) -> bool:
 
 
 def lens_limit(lens: Distortion) -> float:
-    """Where the lens map stops being one-to-one: a radius r/z for Brown-Conrady (may be infinite), an angle for a fisheye; a
-    scan has no limit.
+    """Return the limit within which the lens map is one-to-one.
+
+    The limit is a radius r/z for Brown-Conrady (may be infinite), an angle for a fisheye; a scan has no limit.
 
     Beyond this limit a distortion polynomial folds the picture back on itself, as no real lens does. A fisheye's radius must
-    rise with the angle. Brown-Conrady's Jacobian is symmetric (the map is the gradient of a potential); inside the limit it
+    rise with the angle. Brown-Conrady's Jacobian is symmetric (the map is the gradient of a potential). Inside the limit it
     is positive definite all around, so the potential is convex and no two rays meet in a pixel.
     """
     return _limit(lens.model, tuple(coefficients(lens).tolist()))

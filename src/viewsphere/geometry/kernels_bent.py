@@ -176,7 +176,10 @@ def _cut(lens, box, inside, outside):
 
 @inner
 def _turning(lens, a, b):
-    """Where between two directions the edge is nearest to the axis or farthest from it, and whether that is between them."""
+    """Return the point between two directions where the edge is nearest to the axis or farthest from it.
+
+    Also return whether that point is between the directions.
+    """
     aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
     x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     along, square = a[0] * x + a[1] * y + a[2] * z, x * x + y * y + z * z

@@ -34,7 +34,7 @@ def edges_apart(au, av, bu, bv, cu, cv):
 
 @inner
 def extent(points, triangles, t, axis):
-    """Where a triangle begins and ends along an axis."""
+    """Return the begin and the end of a triangle along an axis."""
     p, q, r = points[triangles[t, 0], axis], points[triangles[t, 1], axis], points[triangles[t, 2], axis]
     return min(p, q, r), max(p, q, r)
 
@@ -122,7 +122,7 @@ def turns(px, py, qx, qy, x, y):
 
 @inner
 def around(points, triangles, t, u, v, x, y):
-    """How often a triangle's edges go around a point of the plane of axes u and v: 1, -1 or 0."""
+    """Return the winding number of a triangle's edges around a point of the plane of axes u and v: 1, -1 or 0."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     return (
         turns(points[i, u], points[i, v], points[j, u], points[j, v], x, y)
@@ -133,7 +133,10 @@ def around(points, triangles, t, u, v, x, y):
 
 @inner
 def crossing(points, triangles, t, u, v, w, x, y):
-    """Where the line along axis w through a point of the plane of axes u and v crosses a triangle that is around it."""
+    """Return the coordinate where a line along axis w crosses a triangle around it.
+
+    x, y: the line's point in the plane of axes u and v.
+    """
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     pu, pv, pw = points[j, u] - points[i, u], points[j, v] - points[i, v], points[j, w] - points[i, w]
     qu, qv, qw = points[k, u] - points[i, u], points[k, v] - points[i, v], points[k, w] - points[i, w]

@@ -1,4 +1,4 @@
-"""What geometry asks of a camera, as protocols: `viewsphere.model.camera` has the classes that satisfy them."""
+"""The protocols of the cameras that geometry uses: `viewsphere.model.camera` has the classes that satisfy them."""
 
 # ruff: noqa: D102, the classes say what each name means
 

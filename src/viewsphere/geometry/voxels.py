@@ -1,4 +1,4 @@
-"""Which cells of a grid a mesh is in: its surface by exact overlap, and its inside where it is closed."""
+"""The cells of a grid that a mesh occupies: its surface by exact overlap, and its inside where it is closed."""
 
 from __future__ import annotations
 
@@ -41,8 +41,9 @@ def fill(points: Float, triangles: NDArray[np.int32], rows: Rows, owner: Cells, 
 
 
 def heights(points: Float, triangles: NDArray[np.int32], rows: Rows, size: tuple[int, int]) -> tuple[Float, Float]:
-    """Where the lines along the middle axis through the centres of the cells of a grid of this size (ahead, right) first and
-    last cross these rows of triangles, in cells; inf and -inf where they do not.
+    """Return the first and the last crossing of these rows of triangles on each vertical line through cells' centres, in cells.
+
+    The lines are along the middle axis of a grid of this size (ahead, right). Lines without a crossing have inf and -inf.
     """
     from viewsphere.geometry import kernels_voxels as kernels
 
@@ -52,8 +53,9 @@ def heights(points: Float, triangles: NDArray[np.int32], rows: Rows, size: tuple
 
 
 def closed(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Which triangles (T,) belong to a piece that is closed: every edge is passed as often one way as the other. Vertices in
-    one place are one, and pieces are what vertices join.
+    """Return a mask of the triangles (T,) that belong to a closed piece: each edge is passed as often one way as the other.
+
+    Vertices in one place are one, and shared vertices join triangles to pieces.
     """
     from viewsphere.geometry import kernels_voxels as kernels
 
