@@ -56,7 +56,7 @@ def drawn(sample: Sample, draw: Sequence[str]) -> list[Drawing]:
 
 
 def extents(samples: Sequence[Sample], draw: Sequence[str]) -> Extents:
-    """What the pictures beside some samples tell apart together."""
+    """Return the common value ranges of the drawings of some samples."""
     found: dict[str, list[Extent]] = {}
     for sample in samples:
         for drawing in drawn(sample, draw):
@@ -82,7 +82,7 @@ def draw_sample(
 
 
 def draw_instant(samples: Sequence[Sample], draw: Sequence[str], width: int | None, before: Before, within: Extents) -> Picture:
-    """All sensors of an instant side by side, as `draw_sample` draws them, but what is beside their pictures below them."""
+    """Draw all sensors of an instant side by side, as `draw_sample` does, with their labels' pictures below them."""
     if len(samples) == 1:
         return draw_sample(samples[0], draw, width, before, within)
     columns = [np.vstack(_pictures(sample, draw, width, before, within)) for sample in samples]

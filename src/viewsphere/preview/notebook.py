@@ -1,4 +1,4 @@
-"""How recipes, plans, data sets and samples show themselves in notebooks: HTML that needs no other file."""
+"""The HTML of recipes, plans, data sets and samples in notebooks, which needs no other file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which samples a preview shows."""
+"""The choice of a preview's samples."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _check(stages: Stages, planned: Plan, subjects: Sequence[str]) -> None:
 
 
 def _each(count: int, films: int, row: int) -> int:
-    """How many instants each of some sequences shows, so that rows are full."""
+    """Return the number of instants that each of some sequences shows, so that rows are full."""
     each = max(1, count // films)
     return each - each % row if each > row else each
 

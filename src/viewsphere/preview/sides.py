@@ -53,7 +53,7 @@ def four_sides(spec: ModelSpec, axes: tuple[Axis, Axis] | None = None, size: int
 
 
 def _words(side: str, azimuth_deg: float, axes: tuple[Axis, Axis] | None) -> str:
-    """Which side is seen, and what to write where it is the front."""
+    """Return the name of the visible side, and the setting to write if this side is the front."""
     if axes is None:
         return f"{side} (azimuth {azimuth_deg:g})"
     return f"{side} (azimuth {azimuth_deg:g}); the front? forward: {facing(*axes, azimuth_deg)}"

@@ -33,10 +33,11 @@ Tile = tuple[Picture, str]
 def contact_sheet(
     samples: Sequence[Sample], draw: Sequence[str] = (), columns: int = 4, width: int = 320, before: Before = nothing
 ) -> Picture:
-    """All samples side by side, with the labels named in `draw` over them, (H, W, 3) uint8 sRGB; those of sequences as
-    filmstrips: each begins a row, and the sensors of an instant are side by side.
+    """Draw samples side by side, with the labels named in `draw` over them, (H, W, 3) uint8 sRGB.
 
-    `before` gives what a sample's sensor saw before it, for trails. Raises StoreError for what nobody can draw.
+    Sequences are filmstrips: each begins a row, and the sensors of an instant are side by side.
+
+    `before` gives the earlier views of a sample's sensor, for trails. Raises StoreError for labels that cannot be drawn.
     """
     check_drawn(samples, draw)
     films = films_of(samples, is_shown)
@@ -56,7 +57,7 @@ def _strip(samples: Sequence[Sample], film: Film, draw: Sequence[str], width: in
 
 
 def film_caption(film: Film, i: int) -> str:
-    """What is seen at one of a film's instants, counted from 0."""
+    """Return the caption of one of a film's instants, counted from 0."""
     sensors = "" if film.sensors == ("camera",) else f"  {' | '.join(film.sensors)}"
     return f"{film.sequence}{sensors}  #{film.instants[i]}  {film.times[i]:.3f} s"
 

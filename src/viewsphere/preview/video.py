@@ -33,7 +33,7 @@ Listener = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Video:
-    """What was written: the sequences in it, its pictures and its seconds."""
+    """The numbers of a written video: its sequences, its pictures and its seconds."""
 
     sequences: int
     pictures: int
@@ -140,7 +140,7 @@ Write = Callable[[Path, Iterator[Shown], tuple[int, int], int], None]
 
 
 def _writer(file: Path) -> Write:
-    """What writes a file of this ending; raises as `write_video`."""
+    """Return the writer of files with this ending; raises as `write_video`."""
     if file.suffix.lower() == ".webp":
         return _write_webp
     if file.suffix.lower() != ".mp4":
