@@ -1,4 +1,4 @@
-"""How many pixels files promise at their heads, before anything is unpacked: QOI and JPEG XL.
+"""The picture sizes in the headers of QOI and JPEG XL files, read before anything is unpacked.
 
 QOI: https://qoiformat.org/qoi-specification.pdf; JPEG XL: ISO/IEC 18181-1 (SizeHeader) and 18181-2 (boxes).
 """
@@ -50,7 +50,7 @@ class _Bits:
 
 
 def _codestream(data: bytes) -> int:
-    """Where the picture begins in a file of boxes; the file's end where there is none."""
+    """Return the place where the picture begins in a file of boxes; the file's end if there is none."""
     place = 0
     while place + 8 <= len(data):
         size, kind = struct.unpack_from(">I4s", data, place)

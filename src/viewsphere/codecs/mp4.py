@@ -158,7 +158,10 @@ def _fed(pipe: IO[bytes], parts: Iterator[bytes]) -> bool:
 
 
 def _end(code: int | None, said: IO[bytes]) -> str:
-    """How ffmpeg ended, None for not at all, and the first thing that it said: what went wrong, before what came of that."""
+    """Return the way in which ffmpeg ended, and its first message, which names the cause.
+
+    code: the exit code, None if ffmpeg has not ended.
+    """
     how = "that it reads no more" if code is None else f"exit code {code}"
     if code is not None and -code in set(signal.Signals):
         how = signal.Signals(-code).name

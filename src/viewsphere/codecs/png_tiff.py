@@ -197,7 +197,7 @@ def encode_tiff(array: NDArray[Any]) -> bytes:
 
 
 def _tiff_head(height: int, width: int, components: int, dtype: np.dtype[Any], size: int) -> bytes:
-    """All that comes before the strip of so many bytes."""
+    """Return the bytes before a strip of `size` bytes."""
     head = _tiff_layout(height, width, components, dtype)
     return head[:_SIZE_AT] + struct.pack("<I", size) + head[_SIZE_AT + 4 :]
 

@@ -6,14 +6,14 @@ import tarfile
 
 
 def head(name: str, size: int) -> bytes:
-    """What stands before a file of this name and number of bytes; raises ValueError for a name that ustar cannot hold."""
+    """Return the header of a file of this name and number of bytes; raises ValueError for a name that ustar cannot hold."""
     info = tarfile.TarInfo(name)
     info.size = size
     return info.tobuf(tarfile.USTAR_FORMAT)
 
 
 def filling(size: int) -> bytes:
-    """What stands behind a file of so many bytes."""
+    """Return the padding behind a file of so many bytes."""
     return bytes(-size % tarfile.BLOCKSIZE)
 
 
@@ -23,6 +23,6 @@ def member(name: str, data: bytes) -> bytes:
 
 
 def ending(size: int) -> bytes:
-    """What stands behind the last file of a tar of so many bytes: two empty blocks, and what fills a record."""
+    """Return the bytes behind the last file of a tar of so many bytes: two empty blocks, and the padding of a record."""
     least = size + 2 * tarfile.BLOCKSIZE
     return bytes(least + -least % tarfile.RECORDSIZE - size)
