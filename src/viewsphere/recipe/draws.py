@@ -354,7 +354,7 @@ def is_random(value: object) -> bool:
 
 
 def alternatives(value: Any) -> Iterator[Any]:
-    """All values that a word or an entry may take: the value itself, or the values of each of its choices."""
+    """Yield the values that a word or an entry may take: the value itself, or the values of each of its choices."""
     if isinstance(value, Distribution) and value.choice is not None:
         for option in value.choice:
             yield from alternatives(option)

@@ -41,15 +41,15 @@ class FormatEntry(Frozen):
         return FormatEntry(name=self.name, options=read[0].model_dump(mode="json") if read else {})
 
     def arguments(self, field: str | None = None) -> tuple[Frozen, ...]:
-        """What the format's functions are given behind their other arguments: its `Options`, or nothing where it has none.
+        """Return the last arguments of the format's functions: its `Options`, or nothing if it has none.
 
         Raises RecipeError for options that it does not have, as mistakes of `field` (default: the format's name), and UserError
-        for a format that is not known.
+        for an unknown format.
         """
         return plugins.load(FormatSpec, self.name).read_options(self.name, self.options, field or self.name)
 
     def notes(self, categories: Sequence[Any]) -> Iterator[str]:
-        """What the format has to say of these options and a data set's categories; raises as `arguments` does."""
+        """Yield the format's notes on these options and a data set's categories; raises as `arguments` does."""
         spec = plugins.load(FormatSpec, self.name)
         if self.options and spec.notes is not None:
             yield from spec.notes(categories, *self.arguments())

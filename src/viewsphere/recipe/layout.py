@@ -1,4 +1,7 @@
-"""How a recipe says where models that share a frame stand. Placers and their options, `viewsphere.composing.placing` knows."""
+"""The recipe's entries for the places of models that share a frame.
+
+`viewsphere.composing.placing` has the placers and their options.
+"""
 
 from __future__ import annotations
 

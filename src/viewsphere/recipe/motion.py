@@ -1,4 +1,7 @@
-"""How a recipe says that things move. What the kinds of motion are, and their options, `viewsphere.composing.motion` knows."""
+"""The recipe's entries for the motion of things.
+
+`viewsphere.composing.motion` has the kinds of motion and their options.
+"""
 
 from __future__ import annotations
 

@@ -273,7 +273,7 @@ class SceneEntry(Frozen):
 
     @property
     def backgrounds(self) -> tuple[BackgroundEntry, ...]:
-        """All values that the background may take."""
+        """The values that the background may take."""
         return tuple(alternatives(self.background))
 
     @property

@@ -1,4 +1,4 @@
-"""What `viewsphere new` writes: a folder a kind, named after it, with a commented recipe and perhaps a script."""
+"""The files that `viewsphere new` writes: a folder a kind, named after it, with a commented recipe and perhaps a script."""
 
 from __future__ import annotations
 
