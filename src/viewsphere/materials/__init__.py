@@ -35,7 +35,7 @@ def metres(name: str, seed: int) -> float:
 
 
 def word(name: str) -> str:
-    """What sentences say of things that are made of a material: wooden."""
+    """Return the adjective for things made of a material, for use in sentences: wooden."""
     return plugins.load(MaterialSpec, name).word
 
 

@@ -1,1 +1,1 @@
-"""What materials are made of: noise, cells, strokes and courses, all of which tile, and how tones become colours."""
+"""The elements of materials: noise, cells, strokes and courses, all of which tile, and the colours of tones."""

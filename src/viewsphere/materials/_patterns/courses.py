@@ -12,8 +12,10 @@ from viewsphere.materials._patterns.surface import Map
 
 @dataclass(frozen=True, eq=False)
 class Courses:
-    """Where each texel lies: `piece` its piece's number; `across`, `down`: metres from its left and upper edge; `edge`: metres
-    to the middle of the nearest joint; `length`, `width`: metres of its piece.
+    """The place of each texel in its piece.
+
+    `piece`: its piece's number; `across`, `down`: metres from its left and upper edge; `edge`: metres to the middle of the
+    nearest joint; `length`, `width`: metres of its piece.
     """
 
     piece: NDArray[np.intp]

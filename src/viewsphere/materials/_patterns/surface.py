@@ -1,4 +1,4 @@
-"""What a material looks like, in physical terms: the square that repeats."""
+"""The appearance of a material, in physical terms: the square that repeats."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def draw_timber(rng: np.random.Generator) -> Timber:
 
 
 class Grain(NamedTuple):
-    """How late the wood is, about 0 to 1, which darkens it, and how deep its pores are, 0 to 1."""
+    """The lateness of the wood, about 0 to 1, which darkens it, and the depth of its pores, 0 to 1."""
 
     late: Map
     pores: Map
