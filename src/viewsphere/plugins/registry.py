@@ -33,7 +33,7 @@ S = TypeVar("S", bound=Specified)
 
 
 class Seam(NamedTuple):
-    """Where the plug-ins of a kind are that ship with viewsphere, and the constant of a module that holds its spec."""
+    """The package of a kind's built-in plug-ins, and the constant of a module that holds its spec."""
 
     package: str
     constant: str
@@ -114,7 +114,7 @@ def _module_of(kind: Kind, name: str) -> Any:
 
 
 def _entered(entry: metadata.EntryPoint) -> Any:
-    """What a third party's entry point names; whatever goes wrong there is an error of the plug-in."""
+    """Return the object that a third party's entry point names; any failure is an error of the plug-in."""
     try:
         return entry.load()
     except PluginError as error:
@@ -183,7 +183,7 @@ def _changes(paths: Iterable[str]) -> Changes:
 
 
 def _changed(path: str) -> int:
-    """When a folder was last changed, ns; 0 where there is none."""
+    """Return the time at which a folder was last changed, ns; 0 if there is no folder."""
     try:
         # Asked a thousand times a run: making a Path takes longer than the system's answer.
         return os.stat(path or ".").st_mtime_ns  # noqa: PTH116

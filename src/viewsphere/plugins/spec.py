@@ -20,7 +20,7 @@ from viewsphere.plugins.registry import Kind
 
 @dataclass(frozen=True)
 class Takes:
-    """How many values the function of a field takes, besides options."""
+    """The number of values that the function of a field takes, besides options."""
 
     values: int
 
