@@ -69,7 +69,7 @@ class RemotePath(Base):
         raise TypeError(f"{self}: expected a file on this machine, found one at a URL")
 
     def read_bytes(self) -> bytes:
-        """All bytes of the file."""
+        """Return the bytes of the file."""
         return self._asked("read", lambda system, path: bytes(system.cat_file(path)))
 
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
@@ -166,7 +166,7 @@ class RemotePath(Base):
         return os.stat_result((0, 0, 0, 0, 0, 0, int(info.get("size") or 0), 0, seconds, 0))
 
     def iterdir(self) -> Generator[RemotePath]:
-        """What lies in the folder; raises FileNotFoundError where there is none."""
+        """Yield the paths in the folder; raises FileNotFoundError if there is none."""
 
         def names(system: Any, path: str) -> set[str]:
             head = path.rstrip("/") + "/"
@@ -176,7 +176,7 @@ class RemotePath(Base):
         yield from (self / name for name in sorted(self._asked("list", names)))
 
     def glob(self, pattern: str, **_: Any) -> Generator[RemotePath]:
-        """What lies in the folder and has such a name; nothing where there is no folder."""
+        """Yield the paths in the folder whose names match; nothing if there is no folder."""
         try:
             yield from (path for path in self.iterdir() if fnmatchcase(path.name, pattern))
         except FileNotFoundError:
