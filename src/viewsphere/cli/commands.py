@@ -1,4 +1,4 @@
-"""All commands. Heavy modules are imported by the command that needs them."""
+"""The commands of the command line. Each command imports the heavy modules that it needs."""
 
 from __future__ import annotations
 

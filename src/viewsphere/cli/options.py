@@ -23,7 +23,7 @@ def explain(error: Any) -> None:
 
 
 def said(error: Any) -> str:
-    """What was expected and found, and which help to ask for."""
+    """Return the message of an error, with the command whose help to read."""
     from pydantic import ValidationError
 
     from viewsphere.model.mistakes import first_of, nearest
