@@ -1,1 +1,1 @@
-"""How numba is used: jit, its cache, faster compilation. Nothing about pictures."""
+"""The use of numba: jit, its cache, faster compilation. This package has no code for pictures."""

@@ -49,7 +49,7 @@ class Target:
 
     @property
     def note(self) -> str:
-        """Why this machine's kernels are none that other machines have; empty where they are."""
+        """Return the reason why other machines do not have this machine's kernels; empty if they have them."""
         if not self.lacking:
             return ""
         return f"note: this processor, {self.cpu}, lacks {', '.join(self.lacking)}, so kernels are compiled for it alone"
