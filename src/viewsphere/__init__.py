@@ -48,7 +48,7 @@ _HOMES = {
 
 
 def _html_of(value: Any) -> str:
-    """What notebooks show; drawing is imported when they do."""
+    """Return the HTML that notebooks show; the import of the drawing code waits until then."""
     from viewsphere.plugins import attribute
 
     return attribute("preview.notebook.html")(value)

@@ -84,7 +84,7 @@ _held: set[Aside] = set()
 
 
 def of_this_process() -> str:
-    """How names of this process's folders begin, behind their prefix."""
+    """Return the start of the names of this process's folders, behind their prefix."""
     return f"{socket.gethostname()}~{os.getpid()}~"
 
 

@@ -85,7 +85,7 @@ class BlenderDied(ViewsphereError):
 
 
 def joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
-    """All of them, each line once; of their common type if they have one."""
+    """Join errors to one, each line once; of their common type if they have one, else a UserError."""
     kinds = {type(error) for error in errors}
     kind = kinds.pop() if len(kinds) == 1 else UserError
     lines = list(dict.fromkeys(line for error in errors for line in str(error).splitlines()))
@@ -94,7 +94,7 @@ def joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
 
 
 def each(work: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
-    """What `work` makes of each item, in order; raises the user's mistakes in all of them together, as `joined` does."""
+    """Return the result of `work` for each item, in order; raises all of the user's mistakes together, as `joined` does."""
     made, errors = list[Made](), list[UserError]()
     for item in items:
         try:

@@ -62,7 +62,7 @@ def parsed(text: str, number: type[Number]) -> Number:
 
 
 class Limits:
-    """All limits, in the order of the documentation."""
+    """The limits, in the order of the documentation."""
 
     MAX_READ_SECONDS = Limit(120.0, "seconds to read one model file")
     MAX_READ_BYTES = Limit(4 << 30, "bytes of memory of the process that reads one (Linux)")
@@ -109,5 +109,5 @@ limits = Limits()
 
 
 def table() -> dict[str, Limit[int] | Limit[float]]:
-    """All limits by their names."""
+    """Return the limits by their names."""
     return {name: limit for name, limit in vars(Limits).items() if isinstance(limit, Limit)}
