@@ -23,7 +23,7 @@ def explain(error: Any) -> None:
 
 
 def said(error: Any) -> str:
-    """Return the message of an error, with the command whose help to read."""
+    """Return the message of an error, with a hint to the help of its command."""
     from pydantic import ValidationError
 
     from viewsphere.model.mistakes import first_of, nearest

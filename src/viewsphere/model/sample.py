@@ -243,9 +243,9 @@ class Sample(Shown):
 
         The cloud has colours, objects, categories and normals as far as channels are kept. Any lens is supported.
 
-        surface: visible, a point for each pixel that shows a surface, row by row, by `depth_ray`, else by `depth`; complete,
-        the points of `surface_samples` on all objects, visible or not, without colours. Raises StoreError where these are not
-        kept, or the camera is not known; UserError for other axes or surfaces.
+        surface `visible`: a point for each pixel that shows a surface, row by row, by `depth_ray`, else by `depth`. surface
+        `complete`: the points of `surface_samples` on all objects, visible or not, without colours. Raises StoreError where
+        these are not kept, or the camera is not known; UserError for other axes or surfaces.
         """
         from viewsphere.model.point_cloud import PointCloud
 

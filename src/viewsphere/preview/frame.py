@@ -82,7 +82,7 @@ def draw_sample(
 
 
 def draw_instant(samples: Sequence[Sample], draw: Sequence[str], width: int | None, before: Before, within: Extents) -> Picture:
-    """Draw all sensors of an instant side by side, as `draw_sample` does, with their labels' pictures below them."""
+    """Draw all sensors of an instant side by side, as `draw_sample` does, but with its pictures below one another."""
     if len(samples) == 1:
         return draw_sample(samples[0], draw, width, before, within)
     columns = [np.vstack(_pictures(sample, draw, width, before, within)) for sample in samples]

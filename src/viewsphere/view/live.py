@@ -67,7 +67,7 @@ class Shot:
 class Known:
     """The state of a data set at one time: the listed frames, and the columns of the first of them.
 
-    `frames` are rows of `LISTED`; `damaged` marks the rows of the table whose records could not be read.
+    `frames` are rows of `LISTED`; `damaged` marks the rows of the table with records that could not be read.
     """
 
     frames: NDArray[Any]
@@ -164,8 +164,8 @@ class Live:
     def state(self) -> dict[str, Any]:
         """Return the progress of the data set as plain data.
 
-        It has the frames planned (without those left out), left out, finished and with columns; frames a second, seconds left,
-        failures, and the age of the newest frame.
+        It has the frames planned (without frames left out), left out, finished and with columns. It also has frames a second,
+        seconds left, failures, and the age of the newest frame.
         """
         known, failures, now = self.known, self.failures(), time.time()
         left_out = self._left_out(failures)

@@ -88,8 +88,8 @@ class RayCaster:
         """Yield the contradictions between stored depth and instances, and the models as Embree sees them.
 
         Each point must lie on the right object, and no opaque surface may be in front of it. A point of the background must
-        lie on scenery, or on a ground at the lowest point of all (or lower, if the shot says so). Through empty pixels
-        nothing may be visible, the ground neither.
+        lie on scenery or the ground, which is at the lowest point of all (or lower, if the shot sets this). Through empty
+        pixels nothing may be visible, the ground neither.
         """
         if not sample.objects:
             return

@@ -32,9 +32,9 @@ def _share(state):
 def scatter(seed, low, high, size, mean, moved, eye, ahead, reach, cosine, most):
     """Return the drops or flakes in the cells low..high (3,) int64, of `size` metres, that hold `mean` each.
 
-    moved (3,): the displacement of the air: a place in it lies at that place plus `moved` in the world. Cells farther than
-    `reach` from the eye, or outside of a cone of this cosine around `ahead` (3,), are left out: a cosine of -1 is everywhere.
-    Returns places in the air (N, 3) and three numbers of [0, 1) each (N, 3), N no more than `most`.
+    moved (3,): the displacement of the air: a place in it is at that place plus `moved` in the world. Cells farther than
+    `reach` from the eye are left out. So are cells outside of a cone of this cosine around `ahead` (3,); a cosine of -1 is
+    everywhere. Returns places in the air (N, 3) and three numbers of [0, 1) each (N, 3), N no more than `most`.
     """
     places, shares = np.empty((most, 3), np.float64), np.empty((most, 3), np.float64)
     n, radius, sine = 0, size * math.sqrt(3) / 2, math.sqrt(max(1 - cosine * cosine, 0.0))

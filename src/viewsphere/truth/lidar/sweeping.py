@@ -28,9 +28,9 @@ GLANCE = np.cos(np.radians(80.0))
 class Hits:
     """The hits of rays.
 
-    Each hit has its ring, column and triangle (N,), and the distance (N,) in metres. The angle (N,), 0 to pi/2, lies between
-    the ray and the triangle's normal; `cosine` (N,) is its cosine. The place (N, 3) is in world metres at the hit's own
-    moment, and weights are those of the triangle's corners.
+    Each hit has its ring, column and triangle (N,), and the distance (N,) in metres. `incidence` (N,) is the angle, 0 to pi/2,
+    between the ray and the triangle's normal; `cosine` (N,) is its cosine. `place` (N, 3) is in world metres at the hit's own
+    moment. `weights` (N, 3) apply to the triangle's corners.
     """
 
     ring: NDArray[np.intp]
@@ -47,8 +47,8 @@ class Hits:
 class Turning:
     """The motion of things and sensor while columns are measured.
 
-    `rotation` (W, 3, 3) and `shift` (W, 3) lead from the world to the sensor at each column's moment. `moved` has, by the
-    position of each moving thing, the motion (W, 4, 4) from its place at the instant to its place at that moment.
+    `rotation` (W, 3, 3) and `shift` (W, 3) lead from the world to the sensor at each column's moment. `moved` maps the position
+    of each moving thing to its motion (W, 4, 4) from its place at the instant to its place at that moment.
     """
 
     rotation: Float

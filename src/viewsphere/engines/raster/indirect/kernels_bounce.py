@@ -121,7 +121,7 @@ def _place(frame, columns, rows, layers, b):
 
 @intrinsic
 def _look(typing, screens, cell, x, y, z, b, at):
-    """Multiply eight rows of b by the share of a place that each corner of its cell sees.
+    """Store the share of a place that each corner of its cell sees in eight rows of b.
 
     x, y, z: the place, in cells from the cell's first corner.
     """

@@ -320,7 +320,7 @@ def blur(light, opens, step, out):
 
 @njit(_nrt=True)
 def choose(rank, shape, light, chosen):
-    """Write the probe whose light each probe uses into chosen (N,) int32: the probe itself, or, for a buried one, a neighbour.
+    """Write the probe that lights each probe into chosen (N,) int32: the probe itself, or, for a buried one, a neighbour.
 
     The neighbour has the highest rank available (see `screen`), and is darker than most of that rank: leaked light is more
     visible than darkness.

@@ -1,8 +1,8 @@
 """The near surfaces that probes miss: each sample of a picture gathers them with short rays (`bounces: fine`).
 
-The last bounce of light is followed from the picture itself (final gathering, Reichert 1992), about as far as probes are apart:
-leaves shade leaves, an awning the shop below it. A surface that a ray meets sends the light of its patch; where a ray meets
-nothing, the probes' light arrives.
+The last bounce of light is followed from the picture itself (final gathering, Reichert 1992), about as far as probes are
+apart. So leaves shade leaves, and an awning the shop below it. A surface that a ray meets sends the light of its patch;
+where a ray meets nothing, the probes' light arrives.
 """
 
 from __future__ import annotations

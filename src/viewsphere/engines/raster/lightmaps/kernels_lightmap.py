@@ -142,7 +142,7 @@ def see(ids, turn, local, sky, below, nodes):
     """Add the light of the sky (W, K, 3) and the distant ground (3,) to nodes (N, COLUMNS).
 
     Light along the normal is the radiance of a white matt surface. A slightly tilted surface adds the light along both axes,
-    times its normal's parts along them. ids (K, N): patches that cosine-weighted rays meet; local (R, K, 3): directions in the
+    times its normal's parts along them. ids (K, N): patches that cosine-weighted rays meet. local (R, K, 3): directions in the
     chart's axes, of each way to turn them, turn modulo R.
     """
     turns = U(local.shape[0])

@@ -165,7 +165,7 @@ def lay(triangles, corners, smooth, normals, parts, numbers, index, places, faci
 def _share(dx, dy, dz, n, m, cells):
     """Return the weight of a site with normal m for a point with normal n, at any distance along their planes.
 
-    dx, dy, dz: from the one to the other.
+    dx, dy, dz: from the point to the site.
     """
     like = n[0] * m[0] + n[1] * m[1] + n[2] * m[2] - f4(LIKE)
     if like <= f4(0):

@@ -180,8 +180,8 @@ class _Grid:
 def look_near(tree: Tree, places: Float32, normals: Float32, reach: float, unit: float) -> tuple[Float32, Int32, Float32]:
     """Return the rays from places (P, 3) with these normals, and their hits within `reach`.
 
-    The result has the rays' directions (P, K, 3), the triangles that they meet (K, P), -1 for none, and the distances to
-    them, infinite for none.
+    The result has the rays' directions (P, K, 3), the triangles that they meet (K, P), -1 for none, and the distances,
+    infinite for none.
     """
     each = np.arange(len(places), dtype=np.int32)
     ways = np.matmul(domes(NEAR_RAYS, WAYS).astype(np.float32)[each % WAYS], axes_along(normals))

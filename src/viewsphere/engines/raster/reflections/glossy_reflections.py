@@ -1,7 +1,7 @@
 """The reflections of near things in polished level surfaces, where light bounces: floors, or the top of a table.
 
-Their material mirrors the probes' view, which is blurred and slightly displaced. Here the scene's own mirror image replaces
-it, sharp where a thing stands on the surface. The rougher the surface, the more blurred and the weaker the image.
+Their material mirrors the blurred and slightly displaced view of the probes. Here the scene's own mirror image replaces it,
+sharp where a thing touches the surface. The rougher the surface, the more blurred and the weaker the image.
 """
 
 from __future__ import annotations

@@ -251,9 +251,10 @@ def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals,
     """Return the source of each sample's colour, four samples a pixel: the nearest similar pixel's centre, or the sample.
 
     Pixels marked in behind (H * W,), if `behind` is not empty, may have different backgrounds at their samples. So each of
-    their samples has its own colour. seen, inverse_depth (H, W), radiance (H * W, 4): at the centres. Returns like (4N,): the
-    centre's pixel, or ~k for a colour of its own; rows (R,): the pixels (indices in `pixels`) with such samples: sample k % 4
-    of row k // 4.
+    their samples has its own colour. seen, inverse_depth (H, W), radiance (H * W, 4): at the centres.
+
+    Returns like (4N,) and rows (R,). like: the centre's pixel, or ~k for a colour of its own, of sample k % 4 of row k // 4.
+    rows: the pixels (indices in `pixels`) with such samples.
     """
     height, width = seen.shape
     like, rows = np.empty(triangle.shape[0], np.int32), np.empty(pixels.shape[0], np.int32)

@@ -1,6 +1,6 @@
 """The share of each light that arrives at a block's samples: distance, cone, and shadows that soften with distance.
 
-Most samples lie either before everything near them in the shadow map, or behind it: planes that enclose each cell of the map
+Most samples are either before everything near them in the shadow map, or behind it. Planes that enclose each cell of the map
 decide between the two. Only the other samples search the map for blockers.
 
 Area lights: the light vector of a polygon (Lambert 1760).

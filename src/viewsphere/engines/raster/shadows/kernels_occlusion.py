@@ -1,11 +1,11 @@
 """The share of the sky that a place can see: volumes around the things that hide it, maps of the ground below, and look-ups.
 
 In a still picture all targets share one volume and one map. In a sequence each target has its own, which move along with it.
-Several targets together leave the product of the shares that each leaves (Malmer, Malmer, Assarsson and Holzschuch 2007).
+Several targets together leave the product of their single shares (Malmer, Malmer, Assarsson and Holzschuch 2007).
 
-A cell of the volume holds two sets of numbers, for the directions above the horizon and for those below. They are the visible
-share m of the sphere and the mean v of the visible directions: the spherical harmonics up to degree 1 (Ramamoorthi and
-Hanrahan 2001). The cosine-weighted share that a surface with normal n can see is m + 2 v . n.
+A cell of the volume has values for the directions above the horizon, and for the directions below. The values are the visible
+share m of the sphere and the mean v of the visible directions. They are the spherical harmonics up to degree 1 (Ramamoorthi
+and Hanrahan 2001). The cosine-weighted share that a surface with normal n can see is m + 2 v . n.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """The share of a light that a sample sees where a view's map shows blockers: a blocker search, then a filter of that width.
 
-Percentage-closer soft shadows (Fernando 2005), where a texel blocks only if it lies between the sample and some part of the
-light, as in backprojection (Guennebaud et al. 2006). The filter is a window of the map's own texels, on a coarser level for a
-wider penumbra, so that nothing is random. A light has the shape and the size that it has as seen from the sample.
+The method is percentage-closer soft shadows (Fernando 2005). A texel blocks only if it is between the sample and some part of
+the light, as in backprojection (Guennebaud et al. 2006). The filter is a window of the map's own texels, on a coarser level
+for a wider penumbra, so that nothing is random. A light has the shape and the size that it has as seen from the sample.
 
-The edge that hides part of a lamp is often slanted: from beneath a table's edge, the part of the table top near the lamp would
-hide far more than the edge does. So for lights at a place a plane is fitted to the blockers, and the filter is as wide, on each
-side, as the light seen past that plane.
+The edge that hides part of a lamp is often slanted. Seen from beneath a table's edge, the part of the table top near the lamp
+would hide far more than the edge does. So for lights at a place a plane is fitted to the blockers. On each side, the filter
+is as wide as the light seen past that plane.
 """
 
 # ruff: isort: skip_file

@@ -29,8 +29,8 @@ Key = tuple[bytes, float, float, int]
 class StillMaps:
     """The surfaces of a sequence's still and moving things, and the maps of the still ones.
 
-    still: a function for each still thing, and for the ground, that gives its surfaces; moving: the same for each moving thing;
-    backdrop: the same maps of scenery alone.
+    still: functions that give the surfaces of each still thing, and of the ground. moving: functions that give the surfaces of
+    each moving thing. backdrop: the same maps of scenery alone.
     """
 
     still: tuple[Part, ...]

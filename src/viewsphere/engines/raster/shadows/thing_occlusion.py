@@ -57,7 +57,7 @@ class TargetShades:
     _joined: list[tuple[tuple[Float32, ...], Float32]] = field(default_factory=list[tuple[tuple[Float32, ...], Float32]])
 
     def bake(self, arranged: Arranged, casters: Casters, unit: float, has_ground: bool, quality: Quality) -> Occlusion:
-        """Return the occlusion by targets at their places, in a stage of this unit in metres whose origin is the world's.
+        """Return the occlusion by targets at their places, in a stage with the world's origin and this unit in metres.
 
         The light of lamps and sky is not in the result yet: `with_ground_light` adds it.
         """

@@ -129,7 +129,7 @@ def sky_lights(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[Distant,
 
 
 def environment_notes(sky: AnySky) -> tuple[str, ...]:
-    """Return a sentence for each repair of the picture of an environment."""
+    """Return the notes on the picture of an environment, such as its repairs, a sentence each."""
     return _photographed(_key(sky.file), True).notes if isinstance(sky, Environment) else ()
 
 
