@@ -1,4 +1,4 @@
-"""Who stands beside whom: the models that share a frame."""
+"""The choice of the models that share a frame."""
 
 from __future__ import annotations
 
@@ -40,11 +40,12 @@ def mixed(seed: int, models: Sequence[ModelSpec], count: int, names: Names, repe
 def balanced(
     seed: int, sizes: Mapping[str, int], models: Mapping[str, int], repeat: bool
 ) -> dict[str, tuple[tuple[str, int], ...]]:
-    """How many objects of which categories stand in each scene: all categories have as many over the scenes up to any one, to
-    one, as far as they have enough models.
+    """Return the number of objects of each category in each scene.
 
-    `sizes`: of each scene, in their order, how many objects it has; `models`: of each category how many models there are, which
-    stand in a scene once at most unless they may `repeat`. A scene minds those before it, and none behind it.
+    Over the scenes up to any one, the categories have equal numbers, within one object, while they have enough models.
+    `sizes`: the number of objects of each scene, in scene order. `models`: the number of models of each category.
+    A model appears at most once in a scene unless `repeat` is set. A scene's result depends on earlier scenes, never on later
+    ones.
     """
     had = dict.fromkeys(models, 0)
     found: dict[str, tuple[tuple[str, int], ...]] = {}

@@ -65,9 +65,10 @@ def _as_it_stands(thing: Thing, piece: SceneryPiece) -> Thing:
 
 @dataclass(frozen=True, eq=False)
 class Composition(Sendable):
-    """What a recipe with a place, company or planes puts into its frames; no mesh is touched before `things`.
+    """The contents of the frames of a recipe with a place, company or planes; no mesh is read before `things`.
 
-    `subjects`: what the frames are about. `groups` are the models that may meet: those of one split where splits are by model.
+    `subjects`: the subjects of the frames. `groups`: the models that may meet; with splits by model, the models of the same
+    split.
     """
 
     recipe: Recipe
@@ -180,7 +181,7 @@ class Composition(Sendable):
         seen_from: tuple[float, float] | None = None,
         redraw: int = 0,
     ) -> Laid | None:
-        """What is placed beside a frame's model that stands there; None where nothing is."""
+        """Return the objects placed beside a frame's model, which has the pose `own`; None where nothing is placed."""
         entry = self.recipe.scene.company
         if entry is None:
             return None
@@ -242,7 +243,7 @@ class Composition(Sendable):
         return place_pavements(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
     def surfaces(self, subject: str, pose: str | None, redraw: int = 0) -> tuple[Surface, ...]:
-        """Where things may stand above the floor of the place, world axes; none where it has none."""
+        """Return the surfaces of the place for objects above its floor, world axes; empty where the place has none."""
         place = self.recipe.scene.place
         return place_surfaces(self.recipe, place, self.place_names(subject, pose, redraw)) if place else ()
 
@@ -255,7 +256,7 @@ class Composition(Sendable):
         moved: Moved = _as_it_stands,
         redraw: int = 0,
     ) -> tuple[Thing, ...]:
-        """All that is placed: targets, labelled scenery, then the scenery that is background.
+        """Return all placed things: targets, labelled scenery, then the scenery that is background.
 
         `moved` gives pieces of scenery that the recipe moves (`piece.motion`) their motion.
         """
@@ -295,7 +296,9 @@ class Composition(Sendable):
         return pieces
 
     def center(self, targets: Sequence[Thing], box_of: BoxOf) -> Vector | None:
-        """What the camera looks at: the centre of the box around all targets; None, which says the same, for one."""
+        """Return the point the camera looks at: the centre of the box around all targets.
+        For a single target it is None, which means the same point.
+        """
         return None if len(targets) == 1 else center_of_all(targets, box_of)
 
 
@@ -402,7 +405,7 @@ def still(cast: Sequence[ModelSpec], poses: Sequence[Matrix4]) -> tuple[Thing, .
 
 
 def center(thing: Thing, box_of: BoxOf) -> Vector:
-    """What a camera looks at that has no target of its own: the centre of the object's box, world metres."""
+    """The default point a camera looks at: the centre of the object's box, world metres."""
     x, y, z = transform(thing.world_from_object, box_of(thing.model, thing.step).mean(axis=0)).tolist()
     return x, y, z
 

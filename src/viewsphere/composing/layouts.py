@@ -46,12 +46,12 @@ Remembering = Callable[[tuple[str, ...], Callable[[], Any]], Any]
 
 
 def unremembered(names: tuple[str, ...], make: Callable[[], Any]) -> Any:
-    """What the function makes now."""
+    """Return the function's result, computed on each call."""
     return make()
 
 
 def remembered_as(entry: ScenesEntry | CompanyEntry, cast: Sequence[ModelSpec], names: Sequence[str]) -> tuple[str, ...]:
-    """What simulated poses are remembered by: who is placed, how, and what all draws are for."""
+    """The key under which simulated poses are kept: the models, their layout, and the names of all draws."""
     asked = entry.model_dump_json(include={"layout", "gap", "orientation", "surface"})
     return (EDITION, asked, *names, "of", *(spec.key for spec in cast))
 
@@ -92,7 +92,7 @@ class Laid:
 
     @cached_property
     def ways(self) -> tuple[Carried, ...]:
-        """How each came there; none where the placer does not know."""
+        """The path of each object to its place; empty where the placer reports no paths."""
         placer, options = _placer(self.layout, self.room.field)
         if placer.ways is None:
             return ()
@@ -181,7 +181,7 @@ def _box(spec: ModelSpec) -> Float:
 
 
 def _vertices(spec: ModelSpec) -> Float:
-    """Those of the normalised model, (N, 3); raises ModelError if its file cannot be used."""
+    """The vertices of the normalised model, (N, 3); raises ModelError if its file cannot be used."""
     return shape_of((spec, None)).vertices
 
 

@@ -1,4 +1,4 @@
-"""Where randomness comes from: a generator, or a number, for a seed and the stable names of what is drawn."""
+"""The source of randomness: a generator, or a number, for a seed and the stable names of the drawn value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the dataclasses of a plan have in common that travel to worker processes."""
+"""The common base of a plan's dataclasses that travel to worker processes."""
 
 from __future__ import annotations
 

@@ -200,7 +200,7 @@ def _steps(
     clip: str | None = None,
     fps: float | None = None,
 ) -> tuple[Timeline, tuple[tuple[int, Moment], ...]]:
-    """When the file begins and ends, and the frames that are meant of it with their moments."""
+    """Return the file's timeline, and its requested frames with their moments."""
     line = animation(path, confined, clip, f"{where}.frames", blenders, fps)
     chosen = chosen_frames(frames, line.first, line.last)
     beyond = [frame for frame in chosen if not line.first <= frame <= line.last]
@@ -230,8 +230,8 @@ def animated_file(spec: ModelSpec, field: str) -> Path:
 def animation(
     path: Path, confined: bool, clip: str | None, field: str, blenders: Blenders, fps: float | None = None
 ) -> Timeline:
-    """When a file begins and ends while this clip plays, None: its first one. Raises RecipeError, which begins with the field,
-    for a file that cannot be read, for a clip that it does not have, and where nothing moves.
+    """Return the first and last times of a file for this clip; None is the file's first clip.
+    Raises RecipeError, which begins with the field, for an unreadable file, an unknown clip, and a file without movement.
     """
     try:
         line = blenders.timeline(path, confined, clip, fps)
@@ -243,7 +243,9 @@ def animation(
 
 
 def at_step(timing: Timing | None, number: int | None) -> TimeStep | None:
-    """What a model shows at the time step of this number: the last one where it has fewer, none where it does not move."""
+    """The state of a model at the time step of this number.
+    A model with fewer steps keeps its last step; a model without animation has None.
+    """
     return None if timing is None or number is None else timing.steps[min(number, len(timing.steps) - 1)].model
 
 
@@ -268,7 +270,7 @@ class Schedule:
         return self.runs[self._number(pose)]
 
     def position(self, pose: int) -> int:
-        """How many poses come before this one."""
+        """Return the number of poses before this one."""
         number = self._number(pose)
         return self._before[number] + pose - self.runs[number].first
 

@@ -23,7 +23,7 @@ Quaternion = tuple[Number, Number, Number, Number]
 
 
 class Key(Frozen):
-    """What is given at one time. What is left out, the keys before and after say."""
+    """The values of a motion at one time. The keys before and after fill in omitted values."""
 
     time: Number = Field(description="seconds")
     position: PointDrawn | None = Field(default=None, description="[x, y, z]: metres, world axes")

@@ -1,4 +1,4 @@
-"""What falls, and what it falls on."""
+"""Falling bodies, and the boards they fall on."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FLAT = 0.01
 
 @dataclass(frozen=True)
 class Touch:
-    """How a body touches others: its coefficient of sliding friction, and the share of its speed that it has after a bounce."""
+    """The contact behaviour of a body: its coefficient of sliding friction, and the share of its speed left after a bounce."""
 
     friction: float = 0.8
     restitution: float = 0.0

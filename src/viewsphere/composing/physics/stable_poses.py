@@ -1,4 +1,4 @@
-"""How models lie on a floor."""
+"""The stable poses of models on a floor."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ def stable_turn(hull: Float, rng: np.random.Generator) -> Float:
 
 
 def stable_ways(hull: Float) -> tuple[Float, Float]:
-    """All ways to lie, rotations (N, 3, 3), the likeliest first, and how likely each is (N,); the rarest are left out."""
+    """Return the stable poses as rotations (N, 3, 3), the likeliest first, and their probabilities (N,); the rarest are left
+    out.
+    """
     return _stable_ways(hull.tobytes())
 
 

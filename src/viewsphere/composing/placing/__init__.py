@@ -51,7 +51,7 @@ class Draws(Protocol):
 
 
 def draws_of(rng: Draws, *names: str) -> RngOf:
-    """What the distributions among a placer's options are drawn with, for these names, such as a slot and a model's key."""
+    """The generators for the distributions among a placer's options, for these names, such as a slot and a model's key."""
     return lambda path: rng("option", ".".join(path), *names)
 
 

@@ -25,7 +25,7 @@ TRIES = 200
 
 
 class Options(Frozen):
-    """Where in the line of sight."""
+    """The position of an object in the line of sight."""
 
     stand: Literal["floor", "sight"] = Field(
         default="floor", description="floor: on the floor; sight: in the air on the line of sight, for cameras high above"

@@ -30,7 +30,7 @@ ROOMY = 0.5
 
 
 class Options(Matter):
-    """How things fall into a box."""
+    """The options for things that fall into a box."""
 
     size: tuple[Drawn[Length], Drawn[Length], Drawn[Length]] | None = Field(
         default=None, description="[width, length, height] of the box outside, metres; by default twice its models' boxes"
@@ -45,7 +45,7 @@ def place(
 
 
 def ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Way]:
-    """How each fell."""
+    """Return the path of each falling thing."""
     return ways_of(_fallen(cast, room, shapes, rng, options))
 
 

@@ -28,7 +28,7 @@ TOP = 0.03
 
 
 class Options(Matter):
-    """How things fall."""
+    """The options for falling things."""
 
     spread: tuple[Drawn[Length], Drawn[Length]] | None = Field(
         default=None,
@@ -47,7 +47,7 @@ def place(
 
 
 def ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Way]:
-    """How each fell; none where they are caught in flight."""
+    """Return the path of each falling thing; empty where things are caught in flight."""
     return ways_of(_fallen(cast, room, shapes, rng, options)) if options.moment == "rest" else ()
 
 

@@ -36,7 +36,7 @@ AIR = 0.001
 
 
 class Options(Matter):
-    """How things are piled."""
+    """The options for piles."""
 
     high: CountDrawn = Field(
         default=3,

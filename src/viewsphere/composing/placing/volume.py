@@ -32,7 +32,7 @@ ROOMY = 0.08
 
 
 class Options(Frozen):
-    """Where in the air things are."""
+    """The positions of things in the air."""
 
     size: tuple[Drawn[Length], Drawn[Length], Drawn[Length]] | None = Field(
         default=None, description="[x, y, z]: size of the box around all, metres; by default a cube of twelve times their boxes"

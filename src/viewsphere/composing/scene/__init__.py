@@ -1,1 +1,1 @@
-"""What surrounds the things: places, sky, sun, weather, pictures."""
+"""The surroundings of things: places, sky, sun, weather, pictures."""

@@ -57,7 +57,7 @@ class BlendScenery(Sendable):
 
     @property
     def frames(self) -> tuple[int, ...]:
-        """Those that are asked for, ascending."""
+        """The requested frames, ascending."""
         return tuple(self.seconds)
 
     @property
@@ -67,7 +67,7 @@ class BlendScenery(Sendable):
 
     @cached_property
     def file(self) -> SceneFile:
-        """What is in it, asked from Blender once."""
+        """The contents of the file, which Blender reads once."""
         if not self.path.is_file():
             raise RecipeError(f"scene.blend.file: expected a .blend file; found none at {self.path}")
         try:
@@ -80,7 +80,7 @@ class BlendScenery(Sendable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What there is to say of the file."""
+        """The warnings about the file."""
         dark = f"{self.path.name}: no light and no world; lit by the default sun and sky"
         said = [f"scene.blend: {line}" for line in (*self.file.warnings, *([] if self.file.is_lit else [dark]))]
         seen = {name for one in self.labelled for name in (one.root.name, *one.members)}
@@ -108,7 +108,7 @@ class BlendScenery(Sendable):
         return tuple(Labelled(by_name[name], tuple(found), category[name] or "") for name, found in sorted(members.items()))
 
     def _category(self, one: SceneObject) -> str | None:
-        """What an object itself is; None where no rule fits."""
+        """Return the category of an object itself; None where no rule fits."""
         for rule in self.entry.labels:
             if _fits(rule, one):
                 return str(one.properties[rule.property]) if rule.property and rule.category == VALUE else rule.category
@@ -156,7 +156,7 @@ class BlendScenery(Sendable):
         return int(share(self.recipe.seed, "variant", group, *names) * count)
 
     def scene(self, model: str, pose: str | None) -> BlendScene:
-        """What the engine is told of the file."""
+        """Return the scene that the engine receives for the file."""
         return BlendScene(
             file=str(self.path),
             world_from_file=self.world_from_file,
@@ -207,7 +207,7 @@ class BlendScenery(Sendable):
         return not showing.isdisjoint(spec.parts.only)
 
     def at_frame(self, thing: Thing, frame: int) -> Thing:
-        """What is taken of the file, at one of the frames; a labelled object moves with its axes."""
+        """Return a thing of the file as it is at one of the frames; a labelled object moves with its axes."""
         if thing.model.parts is None:
             return thing
         step = self._step(thing.model.parts, frame)
@@ -223,7 +223,7 @@ class BlendScenery(Sendable):
         return tuple(self._step(spec.parts, frame) for frame in self.frames if self.shows(spec, frame))
 
     def _step(self, parts: Parts, frame: int) -> TimeStep:
-        """What is shown of the file at one of the frames: a labelled object's axes move with it."""
+        """Return the time step of the file at one of the frames; the axes of a labelled object move with it."""
         stands = None if parts.only is None else _rows(self._stands[frame][self._root_of[parts.only].name])
         return TimeStep(frame=frame, seconds=self.seconds[frame], file_from_axes=stands)
 
@@ -288,7 +288,7 @@ class BlendScenery(Sendable):
             )
 
     def _known(self, rule: LabelRule) -> tuple[str, tuple[str, ...]]:
-        """What a rule goes by, and what of the kind there is in the file."""
+        """Return the kind of name that a rule matches, and the names of this kind in the file."""
         objects = self.file.objects
         if rule.name is not None:
             return "name", tuple(self.file.by_name)

@@ -115,7 +115,7 @@ class Scenes:
         return concrete(entry, image=None if entry.image is None else self.pictures["image", entry.image][0])
 
     def jitter(self, model: str, name: str) -> JitterEntry:
-        """What is added to a pose, everything drawn."""
+        """Return the jitter of a pose, with all values drawn."""
         entry = self.recipe.scene.jitter
         return drawn(entry, self._rng_of(draw_names(entry.draw, model, name)), ("jitter",))
 
@@ -146,14 +146,16 @@ class Scenes:
         return (*names, "variation", self.variation)
 
     def _names_of_finish(self, model: str, pose: str | None, place: str) -> tuple[Names, ...]:
-        """What background, smoother, view and effects are drawn for; empty where every frame has a finish of its own."""
+        """The names for the draws of background, smoother, view and effects; empty where every frame has a finish of its own."""
         if pose is None and self.has_finish_per_frame:
             return ()
         draws = map(self._draw, self._finishing)
         return tuple(draw_names(draw, model, place if draw == "per_sequence" else pose) for draw in draws)
 
     def _draw(self, entry: object) -> str:
-        """When a part of the finish is drawn; a choice between several is made for every frame, or sequence."""
+        """Return the draw setting of a part of the finish; a choice between several parts is drawn for every frame, or
+        sequence.
+        """
         if isinstance(entry, PerFrame):
             return entry.draw
         return "per_frame" if self.recipe.time is None else "per_sequence"

@@ -1,4 +1,4 @@
-"""What a place's file says of itself by the names and custom properties of its objects: its floor, lanes and surfaces."""
+"""The floor, lanes and surfaces that a place's file declares by the names and custom properties of its objects."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ class FileFloor:
 
 @dataclass(frozen=True)
 class FileOffers:
-    """What a place's file offers, in its mesh's axes: `lanes` and `surfaces` as a zoo's `Place` has them, in the order of their
-    names. The `mistakes` of either are told when they are asked for.
+    """The floor, lanes and surfaces of a place's file, in its mesh's axes.
+    `lanes` and `surfaces` match those of a zoo's `Place`, ordered by name. Access to either raises its `mistakes`.
     """
 
     floor: FileFloor | None
@@ -101,8 +101,9 @@ class FileOffers:
 
 
 def offers_of(spec: ModelSpec) -> FileOffers:
-    """What the file of a place with this specification offers. The file is read once, and what it says is kept in the cache as
-    long as it stays the same. Raises ModelError for a file that cannot be read, RecipeError for properties that mean nothing.
+    """Return the offers of a place's file with this specification.
+    The file is read once, and the cache keeps its offers while the file is unchanged.
+    Raises ModelError for an unreadable file, RecipeError for meaningless properties.
     """
     state = split_source(Path(spec.source))[0].stat()
     return _offers_of(spec.model_dump_json(), (state.st_mtime_ns, state.st_size))
@@ -125,7 +126,9 @@ def _offers_of(text: str, state: tuple[int, int]) -> FileOffers:
 
 
 def told(mesh: Mesh, facts: FileFacts) -> list[dict[str, Any]]:
-    """What a normalised mesh and its file's facts say, as plain data: an entry for each marked object, in the mesh's axes."""
+    """Return the declarations of a normalised mesh and its file's facts as plain data: an entry for each marked object.
+    The entries are in the mesh's axes.
+    """
     said = {mark.part: mark for mark in facts.marks if mark.part}
     found = [_lane(mark, facts) for mark in facts.marks if not mark.part]
     for number, part in enumerate(mesh.parts):

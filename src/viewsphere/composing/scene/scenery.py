@@ -1,4 +1,4 @@
-"""What stands around the targets: the pieces of a place, and flat planes with pictures."""
+"""The scenery around the targets: the pieces of a place, and flat planes with pictures."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ UPRIGHT: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
 
 
 class Naming(Protocol):
-    """What gives a piece of scenery its category's id: 0 for the background's."""
+    """The function that gives a piece of scenery the id of its category: 0 for the background's."""
 
     def __call__(self, category: str, labels: Labels, /) -> int:
         """The id."""
@@ -66,7 +66,9 @@ class SceneryPiece:
 
 
 def draw_names(draw: str, model: str, pose: str | None) -> Names:
-    """What a draw is for; `pose` is only needed for one a frame, or a sequence: the frame's name, or the sequence's."""
+    """The names that a draw depends on.
+    `pose` is only needed for a draw per frame or per sequence: the name of the frame or of the sequence.
+    """
     if draw == "fixed":
         return ()
     return (model,) if draw == "per_model" or pose is None else (model, pose)
@@ -131,8 +133,8 @@ def place_lanes(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple
 
 
 def place_surfaces(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Surface, ...]:
-    """Where things may stand above the floor of a place, world axes; none where it has none. Raises RecipeError for a file's
-    surface that cannot be one.
+    """Return the surfaces of a place for objects above its floor, world axes; empty where the place has none.
+    Raises RecipeError for an invalid surface of a file.
     """
     if entry is None:
         return ()
@@ -147,7 +149,7 @@ def is_indoors(recipe: Recipe, entry: PlaceEntry | None) -> bool:
 
 
 def _offered(recipe: Recipe, entry: PlaceEntry, names: Names) -> Any:
-    """What a place offers, in its own axes: a `zoo.places.Place`, or the `FileOffers` of a file."""
+    """Return the offers of a place, in its own axes: a `zoo.places.Place`, or the `FileOffers` of a file."""
     return draw_place(recipe, entry, names) if entry.name else _file_offers(recipe, entry)
 
 

@@ -1,4 +1,4 @@
-"""Where the sun stands: NOAA's solar calculator, after Meeus, *Astronomical Algorithms* (2nd ed., chapters 25 and 28)."""
+"""The position of the sun: NOAA's solar calculator, after Meeus, *Astronomical Algorithms* (2nd ed., chapters 25 and 28)."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _apparent_sun(t: float) -> tuple[float, float]:
 
 
 def _refraction(elevation: float) -> float:
-    """How much higher the air makes the sun appear, degrees."""
+    """The apparent rise of the sun through the air, degrees."""
     if elevation > 85:
         return 0.0
     tangent = math.tan(math.radians(elevation))

@@ -1,4 +1,4 @@
-"""Where a rig looks: at a thing, a point, the models' middle, or ahead."""
+"""The aim of a rig: a thing, a point, the models' middle, or the direction ahead."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ STEEP = 1e-9
 
 
 def focuses(entry: Moving, look: object, times: Float, world: World) -> list[Float] | None:
-    """What is looked at, (3,) world metres, at every instant; None: ahead."""
+    """Return the target points, (3,) world metres, at every instant; None for the direction ahead."""
     if look == "ahead":
         return None
     if look == "center":

@@ -1,4 +1,4 @@
-"""What a trajectory is asked with, and what it answers."""
+"""The input of a trajectory, and its result."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RigPose:
-    """Where the rig is at an instant: `world_from_rig` (4, 4), OpenCV axes of its first sensor, metres; what it looks at,
-    world metres; and its lens, where it zooms.
+    """The rig at an instant.
+    `world_from_rig` (4, 4): OpenCV axes of its first sensor, metres; `focus`: its target point, world metres.
+    `intrinsics`: its lens, where the rig zooms.
     """
 
     world_from_rig: Float
@@ -29,11 +30,11 @@ class RigPose:
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """What is known of a sequence when its cameras are placed.
+    """The known facts of a sequence when its cameras are placed.
 
-    `center` gives the middle (3,) of a thing, by its number or its model's key, at an instant, counted from 0; it raises
-    RecipeError for one that is not there. `target` is what cameras look at that are told nothing else. `rng` gives the
-    generator of a purpose, seeded by the sequence's names. `lanes` are the place's, in world axes.
+    `center` gives the middle (3,) of a thing, by its number or its model's key, at an instant, counted from 0.
+    It raises RecipeError for an absent thing. `target` is the default target point of cameras.
+    `rng` gives the generator of a purpose, seeded by the sequence's names. `lanes` are the place's, in world axes.
     """
 
     fps: float

@@ -29,7 +29,7 @@ def looking(viewpoint: Viewpoint, focus: Vector, **more: Any) -> Instant:
 
 
 def inside_box(box: Float, points: Float) -> NDArray[np.bool_]:
-    """Which of the points (N, 3) lie inside an oriented box (8, 3) that has a volume."""
+    """Return a mask of the points (N, 3) inside an oriented box (8, 3) that has a volume."""
     corner = box[2]
     edges = box[[1, 3, 6]] - corner
     lengths = np.einsum("ij,ij->i", edges, edges)
@@ -38,7 +38,7 @@ def inside_box(box: Float, points: Float) -> NDArray[np.bool_]:
 
 
 def distance_problem(pose: Viewpoint, box: Float) -> str | None:
-    """Why the camera of this pose cannot stand where it does, inside the model's box (8, 3) in world metres; or None."""
+    """Return the error message for a camera of this pose inside the model's box (8, 3), world metres; None outside it."""
     target = box.mean(axis=0) if pose.target is None else np.array(pose.target)
     azimuth, elevation = np.radians([pose.azimuth_deg, pose.elevation_deg])
     camera = target + orbit_center(azimuth, elevation, pose.distance)

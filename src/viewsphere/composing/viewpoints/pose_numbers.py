@@ -125,7 +125,7 @@ def _views(part: Part) -> Poses:
 
 
 def _unknown(wanted: Names, known: Names) -> Names:
-    """Those of the wanted ones that are not known, each once, in their order."""
+    """Return the wanted names that are not known, each once, in their order."""
     seen = set[int](known.tolist())
     new = [name for name in dict.fromkeys(wanted.tolist()) if name not in seen]
     return np.array(new, np.dtype("<u8"))

@@ -73,14 +73,14 @@ class Poses(Sequence[Viewpoint]):
         return None
 
     def target(self, index: int) -> Vector | None:
-        """What the camera looks at, world metres; None: the centre of the model's box."""
+        """Return the point the camera looks at, world metres; None: the centre of the model's box."""
         target = self.viewpoints.target
         return target if isinstance(target, tuple) else None
 
     @property
     @abstractmethod
     def counts(self) -> dict[str, int]:
-        """What there is how many of; the product is the number of poses."""
+        """The size of each axis of the poses; the product is the number of poses."""
 
     @abstractmethod
     def name(self, index: int) -> str:
@@ -92,7 +92,7 @@ class Poses(Sequence[Viewpoint]):
 
     @abstractmethod
     def view(self, index: int) -> Orbit:
-        """Where the camera stands."""
+        """Return the orbit of the camera."""
 
     @property
     def are_shared(self) -> bool:
@@ -193,7 +193,7 @@ class RepeatedPoses(Poses):
 
 @dataclass(frozen=True)
 class GridPoses(Poses):
-    """All combinations of a grid: tilt outermost, then distance, elevation, azimuth innermost."""
+    """The combinations of a grid: tilt outermost, then distance, elevation, azimuth innermost."""
 
     viewpoints: Grid | Jitter
 
@@ -247,7 +247,7 @@ class JitteredPoses(Poses):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Those of the grid, and the draws for each of its poses."""
+        """The counts of the grid, and the draws for each of its poses."""
         return {**self.viewpoints.axis_counts, "draws": self.viewpoints.count}
 
     def name(self, index: int) -> str:
@@ -474,8 +474,8 @@ def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
 
 
 def pose_file(path: Path, viewpoints: PoseList, zooms: bool = False) -> PoseFile:
-    """What a file of poses, or the camera of a 3D file, says; with `zooms` the camera's lens may change. Raises RecipeError for
-    files that cannot be read.
+    """Read a file of poses, or the camera of a 3D file; with `zooms` the camera's lens may change.
+    Raises RecipeError for unreadable files.
     """
     from viewsphere.composing.viewpoints.pose_files import cameras
 

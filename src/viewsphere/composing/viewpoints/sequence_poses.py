@@ -30,7 +30,7 @@ class SequencePoses(RepeatedPoses):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Those of the poses, then the number of instants."""
+        """The counts of the poses, then the number of instants."""
         return {**self.base.counts, "instants": self.instants}
 
     def taken(self, index: int) -> int:
@@ -81,7 +81,7 @@ class TrajectoryPoses(Poses):
         return None
 
     def name(self, index: int) -> str:
-        """What it is."""
+        """Return the fixed name of the pose, "trajectory"."""
         return "trajectory"
 
     def view(self, index: int) -> Orbit:

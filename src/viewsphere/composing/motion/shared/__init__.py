@@ -1,1 +1,1 @@
-"""What several motions need."""
+"""Code shared by several motions."""

@@ -1,4 +1,4 @@
-"""How things turn on their way: a model's front, -Y, points ahead."""
+"""The turning of things along their path: a model's front, -Y, points ahead."""
 
 from __future__ import annotations
 

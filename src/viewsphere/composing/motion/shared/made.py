@@ -59,7 +59,7 @@ def _check_clips(recipe: Recipe) -> None:
 
 
 def _all_motions(recipe: Recipe) -> Iterator[tuple[str, Motions]]:
-    """All that a recipe says of motions, with their fields."""
+    """Yield all motions of a recipe, with their fields."""
     place, company = recipe.scene.place, recipe.scene.company
     for i, entry in enumerate(recipe.models):
         if entry.motion is not None:
@@ -78,7 +78,7 @@ def check_motion(motions: Motions | None, field: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Mover:
-    """What moves a thing, everything drawn: where it is at any time, whatever other times are asked for."""
+    """The movement of a thing with all values drawn. The state at a time does not depend on the other requested times."""
 
     start: Start
     moves: tuple[Move, ...]
@@ -89,7 +89,9 @@ class Mover:
         return (None, None) if pose is None else (_recorded(pose, self.start.placed), pose.step)
 
     def at(self, times: Sequence[float]) -> Motion:
-        """Where the thing is at times that follow one another, seconds, and what it shows; one for all where they are equal."""
+        """Return the poses and time steps of the thing at successive times, seconds; a single value for all times where they
+        are equal.
+        """
         poses, steps = zip(*map(self.state, times), strict=True)
         return Motion(poses=_one(poses), steps=_one(_lasting(steps)))
 
@@ -102,8 +104,9 @@ class Mover:
 
 
 def mover(motions: Motions | None, start: Start) -> Mover:
-    """What these motions are of one thing, which stands still where there are none. Each moves the pose that the ones before
-    gave; where one says that the thing is not there, it is not. Raises RecipeError where a motion cannot be.
+    """Return the mover of one thing for these motions; without motions the thing stays still.
+    Each motion changes the pose from the previous motions. A thing is absent while any motion reports it absent.
+    Raises RecipeError where a motion is impossible.
     """
     return Mover(start, tuple(_moves(motions, start)))
 

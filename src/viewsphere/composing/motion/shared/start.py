@@ -1,4 +1,4 @@
-"""What a motion starts from, and the poses that it gives."""
+"""The start of a motion, and the poses that a motion gives."""
 
 from __future__ import annotations
 
@@ -25,9 +25,7 @@ Origin = Literal["placed", "world"]
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Where a thing is, world from object (4, 4), rigid, metres; and the time step of its file that it shows, None: as it
-    rests.
-    """
+    """The pose of a thing, world from object (4, 4), rigid, metres, with the time step of its file; step None is the rest pose."""
 
     matrix: Float
     step: TimeStep | None = None
@@ -52,12 +50,13 @@ class Pose:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """What a motion starts from.
+    """The start of a motion.
 
-    placed: world from object as the thing's placer put it; seconds: length of the sequence; rng: a generator for what is drawn
-    for these names; lanes: of the place, world axes; timeline: frames of the model's file while its clip plays, None where it
-    has none; field: the recipe's, which messages begin with; way: where it was at a time, seconds from its first, on the way to
-    where it is placed, None where it was put there at once.
+    placed: world from object as the thing's placer put it; seconds: length of the sequence.
+    rng: a generator for the values drawn for these names; lanes: lanes of the place, world axes.
+    timeline: frames of the model's file while its clip plays, None where the file has none.
+    field: the recipe's field, with which messages begin.
+    way: the thing's pose on the path to its place, at a time in seconds from the path's start; None where it has no path.
     """
 
     placed: Matrix4

@@ -1,1 +1,1 @@
-"""What several placers need: rooms, footprints, spots."""
+"""Code shared by several placers: rooms, footprints, spots."""

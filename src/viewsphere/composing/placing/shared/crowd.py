@@ -1,4 +1,4 @@
-"""What stands on the floor, kept so that a spot is compared with its neighbours alone."""
+"""The things on the floor, indexed so that a spot is compared only with its neighbours."""
 
 from __future__ import annotations
 

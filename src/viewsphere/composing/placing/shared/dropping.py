@@ -54,7 +54,7 @@ RECORDED = 5
 
 
 class Matter(Frozen):
-    """What things are made of; each is drawn for itself."""
+    """The physical material of things; each value is drawn separately for each thing."""
 
     density: Drawn[Positive] = Field(default=300.0, description="density of the thing's hull, kg per cubic metre")
     mass: Drawn[Positive] | None = Field(default=None, description="mass in kg, instead of density")
@@ -70,8 +70,8 @@ class Matter(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """What things fall on: boards, and where they have to stay: over a rectangle of z = 0, their lowest points no higher than
-    this; None: anywhere.
+    """The boards on which things fall, and the region where they must stay.
+    The region is a rectangle of z = 0, with the things' lowest points at most at `height`; None allows any position.
     """
 
     boards: tuple[Board, ...] = ()
@@ -118,7 +118,7 @@ class Drop:
         raise RecipeError(f"{self.room.field}.layout: {min(problems)[1]} (the best of {TRIES} draws)")
 
     def _once(self, number: str, moment: str, longest_s: float) -> tuple[dict[str, Any], tuple[float, str] | None]:
-        """What comes of one draw, and, where it is not good, how bad that is, and in words."""
+        """Return the result of one draw, and for a bad result its badness, as a number and in words."""
         places = [self._spheres(i) for i in range(len(self.cast))]
         starts = self._starts(number, range(len(self.cast)), places, [])
         high = FENCE * max(shape.length for shape in self.shapes)
@@ -137,7 +137,7 @@ class Drop:
         return made | ({"ways": film.ways} if film else {}), self._problem(world, calm, bool(film))
 
     def _enclosed(self, within: Footprint, starts: Sequence[Matrix4]) -> Footprint:
-        """Where things have to stay, and all that is let go: what is wider would be caught between fences."""
+        """The region for the fences: `within`, enlarged to hold all released things, since fences would catch wider ones."""
         corners = [transform(np.array(pose), body.corners)[:, :2] for body, pose in zip(self._bodies, starts, strict=True)]
         reach = np.abs((np.concatenate(corners) - within.center) @ within.axes.T).max(axis=0)
         return replace(within, half=np.maximum(within.half, reach + GAP))
@@ -212,8 +212,8 @@ class Drop:
     def _starts(
         self, number: str, slots: Sequence[int], places: Sequence[tuple[Float, float]], there: list[tuple[Float, float]]
     ) -> list[Matrix4]:
-        """Where things are let go: over the region, turned about the vertical at random, each as low as it is clear of those
-        before.
+        """Return the poses at release: over the region, turned at random about the vertical, as low as clears the earlier
+        things.
         """
         balls = [*there, *(_ball(shape, pose) for shape, pose in self.room.taken)]
         poses: list[Matrix4] = []
@@ -283,7 +283,7 @@ def _ball(shape: Shape, pose: Matrix4) -> tuple[Float, float]:
 
 
 def _clear(spot: Float, radius: float, balls: Sequence[tuple[Float, float]], lowest: float, air: float) -> float:
-    """How high a ball at a spot is at least, clear of others with some air between."""
+    """Return the lowest height at which a ball at a spot is clear of the others, with some air between."""
     height = lowest
     for middle, other in balls:
         reach, off = radius + other + air, float(np.hypot(*(spot - middle[:2])))

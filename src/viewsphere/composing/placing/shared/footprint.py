@@ -1,4 +1,4 @@
-"""What things cover of the floor, and how they stand on it."""
+"""The floor area that things cover, and their upright poses on the floor."""
 
 from __future__ import annotations
 
@@ -153,12 +153,12 @@ def first_crowded(prints: Sequence[Footprint], gap: float, start: int = 0) -> tu
 
 
 def outline(points: Float, world_from_object: Matrix4) -> Outline:
-    """What points (N, 3) of a model, in its own axes, cover of the floor together, as seen from above."""
+    """Return the floor area that points (N, 3) of a model, in its own axes, cover together, as seen from above."""
     return Outline(convex_hull(transform(np.array(world_from_object), points)[:, :2]))
 
 
 def footprint(box: Float, world_from_object: Matrix4) -> Footprint:
-    """What a model with this box (8, 3), in its own axes, covers of the floor where it stands upright."""
+    """Return the floor area of an upright model with this box (8, 3), in the model's own axes."""
     m = np.array(world_from_object)
     low, high = box[2, :2], box[4, :2]
     return Footprint(m[:2, :2] @ ((low + high) / 2) + m[:2, 3], m[:2, :2].T, (high - low) / 2)

@@ -1,4 +1,4 @@
-"""What there is room in, and whether what was placed keeps to it."""
+"""The free space for objects, and checks that placed objects stay in it."""
 
 from __future__ import annotations
 
@@ -26,22 +26,25 @@ Memory = Callable[[Callable[[], Any]], Any]
 
 
 def forgetful(make: Callable[[], Any]) -> Any:
-    """What the function makes now."""
+    """Return the function's result, computed on each call."""
     return make()
 
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """What there is room in: the floor that is free (None: all of it), the metres that stay free between any two things, at
-    least, the spots that the recipe names, what stands there before (the model that company joins, at the origin, facing -Y),
-    and the recipe's field that asks for all this, which messages begin with.
+    """The free space for objects.
 
-    `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it; `clearance`: metres
-    of air above, None where it has no end; `seen_from`: azimuth and elevation, degrees, of the camera, where one is known;
-    `memory`: keeps what is simulated; `moves`: whether the ways of things to their places are needed, too; `built` gives the
-    parts of the place's mesh up to a height above the floor, as far as a layout reaches, metres; `blocked` holds those for the
-    things that are placed; `lanes`,
-    `bays` and `pavements`: those of the place; `furniture` gives what stands on and beside them, of a zoo's place.
+    `free`: the free floor, None: all of it; `gap`: smallest distance between any two things, metres.
+    `spots`: the spots that the recipe names; `field`: the recipe's field for the room, with which messages begin.
+    `taken`: things already in place (the model that company joins, at the origin, facing -Y).
+    `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it.
+    `clearance`: metres of air above, None for no limit.
+    `seen_from`: azimuth and elevation of the camera, degrees, None if unknown.
+    `memory`: keeps simulated results; `moves`: whether the paths of things to their places are needed, too.
+    `built` gives the parts of the place's mesh up to a height above the floor, within a layout's reach, metres.
+    `blocked` holds these parts for the placed things.
+    `lanes`, `bays` and `pavements`: those of the place.
+    `furniture` gives the objects on and beside them, for a place of the zoo.
     """
 
     free: Footprint | None = None
@@ -78,7 +81,7 @@ class Room:
 
     @property
     def prints(self) -> tuple[Footprint, ...]:
-        """What things that stand there before cover of the floor."""
+        """The footprints of the things already in place."""
         return tuple(footprint(shape.box, pose) for shape, pose in self.taken)
 
 

@@ -1,4 +1,4 @@
-"""Where there is room for one thing more."""
+"""The search for a spot with room for one more thing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ Cover = Callable[[Matrix4], Any]
 
 @dataclass(frozen=True, eq=False)
 class Others:
-    """What stands on the floor already, and maps of where no other thing can, the largest things' last, if many are to come."""
+    """The things already on the floor, and maps of the blocked positions.
+    If many things are to come, the maps of the largest things come last.
+    """
 
     maps: tuple[TakenMap, ...] = ()
     crowd: Crowd = field(default_factory=Crowd)

@@ -1,4 +1,4 @@
-"""How a thing came to where it stands."""
+"""The path of a thing to its place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a file of poses holds."""
+"""The entries of a file of poses."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ class Extrinsics(NamedTuple):
 
 
 class Arranged(NamedTuple):
-    """What a line of a file of shots says, with a name; the line's number, and where each of its objects is, as a camera is:
-    `R` (3, 3) from the world to the object.
+    """A line of a file of shots, with a name.
+    `line`: the line's number. `places`: the poses of its objects, in the form of a camera: `R` (3, 3) from the world to the
+    object.
     """
 
     said: ListedShot
@@ -46,11 +47,13 @@ class Arranged(NamedTuple):
 
 @dataclass(frozen=True)
 class PoseFile:
-    """All of a file's poses in its order, all orbits or all motions.
+    """The poses of a file in its order, all orbits or all motions.
 
-    `up` is the axis of the world that points up, as the format (or its usual writers) have it; `intrinsics` is the lens
-    that all frames share, None if the file names none, or several: then `lenses` has one for each. `times` are the seconds of
-    each pose, as the file counts them, None if it does not. `shots` say what else a file of shots says of each pose.
+    `up` is the world axis that points up, as the format (or its usual writers) define it.
+    `intrinsics` is the common lens of all frames, None if the file names none or several; for several, `lenses` has one a
+    frame.
+    `times` are the seconds of each pose on the file's clock, None if the file has none.
+    `shots` are the further fields of each pose in a file of shots.
     """
 
     entries: tuple[Orbit, ...] | tuple[Extrinsics, ...]

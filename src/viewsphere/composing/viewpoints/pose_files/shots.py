@@ -21,10 +21,10 @@ from viewsphere.store.texts import parsed
 
 
 def read_shots(path: Path) -> PoseFile:
-    """All shots of a file in its order, names given to those that have none; empty lines and `#` comments are passed over.
+    """Read all shots of a file in its order, and name the unnamed ones; empty lines and `#` comments are ignored.
 
-    Raises RecipeError with file and line for what is no shot, a pose that is none, a name that was there before, and a line
-    without a lens where others have one.
+    Raises RecipeError with file and line for an invalid shot, an invalid pose and a repeated name.
+    A line without a lens is also an error where others have one.
     """
     try:
         found = path.stat()
