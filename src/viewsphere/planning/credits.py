@@ -1,4 +1,4 @@
-"""Whose the models are: said in their entries, else in a table beside their files; those of the zoo are the project's own."""
+"""The credits of models: from their entries, else from a table beside their files; the zoo's models belong to the project."""
 
 from __future__ import annotations
 

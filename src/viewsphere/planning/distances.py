@@ -1,4 +1,4 @@
-"""Where a plan's cameras stand before anything is rendered, and whether one would stand inside of a model."""
+"""The positions of a plan's cameras before rendering, and the check for cameras inside a model."""
 
 from __future__ import annotations
 
@@ -104,8 +104,8 @@ class Distances:
         subject: str | None = None,
         views: Poses | None = None,
     ) -> Float:
-        """Where the cameras of these poses of a subject (by default the plan's first) stand, (poses, 3) world metres, when
-        these things are placed; they look at `target`, by default at the middle of what is placed.
+        """Return the camera positions of these poses of a subject, (poses, 3) world metres, for these placed things.
+        The subject is by default the plan's first. The cameras look at `target`, by default at the middle of the placed things.
         """
         middle = self._middle(things) if target is None else np.array(target)
         subject, views = subject or self.plan.subjects[0], views or self.plan.pose_list
@@ -135,6 +135,6 @@ def _standing(poses: Sequence[int], views: Poses) -> tuple[Float, Float]:
 
 
 def _stand(pose: Viewpoint) -> Float:
-    """Where the camera of a pose with a target stands, (3,) world metres."""
+    """Return the camera position of a pose with a target, (3,) world metres."""
     assert pose.target is not None
     return np.array(pose.target) + orbit_center(math.radians(pose.azimuth_deg), math.radians(pose.elevation_deg), pose.distance)

@@ -1,4 +1,4 @@
-"""How an engine's pictures look beside what a recipe says: what its program makes of it."""
+"""The digest of an engine's program, which with the recipe determines the look of its pictures."""
 
 from __future__ import annotations
 

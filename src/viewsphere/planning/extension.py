@@ -73,7 +73,7 @@ class Portion(Sendable):
         return replace(self, plan=self.plan.changed(memory=Simulated(store.root)))
 
     def __str__(self) -> str:
-        """What the part adds, in words."""
+        """Return the additions of the part, in words."""
         plan, part = self.plan, self.part
         there = plan.frames - part.frames
         less = f" less {there:,} that are there" if there else ""
@@ -121,7 +121,7 @@ class Portion(Sendable):
 
     @cached_property
     def subjects(self) -> tuple[str, ...]:
-        """What the shots show, each once; of the whole part all that the plan has."""
+        """The subjects of the shots, each once; of the whole part, all subjects of the plan."""
         if self.share.is_all:
             return self.plan.taken
         return tuple(dict.fromkeys(subject for index in self.indices for subject, shots in index.counts.items() if shots))
@@ -201,9 +201,9 @@ def resumed(planned: Plan, there: PlanRecord, number: int) -> Portion:
 
 
 def extend(planned: Plan, there: PlanRecord) -> Portion:
-    """What a recipe adds to a data set, as its new last part.
+    """Return the additions of a recipe to a data set, as its new last part.
 
-    Raises RecipeError where the recipe's pictures or labels would not fit those that are there.
+    Raises RecipeError where the recipe's pictures or labels do not fit the existing ones.
     """
     with planned.recipe.located():
         check_fit(planned, there)

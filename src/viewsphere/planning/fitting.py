@@ -1,4 +1,4 @@
-"""Whether what a recipe adds to a data set fits what is there."""
+"""The check that a recipe's additions fit the existing data set."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def settings(planned: Plan) -> Settings:
 
 
 def _movements(planned: Plan) -> Iterator[tuple[str, JsonValue]]:
-    """How each model moves in sequences, and what of its file an animated one plays, by names of settings."""
+    """Yield each model's motion in sequences, and the clip and rate an animated model plays, by names of settings."""
     entries = [entry.model_dump(mode="json", include=set(MOVES)) for entry in planned.recipe.models]
     for spec, number in zip(planned.model_specs, planned.entries, strict=True):
         is_meant = {"motion": planned.recipe.time is not None, "clip": spec.rest is not None, "fps": spec.rest is not None}

@@ -59,8 +59,8 @@ class _Found:
 
 
 def count_models(recipe: Recipe) -> int:
-    """How many models there are, without making their specifications; raises RecipeError for files and families of the zoo that
-    are not there, of all entries together.
+    """Return the number of models, without making their specifications.
+    Raises RecipeError for missing files and unknown families of the zoo, of all entries together.
     """
 
     def count(index: int) -> int:
@@ -187,7 +187,7 @@ def _families(recipe: Recipe, index: int) -> tuple[str, ...]:
 
 
 def _count(recipe: Recipe, index: int) -> int:
-    """How many models of each of its zoo families an entry means; raises RecipeError for more than are made."""
+    """Return an entry's number of models for each of its zoo families; raises RecipeError above the limit."""
     entry, most = recipe.models[index], limits.MAX_MODELS
     names = ("models", "count", entry.name or "", *entry.source)
     count = 1 if entry.count is None else drawn(entry.count, lambda path: generator(recipe.lasting_seed, *names, *path))
@@ -200,7 +200,7 @@ def _count(recipe: Recipe, index: int) -> int:
 
 
 def _scale(recipe: Recipe, entry: ModelEntry, key: str) -> Literal["as_is", "real_size"] | float:
-    """What a model is scaled to: a length is drawn for each."""
+    """Return the scale setting of a model; a length is drawn separately for each model."""
     if not isinstance(entry.scale, Length):
         return entry.scale
     return drawn(entry.scale.length, lambda path: generator(recipe.lasting_seed, "models", "scale", key, *path))
@@ -235,7 +235,7 @@ def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
 
 
 def _meant(source: str) -> tuple[str, ...]:
-    """All families that a source may mean, each as a source; the source itself where it means one."""
+    """Return the sources of all families that a source may mean; the source itself where it means a single one."""
     return tuple(ZOO + family for family in things()) if source == ZOO + ANY else (source,)
 
 
@@ -267,7 +267,7 @@ def _short(key: str) -> str:
 
 
 def _files(recipe: Recipe, index: int) -> tuple[Path, ...]:
-    """All files of an entry, sorted, each once; raises RecipeError for a source without any, or not `count` of them."""
+    """Return the files of an entry, sorted, each once; raises RecipeError for a source without any, or not `count` of them."""
     entry, where = recipe.models[index], f"models[{index}]"
     files = {file for source in entry.source for file in _matching(recipe.folder, source, where)}
     if entry.count is not None and entry.count != len(files):
@@ -313,7 +313,7 @@ def _unread(folder: Path, source: str, where: str) -> set[Path]:
 
 
 def _naming(folder: Path, unread: Collection[Path]) -> str:
-    """How many files are left out, and a pattern that names some of them as a recipe in this folder does."""
+    """Return the number of omitted files in words, with a pattern that a recipe in this folder can use for some of them."""
     first = min(unread, key=lambda f: f.as_posix())
     parent = first.parent.relative_to(folder) if first.is_relative_to(folder) else first.parent
     many = "1 file that Blender reads" if len(unread) == 1 else f"{len(unread):,} files that Blender reads"

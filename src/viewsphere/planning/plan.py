@@ -78,7 +78,7 @@ SHOT_FRAMES = 16
 
 @dataclass(frozen=True, eq=False)
 class Plan(Shown, Stock):
-    """What will be rendered: of every subject, in order, its poses. Nothing here grows with the frames."""
+    """The frames to render: the poses of every subject, in order. Its memory does not grow with the number of frames."""
 
     categories: tuple[Category, ...] = ()
     shot_frames: int = SHOT_FRAMES
@@ -112,7 +112,7 @@ class Plan(Shown, Stock):
 
     @property
     def factors(self) -> str:
-        """What its frames are the product of, in words."""
+        """The factors whose product is the number of frames, in words."""
         sensors = len(self.rig.sensors)
         more = {"sensors": sensors if sensors > 1 else 0, "variations": len(self.recipe.variations or ())}
         return self.sampler.factors(self) + "".join(f" x {count} {what}" for what, count in more.items() if count)
@@ -125,7 +125,7 @@ class Plan(Shown, Stock):
 
     @property
     def kept_specs(self) -> tuple[ModelSpec, ...]:
-        """All models that the data set keeps: the recipe's, then labelled scenery's."""
+        """The models that the data set keeps: the recipe's, then labelled scenery's."""
         return self.model_specs + (() if self.composition is None else self.composition.models)
 
     @property
@@ -164,7 +164,7 @@ class Plan(Shown, Stock):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What may be meant otherwise."""
+        """The warnings about settings that are probably unintended."""
         by = self.recipe.splits.by
         found = [
             f"split {name!r} is empty: too few {by}s for its share; list models for it, or split by something else"
@@ -191,7 +191,7 @@ class Plan(Shown, Stock):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is missing for others to use the data set, licences of models; and what options of formats mean for it."""
+        """The notes for publishing: missing licences of models; and the effects of format options on the data set."""
         options = chain.from_iterable(entry.notes(self.categories) for entry in self.recipe.formats)
         return (*unlicensed((spec.key for spec in self.kept_specs), self.credits), *options)
 
@@ -221,13 +221,13 @@ class Plan(Shown, Stock):
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """Which subjects are taken from which poses, time step by time step, by all sensors each."""
+        """The blocks of subjects and their poses, time step by time step, each for all sensors."""
         found = (replace(block, each=len(self.rig.sensors)) for block in self.sampler.blocks(self))
         return tuple(replace(block, subjects=self._taken(block.subjects)) for block in found)
 
     @cached_property
     def taken(self) -> tuple[str, ...]:
-        """What pictures are about: the subjects, where there are variations each under each of them."""
+        """The subjects of pictures; with variations, each subject under each variation."""
         return self._taken(self.subjects)
 
     def _taken(self, subjects: Sequence[str]) -> tuple[str, ...]:
@@ -251,7 +251,7 @@ class Plan(Shown, Stock):
 
     @cached_property
     def rows(self) -> Index:
-        """All shots."""
+        """The index of all shots."""
         return Index(self.blocks, 0, self.shot_frames, 0)
 
     @property
@@ -361,7 +361,7 @@ class Plan(Shown, Stock):
         return self.sampler.cast(self, self.world(subject), pose)
 
     def shots(self, box_of: BoxOf) -> Iterator[Shot]:
-        """All shots in order, made one by one."""
+        """Yield all shots in order, made one by one."""
         return (self.shot(row, box_of) for row in self.rows)
 
     @cached_property
@@ -391,7 +391,7 @@ def _by_name(spec: ModelSpec) -> dict[str, Any]:
 
 
 def _unlit(scene: SceneEntry) -> Iterator[str]:
-    """What makes a scene's pictures black, or white."""
+    """Yield the reasons why a scene's pictures are black, or white."""
     dark = not all(isinstance(sky, NightSky) for sky in alternatives(scene.sky))
     if dark and any(is_night(sun) for sun in alternatives(scene.sun)):
         yield "scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight"
@@ -399,10 +399,10 @@ def _unlit(scene: SceneEntry) -> Iterator[str]:
 
 
 def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -> Plan:
-    """What a recipe (or the one in this file) means, frame by frame, without touching a mesh.
+    """Return the plan of a recipe (or of the recipe in this file), frame by frame, without reading a mesh.
 
-    `shot_frames`: most frames of a shot, where the recipe does not say.
-    Raises RecipeError for files that are not there, unknown engines and formats, more frames than `max_frames`.
+    `shot_frames`: most frames of a shot, for recipes without their own setting.
+    Raises RecipeError for missing files, unknown engines and formats, more frames than `max_frames`.
     """
     recipe = Recipe.of(recipe)
     with recipe.located():

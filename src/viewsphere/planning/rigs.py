@@ -126,7 +126,7 @@ def _channels(recipe: Recipe, name: str, entry: SensorEntry) -> tuple[str, ...] 
 
 
 def _not_measured(channel: str, entry: SensorEntry) -> str | None:
-    """What is wrong with a channel that a sensor cannot have."""
+    """Return the error for a channel that a sensor cannot have; None for a valid channel."""
     if entry.lidar is not None and channel in PASSES:
         return f"expected labels, as a LiDAR takes no pictures; found {channel}"
     if entry.lidar is None and channel == LIDAR:
@@ -135,7 +135,7 @@ def _not_measured(channel: str, entry: SensorEntry) -> str | None:
 
 
 def _pose(name: str, entry: SensorEntry) -> Float:
-    """Where a sensor stands, (4, 4)."""
+    """Return the pose of a sensor, (4, 4)."""
     if entry.look is not None:
         forward = np.subtract(entry.look, entry.position)
         if math.hypot(forward[0], forward[2]) < 1e-9 * math.hypot(*forward.tolist()):

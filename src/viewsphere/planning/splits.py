@@ -1,4 +1,4 @@
-"""Which split a frame is in: it follows from the seed and the names of what is kept together, and nothing else."""
+"""The split of a frame, which depends only on the seed and the names of the things that stay together."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ def dealt(splits: Splits, seed: int, keys: Iterable[str], kept: Mapping[str, str
 
 
 def quotas(shares: Mapping[str, float], count: int) -> dict[str, int]:
-    """How many of `count` each share gets, by largest remainders; none gets 0 where there are as many as shares."""
+    """Return the part of `count` for each share, by largest remainders; no share gets 0 if `count` is at least the number of
+    shares.
+    """
     exact = {name: share * count for name, share in shares.items()}
     found = {name: int(number + 1e-9) for name, number in exact.items()}
     by_remainder = sorted(exact, key=lambda name: found[name] - exact[name])

@@ -31,11 +31,11 @@ class Turns:
         return len(self._index)
 
     def in_order(self) -> Iterator[Row]:
-        """All turns, subject by subject."""
+        """Yield all turns, subject by subject."""
         return chain.from_iterable(map(self._index.of, self.plan.taken))
 
     def shuffled(self, epoch: int) -> Iterator[Row]:
-        """All turns in an order that the recipe's seed and the epoch draw."""
+        """Yield all turns in an order that the recipe's seed and the epoch draw."""
         rng = generator(self.plan.recipe.lasting_seed, "turns", str(epoch))
         return (self._index[int(number)] for number in rng.permutation(len(self)))
 

@@ -146,7 +146,7 @@ class Scenes:
         return (*names, "variation", self.variation)
 
     def _names_of_finish(self, model: str, pose: str | None, place: str) -> tuple[Names, ...]:
-        """The names for the draws of background, smoother, view and effects; empty where every frame has a finish of its own."""
+        """The names for the draws of background, smoother, view and effects; empty where every frame has its own finish."""
         if pose is None and self.has_finish_per_frame:
             return ()
         draws = map(self._draw, self._finishing)

@@ -1,4 +1,4 @@
-"""What has to hold of a recipe before it is planned; each check raises RecipeError for the first thing that does not."""
+"""The checks of a recipe before planning; each raises RecipeError for the first violation."""
 
 from __future__ import annotations
 
@@ -260,7 +260,7 @@ def check_photo(recipe: Recipe) -> None:
 
 
 def check_shutter(recipe: Recipe) -> None:
-    """What moves is blurred once: by an open shutter, or by an effect."""
+    """Refuse a recipe that blurs moving things twice: by an open shutter, and by an effect."""
     blurs = alternatives(recipe.scene.effects.motion_blur)
     if recipe.time is not None and recipe.time.shutter and any(span(blur)[1] > 0 for blur in blurs):
         raise RecipeError(

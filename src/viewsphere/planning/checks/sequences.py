@@ -1,4 +1,4 @@
-"""What sequences would be refused for, as far as that is known before a model is read."""
+"""The checks that refuse sequences before a model is read, as far as the recipe allows."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _check_motions(planned: Plan, subject: str, cast: Sequence[ModelSpec], lanes
 
 
 def _nowhere(seconds: float) -> Matrix4:
-    """Where a thing is on a way that nobody asked for yet."""
+    """The placeholder pose of a thing whose path is not computed yet."""
     return IDENTITY
 
 

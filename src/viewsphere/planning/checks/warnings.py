@@ -1,6 +1,6 @@
-"""What of a recipe would make pictures without anything to see: no light, an exposure that hides all, a camera that looks away.
+"""Warnings for recipes with empty pictures: no light, an exposure that hides all, a camera that looks away.
 
-All of it is told from the recipe alone, hence of lamps and photographed skies with a wide margin.
+The checks read the recipe alone, so lamps and photographed skies have a wide margin.
 """
 
 from __future__ import annotations

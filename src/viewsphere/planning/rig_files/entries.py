@@ -1,4 +1,4 @@
-"""What a calibration holds of a sensor."""
+"""The values of a sensor in a calibration."""
 
 from __future__ import annotations
 

@@ -18,8 +18,8 @@ from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fis
 
 
 def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[Calibrated, ...]:
-    """All cameras of the chain, named cam0, cam1, ...; raises RecipeError for lenses that are no pinhole with radtan,
-    equidistant or no distortion.
+    """Return the cameras of the chain, named cam0, cam1, ...
+    Raises RecipeError for lenses other than a pinhole with radtan, equidistant or no distortion.
     """
     where = ", ".join(map(str, documents))
     if rectified:

@@ -25,8 +25,8 @@ Options = TypeVar("Options", bound=Frozen)
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """What stands there, objects alone, while a subject is taken from some poses (their numbers in `views`); cameras look at
-    `target`, None: the first object's centre.
+    """The objects in place, without scenery, while a subject is taken from some poses (their numbers in `views`).
+    Cameras look at `target`, None: the first object's centre.
     """
 
     things: tuple[Thing, ...]

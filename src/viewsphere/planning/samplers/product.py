@@ -45,7 +45,7 @@ def factors(stock: Stock) -> str:
 
 
 def blocks(stock: Stock) -> tuple[Block, ...]:
-    """Which models are taken from which poses, time step by time step."""
+    """Return the blocks of models and their poses, time step by time step."""
     found: list[Block] = []
     for schedule, members in groupby(range(stock.models), lambda model: stock.schedules[model]):
         keys = tuple(stock.model_specs[model].key for model in members)
@@ -121,8 +121,8 @@ def _seen_from(stock: Stock, subject: str, poses: Sequence[int]) -> tuple[float,
 
 
 def _target(stock: Stock, first: Thing, run: Run, target: Vector | None, box_of: BoxOf) -> Vector | None:
-    """What cameras look at that have no target of their own, None for the first object's centre: where that stands at the
-    first frame, or follows it.
+    """Return the default target of cameras: its position at the first frame, or the position that follows it.
+    None means the first object's centre.
     """
     moves = run.step is not None and run.step.model is not None
     if moves and stock.recipe.viewpoints.target == "follow":
@@ -135,7 +135,7 @@ def _target(stock: Stock, first: Thing, run: Run, target: Vector | None, box_of:
 
 
 def _floor(stock: Stock, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf) -> dict[str, Floor]:
-    """How high the ground is at most, in a scene's field: at the lowest that a model comes at its time steps."""
+    """Return the scene's field for the ground's greatest height: the lowest point of a model over its time steps."""
     steps = stock.steps_of(spec)
     if not steps or stock.recipe.scene.ground == "off":
         return {}
@@ -144,8 +144,8 @@ def _floor(stock: Stock, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf
 
 
 def _at(stock: Stock, things: Sequence[Thing], run: Run) -> tuple[Thing, ...]:
-    """What is placed, as it is at a time step; company is at its own of the same number. What of the scene's file shows
-    nothing then is left out, so that others have other ids.
+    """Return the placed things at a time step; company is at its own step of the same number.
+    Things of the scene's file that show nothing at this step are omitted, so the ids of others shift.
     """
     if run.step is None:
         return tuple(things)

@@ -59,7 +59,7 @@ def factors(stock: Stock) -> str:
 
 
 def blocks(stock: Stock) -> tuple[Block, ...]:
-    """All poses of every scene, or those that are drawn for each. Raises RecipeError where too few models may meet."""
+    """Return the blocks of every scene, with all poses or the drawn ones. Raises RecipeError where too few models may meet."""
     check_scene_models(stock)
     if not are_views_drawn(stock):
         return (Block(stock.subjects, ((0, len(stock.pose_list)),)),)

@@ -25,7 +25,7 @@ Origin = Literal["placed", "world"]
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """The pose of a thing, world from object (4, 4), rigid, metres, with the time step of its file; step None is the rest pose."""
+    """The pose of a thing, world from object (4, 4), rigid, metres, with the time step of its file; None is the rest pose."""
 
     matrix: Float
     step: TimeStep | None = None

@@ -1,1 +1,1 @@
-"""What several samplers need."""
+"""Code shared by several samplers."""

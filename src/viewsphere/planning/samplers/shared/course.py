@@ -1,4 +1,4 @@
-"""What a whole sequence does: where its things and its rig are at all of its instants, however shots cut it."""
+"""The course of a whole sequence: the poses of its things and its rig at all instants, however shots divide it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Course:
         return tuple(_with(thing, moving and moving.during(instants)) for thing, moving in pairs)
 
     def focus_at(self, instant: int, follows: bool, box_of: BoxOf) -> Vector:
-        """What cameras look at that have no target of their own, and may follow the first thing."""
+        """Return the default target of cameras at an instant; with `follows` it follows the first thing."""
         return center(_at(self.things[0], self.moving[0], instant), box_of) if follows else self.focus
 
 
@@ -113,7 +113,7 @@ def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) 
 
 
 def target_ways(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Way | None, ...]:
-    """How each target of a sequence, and then each distractor, came to where it is placed; None: it was put there at once."""
+    """Return the path to its place of each target of a sequence, then of each distractor; None for a thing without a path."""
     if stock.recipe.scenes is not None:
         made = scene_laid(stock, subject, pose, box_of)
         return tuple(way.at for way in made.ways) or (None,) * len(made.members)
@@ -129,24 +129,24 @@ def target_ways(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> 
 
 
 def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
-    """What cameras look at that have no target of their own: where the targets are placed."""
+    """Return the default target of cameras: the middle of the placed targets."""
     return center(things[0], box_of) if len(things) == 1 else center_of_all(things, box_of)
 
 
 def target_moving(
     stock: Stock, thing: Thing, slot: int, names: Names, lanes: tuple[Lane, ...], way: Way | None = None
 ) -> Moving | None:
-    """What moves a target, the one of this number, in the sequence of these names; None where it stands still."""
+    """Return the movement of the target with this number in the sequence of these names; None where it stands still."""
     return _moving(stock, thing, *_motions(stock, thing.model, slot), (*names, str(slot), thing.model.key), lanes, way)
 
 
 def piece_moving(stock: Stock, thing: Thing, piece: SceneryPiece, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
-    """What moves a piece of scenery in the sequence of these names; None where it stands still."""
+    """Return the movement of a piece of scenery in the sequence of these names; None where it stands still."""
     return _moving(stock, thing, piece.motion, piece.field, (*names, piece.name), lanes)
 
 
 def _distractor_moving(stock: Stock, thing: Thing, way: Way | None, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
-    """What moves a model that is not labelled; None where it stands still."""
+    """Return the movement of a model that is not labelled; None where it stands still."""
     number = {spec.key: number for spec, number in stock.distractors}[thing.model.key]
     motions, field = stock.recipe.models[number].motion, f"models[{number}].motion"
     return _moving(stock, thing, motions, field, (*names, "distractor", thing.model.key), lanes, way)
@@ -161,7 +161,7 @@ def _moving(
     lanes: tuple[Lane, ...],
     way: Way | None = None,
 ) -> Moving | None:
-    """What moves a thing, drawn for these names; None where it stands still."""
+    """Return the movement of a thing, drawn for these names; None where it stands still."""
     if motions is None:
         return None
     time, rng = time_of(stock), partial(generator, stock.recipe.seed, "motion", *names)
@@ -172,7 +172,9 @@ def _moving(
 
 
 def _motions(stock: Stock, spec: ModelSpec, slot: int) -> tuple[Motions | None, str]:
-    """How a target moves: its model's way, or in company as the recipe says of distractors; and the recipe's field."""
+    """Return the motions of a target, and the recipe's field for them.
+    The motions are those of its model, or for a target in company those of the company entry.
+    """
     company = stock.recipe.scene.company
     if slot and company is not None:
         return company.motion, "scene.company.motion"
@@ -183,7 +185,7 @@ def _motions(stock: Stock, spec: ModelSpec, slot: int) -> tuple[Motions | None, 
 def _rig(
     stock: Stock, course: Course, subject: str, start: int, lanes: tuple[Lane, ...], box_of: BoxOf
 ) -> tuple[RigPose, ...] | None:
-    """Where the rig is at all instants, None where it stands still."""
+    """Return the rig's poses at all instants, None where it stands still."""
     time, views = time_of(stock), stock.sequences_of(subject)
     times = np.array([time.at(i) for i in range(time.count)])
     names = (subject, stock.pose_list.place(start), *redraw_names(stock.redraw))
@@ -222,7 +224,9 @@ def _center(course: Course, wanted: int | str, instant: int, box_of: BoxOf) -> V
 
 
 def no_such_thing(wanted: int | str, known: Mapping[int, str]) -> RecipeError:
-    """What says that a camera cannot look at a thing; `known` are the keys of those that are there, by their numbers."""
+    """Return the error for a camera that looks at an absent thing; `known` are the keys of the existing things, by their
+    numbers.
+    """
     there = ", ".join(f"{number} ({key})" for number, key in known.items())
     return RecipeError(
         f"viewpoints.look: expected a thing's number or key: {there}; found {wanted!r}{nearest(wanted, known.values())}"

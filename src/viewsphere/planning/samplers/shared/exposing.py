@@ -1,4 +1,4 @@
-"""What moves around each instant of a sequence while the shutter is open."""
+"""The movements around each instant of a sequence while the shutter is open."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ RigAt = Callable[[int], Matrix4]
 
 
 def exposures(course: Course, instants: Sequence[int | None], time: TimeEntry, rig_at: RigAt) -> tuple[Exposure | None, ...]:
-    """What moves around each of these instants, None for one that is not recorded (None), and where nothing moves; none at all
-    where the shutter takes no time.
+    """Return the movements around each of these instants; empty for a shutter without duration.
+    An instant has None where it is not recorded (None), and where nothing moves.
     """
     if not time.shutter:
         return ()

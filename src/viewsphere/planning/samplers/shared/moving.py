@@ -15,7 +15,7 @@ from viewsphere.recipe.sequence import TimeEntry
 
 @dataclass(frozen=True, eq=False)
 class Moving:
-    """What a mover does at the instants of a sequence: the same whichever of these are asked for."""
+    """The movement of a thing at the instants of a sequence; the result does not depend on the choice of instants."""
 
     mover: Mover
     time: TimeEntry
@@ -66,7 +66,9 @@ class Moving:
         return self.mover.state(self.time.at(instant))[1]
 
     def _step(self, instant: int) -> TimeStep | None:
-        """What it shows; while it is not there what it showed last, and before it enters what it will show first."""
+        """Return the time step that the thing shows.
+        While the thing is absent, this is the last step it showed; before it enters, the first step it will show.
+        """
         if not self.plays_file:
             return None
         return next(filter(None, map(self._shown, range(instant, -1, -1))), self._first_step)

@@ -89,7 +89,7 @@ def _models_for(stock: Stock, group: str) -> tuple[ModelSpec, ...]:
 
 @lru_cache(maxsize=2)
 def _categories(stock: Stock) -> dict[str, tuple[tuple[str, int], ...]]:
-    """How many objects of which categories stand in each scene."""
+    """Return the number of objects of each category in each scene."""
     recipe, repeat = stock.recipe, scenes_entry(stock.recipe).repeat
     groups: defaultdict[str, list[str]] = defaultdict(list)
     for subject in stock.subjects:
@@ -171,7 +171,7 @@ def _distractors(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
 
 
 def scene_around(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
-    """What the models of a scene stand on or in that comes with their layout: background."""
+    """Return the background pieces that a scene's layout adds, such as the table or box for its models."""
     pieces = list(scene_laid(stock, subject, pose, box_of).around)
     on, seed = scenes_entry(stock.recipe).surface, stock.recipe.seed
     if isinstance(on, SurfaceEntry):
@@ -210,7 +210,7 @@ def check_surface(recipe: Recipe) -> None:
 
 
 def surface(stock: Stock, subject: str, pose: str | None) -> Surface | None:
-    """What the models of a scene stand on, world axes; None for the floor. Raises RecipeError for one that is not there."""
+    """Return the surface under a scene's models, world axes; None for the floor. Raises RecipeError for an absent surface."""
     on = scenes_entry(stock.recipe).surface
     if on is None:
         return None

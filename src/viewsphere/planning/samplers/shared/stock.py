@@ -1,4 +1,4 @@
-"""What shots are made of: a recipe's models, viewpoints, splits and pictures. No mesh is read."""
+"""The material for shots: a recipe's models, viewpoints, splits and pictures. No mesh is read."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ from viewsphere.recipe.recipe import Recipe
 
 @dataclass(frozen=True, eq=False)
 class Stock(Sendable):
-    """What a sampler makes shots of; nothing here grows with the frames.
+    """The material from which a sampler makes shots; its memory does not grow with the number of frames.
 
-    `subjects`: what the frames are about, as the sampler says: models' keys, or scenes' names.
+    `subjects`: the subjects of the frames, as the sampler defines them: models' keys, or scenes' names.
     """
 
     recipe: Recipe
@@ -89,7 +89,7 @@ class Stock(Sendable):
 
     @property
     def views(self) -> Poses:
-        """All viewpoints: of poses over time those of whole sequences."""
+        """The viewpoints; for poses over time, those of whole sequences."""
         return self.pose_list.base if isinstance(self.pose_list, SequencePoses) else self.pose_list
 
     @cached_property
@@ -109,7 +109,7 @@ class Stock(Sendable):
 
     @cached_property
     def scenes(self) -> Scenes:
-        """Where light, ground, materials, finishes and jitter are drawn."""
+        """The draws of light, ground, materials, finishes and jitter."""
         variations = (self.untried or self).recipe.variations
         alone = variations.drawn_alone(self.variation) if self.variation and variations else frozenset[str]()
         return Scenes(self.recipe, self.pictures, self.variation, alone)
@@ -121,11 +121,11 @@ class Stock(Sendable):
 
     @cached_property
     def schedules(self) -> tuple[Schedule, ...]:
-        """Which poses each model is taken from, and when."""
+        """The poses of each model, with their times."""
         return schedules(self.timings or (None,) * self.models, self.pose_list)
 
     def schedule(self, spec: ModelSpec) -> Schedule:
-        """Which poses a model is taken from, and when."""
+        """Return the poses of a model, with their times."""
         return self.schedules[self.position[spec.key]]
 
     def steps_of(self, spec: ModelSpec) -> tuple[TimeStep, ...]:
@@ -248,7 +248,7 @@ class Stock(Sendable):
         return self.scenes.jittered(view, subject, self.jitter_name(view.index))
 
     def jitter_name(self, pose: int) -> str:
-        """What the jitter of a pose is drawn for, where it is drawn for each frame: its name, and its try."""
+        """Return the name for the draw of a pose's jitter; for jitter of each frame: the frame's name, and its redraw."""
         is_per_frame = self.recipe.scene.jitter.draw == "per_frame"
         name = self.pose_list.name if self.recipe.time is not None and is_per_frame else self.pose_list.place
         again = self.tries.get(pose) if is_per_frame else None
