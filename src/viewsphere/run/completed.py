@@ -73,7 +73,7 @@ class Completed(Exported):
 
     @cached_property
     def sights(self) -> Sights:
-        """What its sensors saw; several data sets of one root may share it."""
+        """The reconstructed views of the data set's sensors; several data sets of one root may share them."""
         whole = Dataset(self.root)  # chosen or not, and with what is hidden
         return Sights(whole, Scenery(whole), {info.key: info for info in whole.models})
 

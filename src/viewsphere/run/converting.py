@@ -28,7 +28,9 @@ from viewsphere.store.shots.checksums import CHECKSUMS, damaged_files
 
 @dataclass(frozen=True)
 class Converted:
-    """How many frames were written; what `keep_going` left out of them; and notes of the formats."""
+    """The result of a conversion: the number of written frames, the frames that `keep_going` left out, and notes of the
+    formats.
+    """
 
     frames: int
     left_out: tuple[str, ...]

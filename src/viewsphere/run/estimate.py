@@ -1,10 +1,11 @@
-"""What a recipe's data set will cost: a few of its frames are made in a folder that goes away, and counted up.
+"""The estimated cost of a recipe's data set, measured on a few of its frames in a temporary folder.
 
     seconds = (models x model + scenes x scene + frames x frame) / workers + frames x export
     bytes   = models x model + frames x frame
 
-A scene is built once for each model or random scene (by every worker, if there are fewer), or for each frame where the recipe
-draws scenes for each. Exports are written by one process. Not counted: starting the workers, and compiling kernels.
+A scene is built once for each model or random scene (by every worker, if there are fewer). Where the recipe draws a scene for
+each frame, it is built for each frame. Exports are written by one process. Not counted: starting the workers, and compiling
+kernels.
 """
 
 from __future__ import annotations
@@ -149,7 +150,7 @@ def _spread(planned: Plan) -> Iterator[Row]:
 
 
 def disk_bytes(folders: Sequence[Path]) -> int:
-    """What the files in these folders take on disk, in whole blocks; what is hard-linked counts once."""
+    """Return the disk space of the files in these folders, bytes in whole blocks; hard-linked files count once."""
     sizes = {(s.st_dev, s.st_ino): s.st_size for s in _stats(folders)}
     return sum(-(-size // BLOCK) * BLOCK for size in sizes.values())
 

@@ -66,13 +66,13 @@ def export(
 
 
 def linked(dataset: Dataset, where: Path | str) -> Iterator[str]:
-    """How a data set's files came into the exports, where that took more than hard links."""
+    """Yield a note for each kind of link in a data set's exports other than hard links."""
     for kind in sorted(dataset.link_kinds - {"hard link", "download"}):
         yield f"{where}: files of the exports are made as a {kind}, hard links do not work here"
 
 
 def _lacks(dataset: Dataset) -> Iterator[str]:
-    """How many frames there are, where that is not all that its plan asks for."""
+    """Yield a note with the number of existing frames, if the plan has more."""
     there = len(Dataset(dataset.root)) if dataset.choice.is_some else len(dataset)
     if there < dataset.plan.frames:
         yield (

@@ -154,8 +154,8 @@ class Framing:
         return partial(self._seen, Ring(shot.scene.ground is not None, shot.label_alpha))
 
     def _seen(self, ring: Ring, shot: Shot, instant: int) -> float:
-        """How good a frame is: the least visibility of what has to be seen in it, or, below 0, how much it misses what is
-        wanted.
+        """Return the quality of a frame: the least visibility of its targets.
+        With `wanted` in the recipe, it is minus the distance from the wanted visibility and truncation.
         """
         recipe = self.plan.recipe
         wanted = shot.targets(recipe.scenes is not None)

@@ -47,7 +47,7 @@ MOST_SUBJECTS = 10_000
 
 @dataclass(frozen=True)
 class Warnings:
-    """What a run warns of: lines about `models` by their keys, and about `files`, of which models are parts, by their names."""
+    """The warnings of a run, as lines: `models` by models' keys, and `files`, of which models are parts, by file names."""
 
     models: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     files: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
@@ -183,7 +183,7 @@ def _is_done(entry: FormatEntry, dataset: Dataset, least: float | None, proved: 
 
 
 def _left_to_others(portion: Portion, far: Status) -> str:
-    """What is left to do when a shard is done."""
+    """Return the message about the remaining work when a shard is done."""
     what = f"{far.missing:,} of {far.frames:,} frames are" if far.missing else "models are"
     return (
         f"{far.root}: shard {portion.share} is done, {what} left to other shards: the run that makes the last of them writes "
@@ -372,7 +372,7 @@ class Missing:
 
     @cached_property
     def _there(self) -> tuple[Counter[str], int]:
-        """How many shots of each model were finished then, and how many frames these are."""
+        """The number of finished shots of each model at that time, and the number of their frames."""
         shots, total = Counter[str](), 0
         for _, subject, frames in chain.from_iterable(index.held(self._finished) for index in self.portion.indices):
             shots[subject] += 1
@@ -381,7 +381,7 @@ class Missing:
 
     @cached_property
     def _left(self) -> Counter[str]:
-        """How many shots were missing then of each model that lacks any, in the models' order."""
+        """The number of missing shots at that time of each incomplete model, in the models' order."""
         return sum((index.counts for index in self.portion.indices), Counter[str]()) - self._there[0]
 
     @property
@@ -399,7 +399,7 @@ class Missing:
         return (Job(row.key, line, row) for row in self._lacking(rows))
 
     def rows(self) -> Iterator[Row]:
-        """All shots that are to be rendered."""
+        """Yield all shots to render."""
         whole = set(self.portion.subjects).difference(self._left)
         return self._lacking(chain.from_iterable(index.without(whole) for index in self.portion.indices))
 

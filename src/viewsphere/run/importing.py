@@ -46,8 +46,8 @@ def import_dataset(
 
 
 def read_dataset(kind: str, source: Path | str, *, keep_going: bool = False, field: str = "import") -> ForeignDataset:
-    """What a data set of another tool says, whole; raises as `import_dataset` does, for an unknown format as a mistake of
-    `field`.
+    """Read a whole data set of another tool.
+    Raises as `import_dataset` does; an unknown format is reported as an error of `field`.
     """
     known = _readers()
     if kind not in known:

@@ -84,7 +84,7 @@ def _serve(pipe: Connection, make: Callable[[], Callable[[Any], Any]]) -> None:
 
 
 def _answer(do: Callable[[], Any]) -> bytes:
-    """What a task comes to, or what it raises, as `_answered` reads it."""
+    """Return the result of a task, or its exception, in the form that `_answered` reads."""
     try:
         return pickle.dumps((do(), None))
     except UserError as error:

@@ -1,4 +1,4 @@
-"""What `viewsphere inspect` says of one model."""
+"""The report of `viewsphere inspect` on one model."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _metres(unit: str) -> float:
 
 
 def inspect_model(spec: ModelSpec) -> ModelReport:
-    """What is in the model and what it becomes; raises ModelError for a file that cannot be used."""
+    """Return the report on a model: its contents, and its form after loading; raises ModelError for an unusable file."""
     return describe(spec, build_zoo_model)
 
 
@@ -104,7 +104,7 @@ def _keypoints(report: ModelReport) -> Iterator[str]:
 
 
 def _symmetries(report: ModelReport) -> Iterator[str]:
-    """How many there are; those that are found, as a sidecar has them."""
+    """Yield the lines about symmetries: their number, and detected ones in the form of a sidecar."""
     discrete, continuous = report.symmetries["discrete"], report.symmetries["continuous"]
     kinds = [f"{len(discrete)} rotation{'s' if len(discrete) > 1 else ''}"] if discrete else []
     kinds += [f"round about {len(continuous)} {'axes' if len(continuous) > 1 else 'axis'}"] if continuous else []

@@ -1,4 +1,4 @@
-"""All formats, with what users choose one by."""
+"""The list of formats, with the facts by which users choose a format."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Listed:
 
 
 def listed() -> tuple[Listed, ...]:
-    """All formats that are installed, by their names."""
+    """Return all installed formats, by their names."""
     return tuple(_listed(name, spec) for name, spec in plugins.loadable(FormatSpec).items())
 
 

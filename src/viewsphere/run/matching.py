@@ -27,10 +27,10 @@ SHOTS = 4
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """Where the point that each pixel of a picture shows is in another picture.
+    """The positions in another picture of the points that each pixel of a picture shows.
 
-    xy (H, W, 2) float64, pixels, NaN where it has none; z (H, W) float64, metres along the other camera's axis, infinite for
-    the sky, NaN where there is no pixel; state (H, W) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid.
+    xy (H, W, 2) float64, pixels, NaN where the pixel has none; z (H, W) float64, metres along the other camera's axis, infinite
+    for the sky, NaN where there is no pixel; state (H, W) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid.
     """
 
     xy: NDArray[np.float64]
@@ -77,7 +77,7 @@ def _subject(shot: Shot) -> str:
 
 
 def _view(sample: Sample, shot: Shot) -> View:
-    """What a sample's sensor may see."""
+    """Return the view of a sample's sensor."""
     assert sample.taken is not None
     return views_of(shot, _meshes(sample.taken)).view(sample.taken.instant, sample.taken.sensor)
 

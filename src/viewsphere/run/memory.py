@@ -43,7 +43,7 @@ class Frames(Shown, Iterable[Sample]):
         known_to_loaders(type(self))
 
     def __getstate__(self) -> dict[str, Any]:
-        """What workers of data loaders are sent: this process's rank, but nothing that is warm."""
+        """The state sent to workers of data loaders: this process's rank, but no warm caches."""
         cold = {"_stages": Stages(), "_taken": None, "_is_compiled": False}
         return {**self.__dict__, "_shard": self._shard or share_of_rank(), **cold}
 

@@ -58,7 +58,7 @@ class Mender:
         return errors
 
     def _changed_models(self, number: int, rows: Sequence[Row]) -> Errors:
-        """Those in the shots that are no longer what the data set shows."""
+        """Return the errors of the shots' models that no longer match the data set."""
         errors: Errors = {}
         specs = {spec.key: spec for row in rows for spec in self._portion(number).cast(row)}
         steps_of = self._portion(number).plan.steps_of

@@ -173,7 +173,7 @@ def _shown(dataset: Dataset) -> str:
 
 
 def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tuple[str, ...], tuple[_Source, ...]]:
-    """All categories, all models' keys, and what the numbers and names of every source become."""
+    """Return all categories, all models' keys, and the new numbers and names of every source."""
     categories: dict[int, Category] = {}
     contents: dict[str, tuple[object, ...]] = {}
     sources: list[_Source] = []
@@ -262,9 +262,9 @@ def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], m
 
 
 def _parts(source: _Source) -> Iterator[Part]:
-    """What is finished of the source's parts, renumbered; channels that one supplied to others now lie with the rest.
+    """Yield the finished portions of the source's parts, renumbered; channels supplied by a later part join the others.
 
-    Of an unfinished part no recipe renders the rest, so it has no digest by which to find it. All poses come with the first.
+    An unfinished part has no digest for its lookup, since no recipe renders its rest. All poses come with the first.
     """
     plan, first, names = source.dataset.plan, source.first_frame, kept(names_of(source.dataset.plan))
     for number, part in enumerate(plan.parts):
@@ -363,7 +363,7 @@ def _with_ids(source: _Source, values: Mapping[str, Any], labels: Iterable[Objec
 
 
 def _of(category: Category) -> dict[str, Any]:
-    """What models and objects say of their category."""
+    """Return the fields with which models and objects describe their category."""
     return {"category": category.name, "supercategory": category.supercategory, "category_id": category.id}
 
 

@@ -84,7 +84,7 @@ class Models:
         self._write(spec, wanted, self._credit_of(spec.key, credit), place)
 
     def _credit_of(self, key: str, otherwise: Credit | None) -> Credit | None:
-        """What the record of a model says, if its manifest vouches for it."""
+        """Return the credit in a model's record, if its manifest confirms the record."""
         file = self.store.model_folder(key) / "model.json"
         try:
             Manifest.read(file.parent).check(file.name, read_bytes(file), file)
@@ -142,7 +142,7 @@ class Models:
         return replace(rest, key=spec.key, track="", steps=infos), export
 
     def _info(self, spec: ModelSpec, mesh: Mesh, step: TimeStep | None = None) -> ModelInfo:
-        """What there is to know of a model, or of one of its time steps."""
+        """Return the metadata of a model, or of one of its time steps."""
         frame, box, traits = step and step.frame, box_vertices(*mesh.bounds), self.stages.traits(spec, step)
         obj, glb = model_files(spec.key, frame)
         return ModelInfo(

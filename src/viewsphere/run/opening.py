@@ -97,10 +97,10 @@ def to_render(planned: Plan, store: Store) -> Portion:
 
 
 def to_append(planned: Plan, store: Store) -> Portion:
-    """What a plan adds to the data set, or what is left of it: a part that was begun goes on. Nothing is written.
+    """Return the plan's additions to the data set, or their remainder if the part was begun. Nothing is written.
 
-    Raises StoreError for a folder that is no data set, for one that is not finished and for one that another version made,
-    RecipeError for a recipe that does not fit.
+    Raises StoreError for a folder without a data set, for an unfinished data set, and for one from another version.
+    Raises RecipeError for a recipe that does not fit.
     """
     found = store.plan()
     number = found.part_with(planned.digest)

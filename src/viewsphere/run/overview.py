@@ -1,4 +1,4 @@
-"""All plug-ins that are installed, and those that cannot be loaded."""
+"""The list of installed plug-ins, and of those that cannot be loaded."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Installed:
 
 
 def overview() -> tuple[Installed, ...]:
-    """All plug-ins, by kind and name; each is loaded."""
+    """Return all plug-ins, by kind and name; each is loaded."""
     return tuple(Installed(kind, name, origin(kind, name), _error(kind, name)) for kind in SEAMS for name in names(kind))
 
 

@@ -84,7 +84,7 @@ class Target:
     view: Dataset
 
     def writer(self, note: Callable[[str], None]) -> AbstractContextManager[Callable[[Any], None]]:
-        """What the format writes with: gives a function that is called with what is prepared of each sample."""
+        """Return the format's writer: a context whose value is a function, which receives the prepared data of each sample."""
         assert self.spec.writer is not None
         return self.spec.writer(self.view, self.folder, note, *self.entry.arguments())
 
@@ -170,11 +170,11 @@ class _Preparation:
         self._dataset = dataset
 
     def of(self, sample: Any) -> dict[str, Any]:
-        """What each format adds of a sample."""
+        """Return the prepared data of a sample for each format."""
         return {name: prepare(sample) for name, prepare in self.preparers.items()}
 
     def __call__(self, lot: Lot) -> tuple[list[dict[str, Any]], set[str]]:
-        """What each format adds of each sample of a lot; and how files were linked so far."""
+        """Return each format's prepared data for each sample of a lot, and the kinds of file links so far."""
         return [self.of(sample) for sample in _samples(self._dataset, lot)], self._dataset.link_kinds
 
 

@@ -1,4 +1,4 @@
-"""How far a run is."""
+"""The progress of a run."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run stands: `done` of `total`; `resumed` of them were there before this run. `under_way` are frames of shots that
-    are not finished, which do not count as done: a run that is stopped loses them. `nodes` are the machines of a cluster at
-    work, None without one.
+    """The progress of a run: `done` of `total`; `resumed` of them were there before this run.
 
-    Phases are skies (their pictures are looked at), models, kernels (compiled once on a machine, then cached), frames and
-    exports (counted in frames, too); those without anything to do are left out.
+    `under_way` are frames of unfinished shots, which do not count as done: a run that is stopped loses them.
+    `nodes` are the machines of a cluster at work, None without a cluster.
+    Phases are skies (their pictures are analysed), models, kernels (compiled once on a machine, then cached), frames and
+    exports (counted in frames, too). Phases without work are left out.
     """
 
     phase: str

@@ -1,4 +1,4 @@
-"""What a run is doing, passed on to its listener and to its heartbeat in the store."""
+"""The activity of a run, passed on to its listener and to its heartbeat in the store."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def heard(pulse: Pulse, listener: Listener) -> Listener:
 
 
 def watched(crew: Crew, work: Work, pulse: Pulse, heard: Callable[[], None]) -> Iterator[Outcome]:
-    """What `crew.run` gives; the heartbeat tells which jobs are handed out and not done."""
+    """Yield the outcomes of `crew.run`; meanwhile the heartbeat reports the jobs that are handed out and not done."""
     for outcome in crew.run(_Told(work, pulse.working_on), heard):
         pulse.working_on.pop(outcome.key, None)
         yield outcome
@@ -37,11 +37,11 @@ class _Told:
     working_on: dict[str, None]
 
     def lines(self) -> Iterable[tuple[str, int]]:
-        """Those of the work."""
+        """Return the lines of the work."""
         return self.work.lines()
 
     def jobs(self, line: str) -> Iterator[Job]:
-        """Those of the work."""
+        """Yield the jobs of a line of the work."""
         for job in self.work.jobs(line):
             self.working_on[job.key] = None
             yield job

@@ -1,4 +1,4 @@
-"""What `viewsphere inspect --rig` says and shows of a rig: its sensors as text, and their frusta as a model."""
+"""The output of `viewsphere inspect --rig`: a rig's sensors as text, and their frusta as a model."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def recipe_rig(recipe: Recipe) -> Rig:
 
 
 def sensor_facts(rig: Rig) -> tuple[SensorFacts, ...]:
-    """What there is to say of each sensor."""
+    """Return the facts about each sensor."""
     colors = list(COLORS)
     return tuple(_facts(sensor, colors[i % len(colors)]) for i, sensor in enumerate(rig.sensors))
 

@@ -1,4 +1,4 @@
-"""What stands behind the objects of a data set's shots: it is no part of the data set, so it is made again."""
+"""The scenery behind the objects of a data set's shots: the data set does not store it, so it is made again."""
 
 from __future__ import annotations
 

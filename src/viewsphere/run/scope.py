@@ -1,4 +1,4 @@
-"""What a format has to know of a data set before it can say that it holds it."""
+"""The facts about a data set that a format needs to decide whether it can hold the data set."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LOOKED_AT = 1000
 
 
 def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
-    """What is known of a recipe's data set, of which frames keep these channels."""
+    """Return the known facts about a recipe's data set, whose frames keep these channels."""
     recipe = planned.recipe
     return Scope(
         categories=planned.categories,
@@ -41,7 +41,7 @@ def scope_of_plan(planned: Plan, channels: Sequence[str]) -> Scope:
 
 
 def scope_of(dataset: Dataset) -> Scope:
-    """What is known of a data set that is there; of one whose shots are kept all labels can be computed."""
+    """Return the known facts about an existing data set; with its shots kept, all labels can be computed."""
     shots = dataset.shots_of_parts
     known = Scope(
         categories=dataset.categories,
@@ -63,7 +63,7 @@ def scope_of(dataset: Dataset) -> Scope:
 
 
 def scope_of_foreign(foreign: ForeignDataset) -> Scope:
-    """What is known of a data set that is about to be imported."""
+    """Return the known facts about a data set before its import."""
     pictures = telling(frame.sample for frame in foreign.frames())
     return Scope(
         categories=foreign.categories,
@@ -113,7 +113,7 @@ def refuse(entries: Sequence[FormatEntry], scope: Scope, where: object) -> None:
 
 
 def refusals(spec: FormatSpec, entry: FormatEntry, scope: Scope) -> Iterator[str]:
-    """What of a data set a format cannot hold, as these options want it."""
+    """Yield the reasons why a format with these options cannot hold a data set."""
     yield from not_held(spec, entry, scope)
     yield from lacking_labels(scope, spec.channels or ())
     if not spec.lidar:

@@ -1,6 +1,6 @@
-"""Which share of the frames this process is to render: one of a job array, a rank, or a data loader's worker.
+"""The share of the frames that this process renders: that of a job array's task, a rank, or a data loader's worker.
 
-PyTorch is asked only where somebody else has imported it: it is no dependency.
+PyTorch is consulted only if the program has already imported it: it is no dependency.
 """
 
 from __future__ import annotations

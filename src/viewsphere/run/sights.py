@@ -1,4 +1,4 @@
-"""What the cameras of a data set's frames see, made again: from the exported models, where shots say that they stand."""
+"""The views of a data set's cameras, reconstructed from the exported models at the poses in the shots."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ class Sights:
 
     @property
     def notes(self) -> list[str]:
-        """What of the scenery is not what it was."""
+        """The notes about changed scenery."""
         return self._scenery.notes
 
     def of(self, sample: Sample, names: Iterable[str], asked: Iterable[str] = (), continued: bool = False) -> Sight | None:
-        """What a sample's sensor saw, for labels of these names, and with the labels on request that were or are `asked` for;
-        None where scenery is not what it was. `continued`: labels may compare it with instants of the shots before and after.
+        """Return the view of a sample's sensor, for labels of these names and for the labels on request in `asked`.
+        It is None where scenery has changed. `continued`: labels may compare it with instants of the shots before and after.
         """
         known = labels()
         needs = tuple(dict.fromkeys(known[name].needs for name in (*names, *asked) if name in known))
@@ -137,9 +137,10 @@ class Sights:
     def _compared(
         self, key: str, sample: Sample, shot: Shot, around: SceneryRecord, needs: Sequence[Needs]
     ) -> SampleViews | None:
-        """What labels of motion and stereo compare a sample with; None without one, and where scenery is not what it was.
+        """Return the views that labels of motion and stereo compare a sample with; None without any, and where scenery has
+        changed.
 
-        Points are picked here, before any label asks for triangles, which would be written over.
+        Points are picked here, before any label requests triangles, which would overwrite them.
         """
         if not any(need.is_some for need in needs):
             return None

@@ -83,7 +83,7 @@ class StoredBoxes:
 
 @dataclass(frozen=True, eq=False)
 class _Stand:
-    """Where a still thing stands: its box (8, 3), and those of its rooms, world metres."""
+    """The place of a still thing: its box (8, 3), and those of its rooms, world metres."""
 
     box: Float
     rooms: tuple[Float, ...]
@@ -136,7 +136,7 @@ class Stages:
         return self._boxes[name]
 
     def traits(self, spec: ModelSpec, step: TimeStep | None = None) -> Traits:
-        """What the model says of itself at a time step; raises ModelError as `model` and `traits_of` do."""
+        """Return the metadata of a model at a time step; raises ModelError as `model` and `traits_of` do."""
         name = _name(spec, step)
         if name not in self._traits:
             mesh = self.model(spec, step)

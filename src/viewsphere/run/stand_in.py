@@ -1,4 +1,4 @@
-"""What stands where a data set of cameras has no model of its own."""
+"""The stand-in model for a data set of cameras without a model of its own."""
 
 from __future__ import annotations
 
@@ -55,5 +55,5 @@ def stand_in(shots: Sequence[ListedShot]) -> StandIn:
 
 
 def _ahead(centers: np.ndarray, axes: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """How far ahead of each camera a point is."""
+    """Return the distance of a point ahead of each camera."""
     return ((point - centers) * axes).sum(axis=1)

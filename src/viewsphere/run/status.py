@@ -1,4 +1,4 @@
-"""How far a data set is: what its index asks for, what is there, and what the runs at work tell of themselves."""
+"""The status of a data set: the frames in its index, the finished ones, and the reports of the active runs."""
 
 from __future__ import annotations
 
@@ -25,13 +25,15 @@ class Run:
 
 @dataclass(frozen=True)
 class Status:
-    """How far a data set is.
+    """The progress of a data set.
 
-    Frames are counted shot by shot: those that are `finished`, `left_out` at the user's wish, and `missing`: all others, also
-    those `under_way` (made by a run, in shots that are not whole: lost if it dies). Frames that get a channel later count once
-    more. `models` are keys of models that are still to be made, `failed` what shards told last that ended with an error, until
-    they are run again. `rate` is that of all runs together, frames a second; `seconds_left` what is missing at this rate, None
-    where no run makes frames.
+    Frames are counted shot by shot: those that are `finished`, `left_out` at the user's request, and `missing`.
+    The missing include those `under_way` (made by a run, in incomplete shots: lost if the run dies).
+    Frames that get a channel later count once more.
+    `models` are keys of models that are still to be made. `failed` are the last reports of shards that ended with an error,
+    until they run again.
+    `rate` is that of all runs together, frames a second; `seconds_left` is for the missing frames at this rate, None while no
+    run makes frames.
     """
 
     root: Path
@@ -68,16 +70,16 @@ class Status:
         return (self.missing - self.under_way) / self.rate if self.rate else None
 
     def to_json(self) -> dict[str, Any]:
-        """All of it as plain data, for scripts."""
+        """Return the status as plain data, for scripts."""
         told = {**asdict(self), "root": str(self.root), "models": list(self.models)}
         asked = ("left_out", "under_way", "complete", "rate", "seconds_left")
         return told | {name: getattr(self, name) for name in asked}
 
 
 def status(out: Path | str | os.PathLike[str]) -> Status:
-    """How far the data set in a folder is; raises StoreError if there is none.
+    """Return the status of the data set in a folder; raises StoreError if there is none.
 
-    Nothing is written, and no shot is opened: it takes as long as listing the finished shots, however many are planned.
+    It writes nothing and opens no shot. Its time depends on the number of finished shots, not of planned ones.
     """
     store = Store(located(out))
     plan = store.plan()

@@ -1,4 +1,4 @@
-"""What walls forbid cameras: to be beyond those of the model's room, and to go through any."""
+"""The limits that walls set for cameras: a camera stays inside the model's room, and never goes through a wall."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Who does the work of a run: processes of this machine (`local`), or the machines of a Ray cluster (`ray`).
+"""The executors of a run: processes of this machine (`local`), or the machines of a Ray cluster (`ray`).
 
-An executor is a file with a `Crew`; what they share is in `_jobs`. Nothing else knows which of them is at work.
+An executor is a file with a `Crew`; the common code is in `_jobs`. No other module depends on the choice of executor.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ class Crew(Protocol):
 
     @property
     def nodes(self) -> int | None:
-        """How many machines are at work; None where it can be this one alone."""
+        """The number of machines at work; None for an executor that only uses this machine."""
         ...
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know of the workers, a line each."""
+        """The notes about the workers for the user, a line each."""
         ...
 
     def run(self, work: Work, heard: Callable[[], None] = ignored) -> Iterator[Outcome]:

@@ -58,7 +58,7 @@ def _live(serve: Callable[..., None], *told: Any) -> None:
 
 
 def end_of(code: int | None, advice: str) -> str:
-    """How a worker with this exit code came to its end; where memory may have been what it lacked, with some advice."""
+    """Return the reason for a worker's end with this exit code; if memory may have run out, the advice follows."""
     if code == OUT_OF_MEMORY:
         return f"it was refused memory{advice}"
     if code == -getattr(signal, "SIGKILL", 0):
@@ -83,8 +83,8 @@ def deaf() -> Generator[None]:
 
 @contextmanager
 def _later() -> Generator[None]:
-    """What this process does at Ctrl-C and SIGTERM waits until the block ends: masks keep signals from one thread, and others
-    may get them.
+    """Delay this process's reaction to Ctrl-C and SIGTERM until the block ends.
+    Signal masks are no substitute: they block signals in one thread only, and other threads may receive them.
     """
     does = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     heard: list[Callable[[], Any]] = []

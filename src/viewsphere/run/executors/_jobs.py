@@ -1,4 +1,4 @@
-"""What there is to do, who gets which of it, and what became of it; the same for all executors."""
+"""The jobs of a run, their distribution to workers, and their outcomes; the same for all executors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST_DEATHS = 16
 
 
 class Work(Protocol):
-    """What there is to do, in lines: jobs of one line share what a worker has warm. Jobs are counted out one by one."""
+    """The jobs of a run, in lines: jobs of one line share the warm caches of a worker. Jobs are counted out one by one."""
 
     def lines(self) -> Iterable[tuple[str, int]]:
         """The name of each line, and about how many jobs are in it."""
@@ -52,13 +52,13 @@ class Listed:
         return Counter(job.line for job in self.all).items()
 
     def jobs(self, line: str) -> Iterator[Job]:
-        """Those of a line."""
+        """Yield the jobs of a line."""
         return (job for job in self.all if job.line == line)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job: the frames it made, or why it could not be done."""
+    """The outcome of a job: the frames it made, or the error that stopped it."""
 
     key: str
     frames: int = 0
@@ -148,9 +148,9 @@ class Queue:
 
 
 def answer(worker: Worker, job: Job, tell: Callable[[int], None]) -> Outcome | str:
-    """What a worker in a process of its own makes of a job: its outcome, or the traceback of what ends the run.
+    """Return the result of a job in a worker's own process: its outcome, or the traceback of an error that ends the run.
 
-    Raises MemoryError where memory is refused, after which the process is not to be trusted.
+    Raises MemoryError where memory is refused; the process is unreliable afterwards.
     """
     try:
         return Outcome(job.key, worker.do(job.task, tell))

@@ -152,7 +152,7 @@ class RayCrew:
             self._hands.append(_Hand(node, nodes[node][0], self._told))
 
     def _heard_of(self) -> list[_Hand]:
-        """Those with an answer, or who died; waits for the first, but not long."""
+        """Return the workers with an answer, and the dead ones; waits briefly for the first."""
         awaited = [hand for hand in self._hands if not hand.is_idle]
         if not awaited:
             time.sleep(TICK)  # until a machine joins
@@ -224,7 +224,7 @@ class _Hand:
             self.asked = self.actor.begun.remote()
 
     def told(self) -> tuple[str, int]:
-        """What it answered: a job's key, and how many of its frames are made."""
+        """Return the worker's answer: the key of a job, and the number of its finished frames."""
         ref, self.asked = self.asked, None
         try:
             return ray.get(ref)
@@ -276,7 +276,7 @@ class _Actor:
 
     @ray.method(concurrency_group="asking")
     def begun(self) -> tuple[str, int]:
-        """How far it is: the key of its job, and how many frames of it are made."""
+        """Return the progress: the key of the current job, and the number of its finished frames."""
         return self._key, self._frames
 
 
@@ -324,7 +324,7 @@ def _nodes() -> dict[str, tuple[str, int]]:
 
 
 def _ready(hands: list[_Hand], which: str, seconds: float = 0.0) -> list[_Hand]:
-    """Those whose answer is there, or comes first within so many seconds."""
+    """Return the workers whose answer has arrived; waits up to this many seconds for the first answer."""
     hand_of = {getattr(hand, which): hand for hand in hands}
     if not hand_of:
         return []
@@ -336,7 +336,7 @@ def _ready(hands: list[_Hand], which: str, seconds: float = 0.0) -> list[_Hand]:
 
 
 def _settings() -> dict[str, str]:
-    """What the user asked for by variables of the environment: limits, scripts, durability."""
+    """Return the user's settings from environment variables: limits, scripts, durability."""
     return {name: value for name, value in os.environ.items() if name.startswith("VIEWSPHERE_") and name not in OF_A_MACHINE}
 
 
