@@ -1,4 +1,4 @@
-"""What a data set made elsewhere shows, to be rendered again: its cameras, its models, and where these are."""
+"""The contents of a data set made elsewhere, for rendering it again: its cameras, its models, and their poses."""
 
 from __future__ import annotations
 

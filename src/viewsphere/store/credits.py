@@ -69,7 +69,7 @@ def write_credits(dataset: Dataset) -> None:
 
 
 def credits_problem(dataset: Dataset) -> str | None:
-    """What is wrong with the file: it is not what the models' records say."""
+    """Return the error in the credits file, if its text differs from the models' records; None if it matches."""
     wanted, found = credits_text(dataset.models), None
     with suppress(OSError, UnicodeDecodeError):
         found = read_bytes(dataset.root / CREDITS, "MAX_RECORD_BYTES").decode()

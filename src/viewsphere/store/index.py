@@ -152,7 +152,7 @@ class Index(Sequence[Row]):
 
     @property
     def subjects(self) -> tuple[str, ...]:
-        """All subjects, each once, in order."""
+        """The subjects, each once, in order."""
         return tuple(self._places)
 
     def at(self, sample: int) -> Row:
@@ -205,7 +205,7 @@ class Index(Sequence[Row]):
         return chunk if self._edge(number, chunk) == offset else None
 
     def _end(self, position: int) -> str:
-        """What ends the key of a shot, behind its subject and a hyphen, by its first position."""
+        """Return the end of a shot's key, behind its subject and a hyphen, by its first position."""
         return f"{position:06d}{self.suffix}"
 
     def _row(self, number: int, subject: int, chunk: int) -> Row:
@@ -228,7 +228,7 @@ class Index(Sequence[Row]):
         return number, subject, chunk
 
     def _own(self, number: int, subject: int) -> range:
-        """Which chunks of a block's subject are in the share."""
+        """Return the chunks of a block's subject that are in the share."""
         chunks = self._chunks(number)
         first = self.share.next(self._rows[number] + subject * chunks) - self._rows[number] - subject * chunks
         return range(first, chunks, self.share.of)
@@ -293,7 +293,7 @@ def floor_sum(count: int, divisor: int, step: int, start: int) -> int:
 
 
 def length(ranges: Ranges) -> int:
-    """How many numbers there are."""
+    """Return the count of all numbers in the ranges."""
     return sum(stop - first for first, stop in ranges)
 
 
@@ -322,7 +322,7 @@ def _cut(ranges: Ranges, begin: int, end: int) -> Ranges:
 
 
 def _offset(ranges: Ranges, number: int) -> int | None:
-    """How many numbers come before this one, None if it is not there."""
+    """Return the number of earlier numbers in the ranges, None if this number is absent."""
     before = 0
     for first, stop in ranges:
         if first <= number < stop:

@@ -35,7 +35,7 @@ def parsed(text: str | bytes, parse_constant: Callable[[str], Any] | None = None
 
 
 def _nesting(text: str) -> int:
-    """How deep brackets stand in one another, outside of what is quoted; not counted where they are too few to matter."""
+    """Return the depth of nested brackets outside of quotes; texts with too few brackets are not counted and return 0."""
     if text.count("[") + text.count("{") <= MOST_NESTED:
         return 0
     outside = text.replace("\\\\", "").replace('\\"', "").split('"')[::2]

@@ -1,9 +1,9 @@
-"""Where data sets are written: on a disk, or at a URL. What reads them is the same for both (`viewsphere.urls`).
+"""The places of data sets: a disk, or a URL. Reading is the same for both (`viewsphere.urls`).
 
-What is written goes by a `Place`: it is made in a folder of this machine's that is aside, and put in its place when it is
-whole. A disk does that by a rename. A URL has none: files are uploaded, and the one that tells that a folder is whole comes
-last; a folder without it is absent, and is made again over what is there. No run knows of others at a URL: those that make
-the same shot put the same bytes there. Files of the store are never changed, so nothing has to be locked to be read.
+Writing uses a `Place`: a folder is made in a scratch folder of this machine, and moved to its place when it is complete.
+A disk does that by a rename. A URL has no rename: files are uploaded, and the file that marks the folder as complete comes
+last. A folder without this file counts as absent, and is made again over its remains. No run detects others at a URL: runs
+that make the same shot write the same bytes. Files of the store are never changed, so reading needs no locks.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Place(Protocol):
 
 
 def place_of(root: Path) -> Place:
-    """What writes below this root."""
+    """Return the writer for this root."""
     if isinstance(root, RemotePath):
         from viewsphere.store.places.remote import Remote
 

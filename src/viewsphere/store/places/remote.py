@@ -122,7 +122,7 @@ def _finished_of(group: RemotePath) -> list[str]:
 
 
 def _each(work: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
-    """What becomes of each item, in order, several at once; the first error ends it."""
+    """Return the result for each item, in order, several at once; the first error ends the work."""
     with ThreadPoolExecutor(AT_ONCE) as pool:
         futures = [pool.submit(work, item) for item in items]
         try:

@@ -34,7 +34,7 @@ class Choice:
         return any(text.startswith(beginning) or beginning.startswith(text) for text in literal)
 
     def places(self, first: int, count: int) -> Sequence[int]:
-        """Which of the frames first, first + 1, ..., first + count - 1 the choice includes, counted from 0."""
+        """Return the chosen ones of the frames first, first + 1, ..., first + count - 1, counted from 0."""
         if not self.frames:
             return range(count)
         return [i for i in range(count) if any(low <= first + i < stop for low, stop in self.frames)]

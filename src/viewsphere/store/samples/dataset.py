@@ -88,12 +88,12 @@ class Dataset(Shown, Sequence[Sample]):
 
     @property
     def categories(self) -> tuple[Category, ...]:
-        """All categories of the plan."""
+        """The categories of the plan."""
         return self.plan.categories
 
     @property
     def classes(self) -> tuple[SemanticClass, ...]:
-        """What the numbers of `semantic` and `panoptic` maps mean, stuff first; `plan.json` lists them, too."""
+        """The classes behind the numbers of `semantic` and `panoptic` maps, stuff first; `plan.json` lists them, too."""
         return self.plan.classes
 
     @property
@@ -267,9 +267,8 @@ class Dataset(Shown, Sequence[Sample]):
         return joined(samples)
 
     def _places(self, row: Row) -> Sequence[int]:
-        """Which of a finished shot's frames are chosen, by the model's key, or by the key of its moment if the model is
-        animated. Where the plan does not know a frame's model, as in imported data sets, the frame belongs to all models that
-        it shows.
+        """Return the chosen frames of a finished shot, by the model's key, or for an animated model by the key of its moment.
+        Where the plan has no model for a frame, as in imported data sets, the frame belongs to all models that it shows.
         """
         places = self.choice.places(row.first, row.count)
         if not self.choice.models or not places:
@@ -455,8 +454,9 @@ class Dataset(Shown, Sequence[Sample]):
             return read_exported(file, info.parts, info.node, whole=True)
 
     def occupancy(self, key: str, cells: int = 32) -> Occupancy:
-        """Which cells a model is in, of a cube of so many along each side around it: where its surface is, and the inside of
-        its pieces that are closed. Raises StoreError as `mesh` does, ValueError for too many cells.
+        """Return the occupied cells of a model, in a cube around it with this many cells along each side.
+        A cell is occupied where the model's surface is, and inside its closed pieces.
+        Raises StoreError as `mesh` does, ValueError for too many cells.
         """
         from viewsphere.model.voxels import Occupancy
 
@@ -530,7 +530,7 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
         return type(self)(self._root, self._files, self._manifest_of)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What other processes are sent: they read manifests anew."""
+        """The state sent to other processes, which read manifests anew."""
         return {**self.__dict__, "_manifest_of": partial(_manifest_of, self._root)}
 
     def __getitem__(self, name: str) -> NDArray[Any]:

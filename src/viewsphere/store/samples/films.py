@@ -43,9 +43,7 @@ class Film:
         return (*steps, min(steps))
 
     def spread(self, count: int) -> tuple[int, ...]:
-        """Which of its instants are evenly spaced, counted from 0: the first, the last and others between; all if there are
-        so few.
-        """
+        """Return evenly spaced instants, counted from 0: the first, the last and others between; all if there are so few."""
         last = len(self.instants) - 1
         return tuple(np.unique(np.linspace(0, last, min(count, last + 1)).round().astype(int)).tolist())
 
@@ -126,7 +124,7 @@ def film_named(films: Sequence[Film], name: str) -> Film:
 
 @dataclass(frozen=True, eq=False)
 class Earlier:
-    """What sensors saw before: of a sample, those of its own sensor at up to `labels.TAIL` instants before, in order."""
+    """The earlier samples of sensors: of a sample, those of its own sensor at up to `labels.TAIL` instants before, in order."""
 
     samples: Sequence[Sample]
     films: Sequence[Film]

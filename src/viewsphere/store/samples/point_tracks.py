@@ -64,7 +64,7 @@ def joined(samples: Sequence[Sample]) -> PointTracks:
 
 
 def _in_picture(sample: Sample) -> tuple[Float, Float, Float]:
-    """Where a sample's points are in its picture (N, 2), in its camera's axes and in the world, (N, 3)."""
+    """Return the positions of a sample's points: in its picture (N, 2), in its camera's axes and in the world, (N, 3) each."""
     point, xyz = sample.channels["tracks"]["point"], in_camera(sample)
     is_sky = point[:, 3] == 0.0
     xyz[is_sky] = (np.nan, np.nan, np.inf)

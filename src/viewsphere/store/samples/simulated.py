@@ -1,7 +1,7 @@
-"""What is simulated, such as where a heap comes to rest: made once, and kept.
+"""The store of simulation results, such as the rest poses of a heap: each is made once, and kept.
 
-Two machines need not agree on the last bit of it, so all shots of a scene, whichever machine makes them and after whatever
-crash, take what was kept first. An entry is a folder with one file: OUT/store/simulated/ab/<the rest of the digest>/made.json.
+Two machines may differ in the last bit of a result. So all shots of a scene use the result that was kept first, on any
+machine and after any crash. An entry is a folder with one file: OUT/store/simulated/ab/<the rest of the digest>/made.json.
 """
 
 from __future__ import annotations

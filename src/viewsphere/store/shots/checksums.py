@@ -90,12 +90,12 @@ def written_credits(folder: Path) -> str | None:
 
 
 def written_frames(folder: Path) -> int | None:
-    """How many frames a folder's files were written of; None where that is not known."""
+    """Return the number of frames in a folder's files when they were written; None if unknown."""
     return _said(folder, FRAMES)
 
 
 def _said(folder: Path, mark: str) -> Any:
-    """What a line at the list's head says; None where there is no such line, or no list that can be read."""
+    """Return the value in a line at the list's head; None without such a line, or without a readable list."""
     with suppress(OSError, ValueError), open_text(folder / CHECKSUMS) as file:
         head = takewhile(lambda line: line.startswith("# "), file)
         return next((parsed(line.removeprefix(mark)) for line in head if line.startswith(mark)), None)
@@ -103,7 +103,7 @@ def _said(folder: Path, mark: str) -> Any:
 
 
 def damaged_files(folder: Path) -> Iterator[str]:
-    """What of a folder is not as it was listed: files that are missing, changed, or too many."""
+    """Yield the differences of a folder from its list: files that are missing, changed, or additional."""
     try:
         listed = sum(1 for _ in _lines(folder))  # the list itself is proved first
         for digest, path, found in _compared(folder):
@@ -147,5 +147,5 @@ def _digest(file: Path) -> str | None:
 
 
 def _files(folder: Path) -> Iterator[str]:
-    """All files but the list, by their paths, in an order that does not depend on the disk."""
+    """Yield all files but the list, by their paths, in an order that does not depend on the disk."""
     return (path for path in files_below(folder) if path != CHECKSUMS)

@@ -43,8 +43,8 @@ RUN = "run.json"
 
 @dataclass(frozen=True)
 class Gap:
-    """What is missing of a part, or of the channels that it adds to other parts: its first missing row, how many shots and
-    frames these are, and of how many frames.
+    """The missing rows of a part, or of the channels that it adds to other parts.
+    `first`: its first missing row; `shots` and `frames`: the numbers of missing ones; `of`: the number of all frames.
     """
 
     part: int
@@ -65,7 +65,7 @@ class Store:
 
     @property
     def plan_file(self) -> Path:
-        """Where the plan is kept."""
+        """The path of the plan."""
         return self.folder / "plan.json"
 
     def plan(self) -> PlanRecord:
@@ -154,14 +154,14 @@ class Store:
             move(own / NEW, own / RUN)
 
     def heartbeats(self) -> tuple[tuple[Heartbeat, bool | None], ...]:
-        """What the runs at work told last, and whether each of them lives, None where that is not known: also those that died,
-        as long as nothing removed what they left.
+        """Return the last report of each run at work, and whether the run is alive, None if unknown.
+        Dead runs are included while their remains are not removed.
         """
         files = sorted((self.folder / "writing").glob(f"*/{RUN}"))
         return tuple((told, lives(file.parent)) for file in files if (told := Heartbeat.read(file)))
 
     def failures(self) -> tuple[Heartbeat, ...]:
-        """What the runs told last that failed, and were not tried again since."""
+        """Return the last reports of failed runs that have not been tried again since."""
         return tuple(filter(None, map(Heartbeat.read, sorted(self._failed.glob("*.json")))))
 
     def forget_failures(self) -> None:
@@ -177,10 +177,10 @@ class Store:
         self._write_atomically(self.plan_file, plan.to_json())
 
     def gaps(self, plan: PlanRecord, finished: Sequence[str] | None = None) -> Iterator[Gap]:
-        """What is missing of each part and of the channels that it adds, but for what was left out at the user's wish; where
-        just these shots are finished, by default all that are.
+        """Yield the gaps of each part and of the channels that it adds, except for rows left out at the user's request.
 
-        Takes as long as shots are finished, however many are planned.
+        `finished`: the shots that count as finished, by default all finished ones.
+        The time depends on the number of finished shots, not of planned ones.
         """
         skipped, finished = self.skipped().keys(), tuple(self.finished()) if finished is None else finished
         alike: defaultdict[tuple[int, bool], list[Index]] = defaultdict(list)
@@ -259,22 +259,24 @@ class Store:
             self.place.put(own / NEW, file)
 
     def shot_folder(self, key: str) -> Path:
-        """Where a finished shot lies."""
+        """Return the folder of a finished shot."""
         return self.folder / "shots" / hashlib.sha256(key.encode()).hexdigest()[:2] / key
 
     def channel_file(self, key: str, channel: str, sample: int, kinds: Files | None = None) -> str:
-        """Where a finished shot's channel of a sample, written as `kinds` say, lies; relative to the data set's root."""
+        """Return the path of a sample's channel in a finished shot, with the file type from `kinds`, relative to the data set's
+        root.
+        """
         return f"{self.shot_folder(key).relative_to(self.root).as_posix()}/{channel_path(channel, sample, kinds)}"
 
     def channel_files(self, key: str, shot: Shot) -> tuple[tuple[str, str, str], ...]:
-        """How the files of a finished shot's channels are called: the channel, what comes before a sample's number of eight
-        digits, and what after it.
+        """Return the file names of a finished shot's channels.
+        Each entry is the channel, the text before a sample's number of eight digits, and the text after it.
         """
         folder, table = self.shot_folder(key).relative_to(self.root).as_posix(), channels()
         return tuple((name, f"{folder}/{name}/", shot.files.suffix(table[name])) for name in shot.channels)
 
     def model_folder(self, key: str) -> Path:
-        """Where a normalised model lies."""
+        """Return the folder of a normalised model."""
         return self.folder / "models" / key
 
     def has_shot(self, key: str) -> bool:
@@ -417,7 +419,7 @@ class Store:
         (folder / "model.json").write_text(json.dumps(info.to_plain(), indent=1), "utf-8", newline="\n")
 
     def model_info(self, key: str) -> ModelInfo | None:
-        """What is known of a finished model; None if it is not there, StoreError if it cannot be read."""
+        """Return the metadata of a finished model; None if it is absent, StoreError if it is unreadable."""
         file = file_inside(self.root, (self.model_folder(key) / "model.json").relative_to(self.root).as_posix())
         try:
             info = ModelInfo.from_plain(parsed(read_bytes(file, "MAX_RECORD_BYTES")))
@@ -451,7 +453,9 @@ def new_folder(target: Path) -> AbstractContextManager[Path]:
 
 
 def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
-    """Where a channel of a sample (its number in the data set), written as `kinds` say, lies in its shot's folder."""
+    """Return the path in its shot's folder of a sample's channel (by its number in the data set), with the file type from
+    `kinds`.
+    """
     return f"{channel}/{sample:08d}{(kinds or Files()).suffix(channels()[channel])}"
 
 

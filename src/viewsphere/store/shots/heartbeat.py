@@ -1,5 +1,5 @@
-"""How far runs are, told by each in a small file of the store that it writes anew every few seconds: for whoever asks, from any
-machine that sees the store.
+"""The progress of runs: each run rewrites a small file in the store every few seconds.
+Any machine that sees the store can read these files.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ MOST = 2.0**53
 
 @dataclass(frozen=True)
 class Heartbeat:
-    """What a run tells of itself.
+    """The report of a run on itself.
 
-    `shard` (k, n): it renders the k-th of n shares. `done` of `total` count frames in the phase "frames", else what that phase
-    counts; `resumed` of them were there before, `under_way` are in shots that are not finished: those of the keys `working_on`.
-    `begun` and `beat` are when the phase began and when this was told, in seconds since 1970. `error`: why the run ended.
+    `shard` (k, n): it renders the k-th of n shares. `done` of `total` count frames in the phase "frames", else the units of
+    that phase. `resumed` of them were there before. `under_way` are in unfinished shots: those of the keys `working_on`.
+    `begun` and `beat` are the times of the phase's start and of this report, in seconds since 1970. `error`: the reason for the
+    run's end.
     """
 
     host: str
@@ -111,7 +112,7 @@ class Pulse:
             self.now, self._phase_begun = replace(self.now, phase=phase), time.monotonic()
 
     def told(self, error: str = "") -> str:
-        """What there is to tell now: how far the run is, or how it ended."""
+        """Return the current report: the run's progress, or the reason for its end."""
         beat = time.time()
         begun = beat - (time.monotonic() - self._phase_begun)
         return replace(self.now, begun=begun, beat=beat, working_on=tuple(self.working_on.copy()), error=error).to_json()

@@ -1,13 +1,13 @@
-"""What lies in a folder that is finished: each file's size and digest, in a file that is written last and proves itself.
+"""The contents of a finished folder: each file's size and digest, in a file that is written last and proves itself.
 
     {"files": {"depth/00000012.tiff": [34180, "6f0c..."], ...}, "digest": "91d2..."}
 
-Where a shot's channels lie in one tar file, it tells where each begins, so that one is read without the others:
+Where a shot's channels are in one tar file, it lists the start of each, so that a reader can skip the others:
 
     {"files": {"channels.tar": [...], ...}, "spans": {"depth/00000012.tiff": [512, 34180, "6f0c..."], ...}, "digest": "91d2..."}
 
-Digests are XXH3 of 128 bits (https://github.com/Cyan4973/xxHash): they find damage at the speed of memory, and are no proof
-against somebody who wants to deceive.
+Digests are XXH3 of 128 bits (https://github.com/Cyan4973/xxHash): they find damage at the speed of memory. They are no
+protection against deliberate deception.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def sealed(value: Mapping[str, Any]) -> str:
 
 
 def unsealed(text: str) -> dict[str, Any]:
-    """What `sealed` was given; raises ValueError for a text that was changed since."""
+    """Return the original argument of `sealed`; raises ValueError for a text that was changed since."""
     start, comma, _ = text.rpartition(',"digest":"')
     if not comma or f'{start},"digest":"{digest((start + "}").encode())}"}}' != text:
         raise ValueError("a text that was changed since it was written: its digest is another")
@@ -85,7 +85,7 @@ class Manifest:
 
     @staticmethod
     def of(folder: Path) -> Manifest:
-        """What lies in a folder and below, but for the manifest itself."""
+        """Return the manifest of a folder and the folders below, without the manifest itself."""
         paths = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / MANIFEST)
         return Manifest({path.relative_to(folder).as_posix(): seal_of(path) for path in paths})
 
@@ -115,7 +115,7 @@ class Manifest:
 
     @property
     def seals(self) -> Mapping[str, Seal]:
-        """All files, those of the shard in its place."""
+        """The seals of all files, with the files inside the shard instead of the shard itself."""
         own = {path: told for path, told in self.files.items() if path != SHARD}
         return own | {path: (size, found) for path, (_, size, found) in self.spans.items()}
 
@@ -145,7 +145,7 @@ class Manifest:
             raise StoreError(f"{file}: expected {said(told)}, found {said((len(data), digest(data)))}: {REPAIR}")
 
     def damage(self, folder: Path) -> Iterator[str]:
-        """What is not as it was written: files that are missing, changed, or too many."""
+        """Yield the differences from the written state: files that are missing, changed, or additional."""
         for path, told in self.files.items():
             try:
                 found = seal_of(file_inside(folder, path))

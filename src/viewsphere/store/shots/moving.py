@@ -37,7 +37,7 @@ automatic mounts."""
 
 
 def durability() -> str:
-    """What is asked for; raises UserError where that is unknown."""
+    """Return the requested durability; raises UserError for an unknown one."""
     asked = os.environ.get(DURABILITY) or DURABILITIES[0]
     if asked not in DURABILITIES:
         raise UserError(f"{DURABILITY}: expected {' or '.join(DURABILITIES)}; found {asked!r}")

@@ -1,4 +1,4 @@
-"""Why a recipe whose fields are as before is not the one of a data set: its files are others."""
+"""The error for a recipe with the fields of a data set but other files."""
 
 from __future__ import annotations
 

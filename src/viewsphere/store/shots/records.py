@@ -116,7 +116,9 @@ class ModelInfo:
         return None if self.step is None else PurePosixPath(self.obj).stem
 
     def at(self, frame: int | None) -> ModelInfo:
-        """What is known of a time step, by the frame of the model's file (None: at rest); raises ValueError for another."""
+        """Return the metadata at a time step, by the frame of the model's file (None: at rest); raises ValueError for another
+        frame.
+        """
         found = self if frame is None else next((one for one in self.steps if one.step and one.step.frame == frame), None)
         if found is None:
             raise ValueError(f"model {self.key}: expected time step {frame}, found none")
@@ -192,7 +194,7 @@ class Part:
 
     @property
     def subjects(self) -> tuple[str, ...]:
-        """What its samples are about, each once: keys of models, or names of scenes."""
+        """The subjects of its samples, each once: keys of models, or names of scenes."""
         return tuple(dict.fromkeys(name for block in self.blocks for name in block.subjects))
 
     def world(self, subject: str) -> str:
@@ -266,7 +268,7 @@ class PlanRecord:
 
     @property
     def classes(self) -> tuple[SemanticClass, ...]:
-        """What the numbers of semantic and panoptic maps mean: names, colours, things and stuff."""
+        """The classes behind the numbers of semantic and panoptic maps: names, colours, things and stuff."""
         return classes_of((category.id, category.name) for category in self.categories)
 
     @property

@@ -89,7 +89,7 @@ def whole_sample(sample: Sample) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Picture:
-    """What a whole record says of a picture, but for its camera, pose and objects."""
+    """The fields of a whole record about a picture, without its camera, pose and objects."""
 
     __pydantic_config__ = ConfigDict(allow_inf_nan=False)
     index: int

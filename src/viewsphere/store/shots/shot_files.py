@@ -1,4 +1,4 @@
-"""How the files of a shot's channels come into its folder: each by itself, or all in one tar."""
+"""The writing of a shot's channel files into its folder: each by itself, or all in one tar."""
 
 from __future__ import annotations
 
