@@ -37,7 +37,7 @@ Home = Literal["table", "floor", "street", "garden", "water", "place"]
 
 
 def home(family: str) -> Home:
-    """Where a family is found; raises UserError for an unknown family, with the nearest known one."""
+    """Return the home of a family; raises UserError for an unknown family, with the nearest known one."""
     return plugins.family(family).HOME
 
 

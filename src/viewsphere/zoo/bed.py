@@ -281,7 +281,7 @@ def _pillows(p: Bed, coats: _Coats, rng: np.random.Generator) -> list[Piece]:
 
 
 def surfaces(parameters: Bed) -> tuple[Surface, ...]:
-    """What of the duvet's top is even, between its turned-back band, or pillows, and the blanket or the foot end, and the
+    """Return the even surfaces: the duvet between its turned-back band, or pillows, and the blanket or the foot end; and the
     blanket's top.
     """
     p, x, foot = parameters, parameters.width / 2 - 0.1, -parameters.length / 2

@@ -105,7 +105,7 @@ def _hubs(p: Bicycle) -> tuple[Hub, Hub]:
 
 
 def _front(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
-    """All pieces that turn with the handlebar, steering straight ahead."""
+    """Return the pieces that turn with the handlebar, steering straight ahead."""
     w, axle = p.wheel, at.front_axle
     blades = unit(at.crown - axle)
     pieces = wheel_pieces(w, _hubs(p)[0], c, "wheel_front", 0.35)
@@ -135,7 +135,7 @@ def _lamp(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
 
 
 def _rear(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
-    """All pieces that stay with the frame when the bar turns."""
+    """Return the pieces that stay with the frame when the bar turns."""
     w, axle, room, hub = p.wheel, at.rear_axle, _room(p), _hubs(p)[1]
     stays = unit(at.on_seat(p.geometry.seat_tube - (0.03 if p.frame.shape == "diamond" else 0.11)) - axle)
     wheel = wheel_pieces(w, hub, c, "wheel_rear", 1.2)
@@ -155,7 +155,9 @@ def _rear(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
 
 
 def _cable_entry(p: Bicycle, at: Layout) -> tuple[Float, Float]:
-    """Where cables enter the frame, and their direction there: in the down tube, or in the head tube above a bowed tube."""
+    """Return the point where cables enter the frame, and their direction there.
+    The point is in the down tube, or in the head tube above a bowed tube.
+    """
     low, high = at.head
     if p.frame.shape in ("diamond", "mixte"):
         return shifted(between(low, at.bracket, 0.2), z=0.004), unit(at.bracket - low)

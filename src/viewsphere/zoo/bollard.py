@@ -72,7 +72,7 @@ def _radius(p: Bollard, z: float) -> float:
 
 
 def _foot(p: Bollard) -> Float:
-    """What stands on the ground."""
+    """Return the profile of the foot on the ground."""
     r = _radius(p, 0.0)
     if p.style != "iron":
         return np.array([(0, 0), (1.15 * r, 0), (1.15 * r, 0.03), (1.02 * r, 0.045), (0.9 * r, 0.045)])

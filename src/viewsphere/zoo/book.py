@@ -75,7 +75,7 @@ def book(parameters: Book | None = None) -> Mesh:
 
 
 def _board(p: Book) -> tuple[float, float]:
-    """How thick the cover is, and how far it stands out beyond the pages."""
+    """Return the thickness of the cover, and its overhang beyond the pages, metres."""
     return (0.0026, 0.0032) if p.binding == "boards" else (0.0005, 0.0)
 
 

@@ -179,7 +179,9 @@ def _ribs(p: Bottle) -> Float:
 
 
 def _glass(p: Bottle, color: Color, name: str = "glass") -> Material:
-    """What the bottle is made of; of a clear one that is full, the drink's colour: no engine has to look through it."""
+    """Return the material of the bottle.
+    A clear and full bottle has the drink's colour, so that no engine has to render a view through it.
+    """
     if p.form == "flask":
         return coated("steel", p.color, "matte") if p.closure == "lid" else metal("steel", p.color, 0.3)
     if p.form == "sauce" and not p.clear:
@@ -202,7 +204,7 @@ def _sleeve(p: Bottle, span: tuple[float, float]) -> Solid:
 
 
 def _cap(p: Bottle) -> list[tuple[Material, Solid]]:
-    """What closes the bottle, by materials."""
+    """Return the closure of the bottle, by materials."""
     top, neck = p.height, float(_radius(p, np.array([0.99]))[0])
     paint = coated("cap", p.cap, "matte")
     if p.closure == "foil":

@@ -183,7 +183,7 @@ def _label(p: Box) -> Piece:
 
 
 def _stuck(p: Box) -> charts.Chart:
-    """How the address lies on its sheet."""
+    """Return the chart of the address on its sheet."""
     x, y = _place(p)
     return charts.flat((x, y), (x + _LABEL[0], y + _LABEL[1]), (0, 1) if p.label == "top" else (0, 2))
 

@@ -140,7 +140,7 @@ def _outside(p: Interior) -> list[Piece]:
 
 
 def _room(p: Interior, room: Room, joinery: Joinery, images: list[Image], rng: np.random.Generator) -> list[Piece]:
-    """All of one room; its pictures are added to `images`."""
+    """Return the pieces of one room; its pictures are added to `images`."""
     floor, picture = coverings.floor(rng, room.floor, len(images))
     images.append(picture)
     paper, picture = coverings.wall(rng, room.wall, len(images))
@@ -166,7 +166,7 @@ def _room(p: Interior, room: Room, joinery: Joinery, images: list[Image], rng: n
 
 
 def _depth(p: Interior, room: Room, side: Side) -> float:
-    """How deep a room's wall reaches: to the outside, or to the middle of what parts it from the next room."""
+    """Return the depth of a room's wall: to the outside, or to the middle of the wall between it and the next room."""
     low, high = p.hull
     edge = {"rear": high[1] - room.high[1], "right": high[0] - room.high[0]}
     edge |= {"front": room.low[1] - low[1], "left": room.low[0] - low[0]}

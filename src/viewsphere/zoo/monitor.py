@@ -101,7 +101,7 @@ def monitor(parameters: Monitor | None = None) -> Mesh:
 
 
 def _bent(p: Monitor, solid: Solid) -> Solid:
-    """What a curved screen does to flat solids: their sides come forward."""
+    """Return a flat solid bent like a curved screen: its sides come forward."""
     if not p.curve:
         return solid
     v = solid.vertices.copy()

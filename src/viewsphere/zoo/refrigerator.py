@@ -87,7 +87,7 @@ class Refrigerator:
 
     @property
     def doors(self) -> list[Door]:
-        """All doors and drawers."""
+        """The doors and drawers."""
         x, low, high = self.width / 2, self.foot, self.height
         cut = low + self.split * (high - low)
         if self.style == "bottom_freezer":

@@ -78,7 +78,9 @@ def rug(parameters: Rug | None = None) -> Mesh:
 
 
 def _folds(p: Rug, rng: np.random.Generator, plan: Float) -> Float:
-    """How high the rug lies over the floor at points (..., 2): soft folds that end before its border, metres, 0 at least."""
+    """Return the height of the rug over the floor at points (..., 2), metres: soft folds that end before its border, 0 at
+    least.
+    """
     x, y = plan[..., 0], plan[..., 1]
     total = np.ones_like(x)
     for turn, phase in rng.uniform(0, np.pi, (2, 2)):

@@ -130,7 +130,7 @@ def _uprights(p: Shelf, timber: Timber) -> list[Piece]:
 
 
 def _boards(p: Shelf, timber: Timber) -> list[Piece]:
-    """All boards, between the sides or over the whole width."""
+    """Return the boards, between the sides or over the whole width."""
     half = p.width / 2 - (0.001 if p.style in ("rack", "ladder") else 0.5 * p.thickness)
     solids = []
     for k, z in enumerate(p.tops):
@@ -193,7 +193,7 @@ def _free(p: Shelf, level: int) -> float:
 
 
 def _taken(p: Shelf) -> dict[int, str]:
-    """What stands in which bay: books, a box, a vase."""
+    """Return the kind of content of each filled bay, by the bay's number: books, a box, a vase."""
     rng = np.random.default_rng((p.seed, 1))
     kinds = ("books", "books", "books", "box", "vase")
     taken = {}
@@ -205,7 +205,7 @@ def _taken(p: Shelf) -> dict[int, str]:
 
 
 def _stock(p: Shelf, rng: np.random.Generator) -> list[Piece]:
-    """What stands in the bays that are taken."""
+    """Return the pieces in the filled bays."""
     found: list[Piece] = []
     bays = _bays(p)
     for number, kind in _taken(p).items():

@@ -131,7 +131,7 @@ def _shelf(p: Table) -> tuple[float, float]:
 
 
 def _frame(p: Table, wood: Timber) -> list[Piece]:
-    """What carries the top."""
+    """Return the frame under the top."""
     steel = METALS[p.metal]
     if p.frame == "pedestal":
         return pedestal(wood.upright if p.metal == "black" else steel, p.under, min(p.width, p.depth), p.metal == "black")

@@ -281,7 +281,7 @@ _STANDS = {"feet": _feet, "foot": _foot, "easel": _easel, "console": _console}
 
 
 def surfaces(parameters: Television) -> tuple[Surface, ...]:
-    """What is free of the low cabinet's top, at both sides of the set; nothing where there is no cabinet."""
+    """Return the free surfaces of the low cabinet's top, at both sides of the set; empty without a cabinet."""
     p = parameters
     if p.style != "console":
         return ()

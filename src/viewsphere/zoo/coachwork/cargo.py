@@ -1,4 +1,4 @@
-"""What a lorry carries: a box, a box kept cold, curtains, an open bed with sides, a tipper's tub."""
+"""The load areas of a lorry: a box, a cold box, curtains, an open bed with sides, a tipper's tub."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Skin:
 
 
 def cargo_pieces(s: Frame, c: Coats, skin: Skin) -> list[Piece]:
-    """What is carried, by the parameters' kind."""
+    """Return the pieces of the load area, by the parameters' kind."""
     return {"box": _box, "cold_box": _cold, "curtain": _curtain, "dropside": _dropside, "tipper": _tipper}[s.p.load](s, c, skin)
 
 

@@ -43,7 +43,7 @@ def car_paint(name: str, color: Color, flakes: float) -> Material:
 
 
 def coats(color: Color, roof: Color, flakes: float, rims: Color, painted_cladding: bool, glass: Color) -> Coats:
-    """All materials of a car of these colours."""
+    """Return the materials of a car of these colours."""
     paint = car_paint("paint", color, flakes)
     plastic = Material("plastic", linear((0.16, 0.16, 0.165)), roughness=0.75)
     return Coats(

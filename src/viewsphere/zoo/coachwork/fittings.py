@@ -34,7 +34,7 @@ def seams(shape: Shape, coats: Coats, rear_door: bool) -> list[Piece]:
 
 
 def _bottom_end(hull: Hull, y: float, sill: float) -> float:
-    """Where a door's lower seam ends: at its rear edge or before the wheel's opening."""
+    """Return the end of a door's lower seam: at its rear edge or before the wheel's opening."""
     clear = [a.y - a.radius - 0.04 for a in hull.arches if abs(a.y - y) < a.radius + 0.04 and a.z + a.radius > sill]
     return min([y, *clear])
 

@@ -1,4 +1,4 @@
-"""What buses and lorries share: axles with heavy wheels, mirrors on arms, and panels on their flat sides."""
+"""The common parts of buses and lorries: axles with heavy wheels, mirrors on arms, and panels on their flat sides."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _disc(w: Wheel, twin: bool) -> tuple[Solid, Solid]:
 
 
 def _tilt(q: float, half: float, flat: float, rise: float) -> float:
-    """How far the cone that carries the holes leans, radians."""
+    """Return the slope of the cone with the holes, radians."""
     return float(np.arctan2((flat - rise) * half, 0.2 * q))
 
 

@@ -64,7 +64,7 @@ class Hull:
         return curve(y, self.center) - self.crown * across**2.6 + bulge
 
     def inset(self, u: ArrayLike, z: ArrayLike) -> Float:
-        """How far the wall lies inside the outline."""
+        """Return the distance of the wall inside the outline."""
         n = self.outline.normal(u)
         ahead, behind = np.maximum(-n[..., 1], 0) ** 2, np.maximum(n[..., 1], 0) ** 2
         inset = n[..., 0] ** 2 * curve(z, self.side)

@@ -27,7 +27,7 @@ RAIL = 0.42
 
 @dataclass(frozen=True)
 class Frame:
-    """Where things are along a lorry, and its cab's surface."""
+    """The positions of the parts along a lorry, and its cab's surface."""
 
     p: Truck
 

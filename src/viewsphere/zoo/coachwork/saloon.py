@@ -27,8 +27,10 @@ Band = tuple[float, float]
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things are on a style of bus, metres: window bands (low, high) from below, the windscreen's, the overhangs before
-    the front and behind the rear axle, the doors' top and the skirt's top."""
+    """The positions of parts on a style of bus, metres.
+    `bands` and `screens`: window bands (low, high) from below, and the windscreen's. `front` and `rear`: the overhangs before
+    the front and behind the rear axle. `door` and `skirt`: their tops.
+    """
 
     bands: tuple[Band, ...]
     screens: tuple[Band, ...]
@@ -59,7 +61,7 @@ class Saloon:
 
     @cached_property
     def amber(self) -> Material:
-        """What its displays' letters shine in."""
+        """The material of the shining letters on its displays."""
         return lamp("destination", (1.0, 0.66, 0.1), 0.9)
 
     @cached_property
@@ -117,7 +119,7 @@ class Saloon:
 
     @property
     def flank(self) -> tuple[float, float]:
-        """Where the flanks' flat part begins and ends."""
+        """The start and the end of the flat part of the flanks."""
         o = self.hull.outline
         ends = [o.u_at_x(0.993 * o.half_width, rear) for rear in (False, True)]
         front, rear = o.point(np.array(ends))[:, 1].tolist()

@@ -90,7 +90,7 @@ class Shape:
 
     @cached_property
     def crown(self) -> float:
-        """How much lower the deck's sides lie than its middle."""
+        """The drop of the deck's sides below its middle."""
         return 0.05 + 0.03 * self.roundness
 
     @cached_property
@@ -245,7 +245,7 @@ class Shape:
         return (Cell(0.94, first), front, *rest[: windows - 1], *plain[windows - 1 :], Cell(last, 3.12))
 
     def deck_inner(self) -> Float:
-        """Where the deck meets the cabin, (stations, 2), one point for each of the hull's stations."""
+        """Return the line between deck and cabin, (stations, 2), one point for each of the hull's stations."""
         return follow(self.hull, self.cabin.base, 1.15, overlap=0.035)
 
     @cached_property

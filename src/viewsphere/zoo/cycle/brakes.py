@@ -118,7 +118,7 @@ def cable(start: Float, leaves: Float, end: Float, arrives: Float, slack: float)
 
 
 def cable_end(kind: Brake, w: Wheel, axle: Float, toward: Float, behind: float) -> tuple[Float, Float]:
-    """Where the front brake's cable ends and the direction in which it arrives."""
+    """Return the end of the front brake's cable, and the direction in which the cable arrives."""
     if kind == "disc":
         return axle + (0.05, 0.012, 0.0) + (w.rotor + 0.012) * unit(toward), -unit(toward)
     wide = max(w.tyre / 2 + 0.012, w.rim_width / 2 + 0.0175)

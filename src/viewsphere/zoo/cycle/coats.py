@@ -55,7 +55,7 @@ class Coats:
 
 
 def coats(c: Colors, canvas: Color) -> Coats:
-    """All materials of a bicycle of these colours; canvas is the colour of its bags."""
+    """Return the materials of a bicycle of these colours; canvas is the colour of its bags."""
     frame = coated("frame_paint", c.frame, c.finish)
     return Coats(
         frame=frame,

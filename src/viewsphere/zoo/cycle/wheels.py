@@ -178,7 +178,7 @@ def _spokes(w: Wheel, hub: Hub) -> tuple[Solid, Solid]:
 
 
 def spoke_ends(w: Wheel, hub: Hub) -> tuple[Float, Float]:
-    """Where spokes start at the hub and end at the rim, (spokes, 3) each."""
+    """Return the spokes' starts at the hub and ends at the rim, (spokes, 3) each."""
     m = w.spokes // 2
     hubs: list[Float] = []
     rims: list[Float] = []

@@ -1,1 +1,1 @@
-"""What rooms are furnished with: boards, handles, cushions, bedding, woods and cloths that the families share."""
+"""The common parts of furniture: boards, handles, cushions, bedding, woods and cloths that the families share."""

@@ -1,4 +1,4 @@
-"""What is on television: pictures drawn by code, (H, W, 4) uint8 sRGB."""
+"""The pictures on televisions: drawn by code, (H, W, 4) uint8 sRGB."""
 
 from __future__ import annotations
 

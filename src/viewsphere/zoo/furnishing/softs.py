@@ -1,4 +1,4 @@
-"""What is soft: cushions, pillows, cloths that hang over what they cover, tufted panels."""
+"""The soft parts of furniture: cushions, pillows, cloths that hang over furniture, tufted panels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def cushion(size: tuple[float, float, float], crown: float, rounding: float = 0.
 
 
 def upright(solid: Solid, at: ArrayLike, lean_deg: float) -> Solid:
-    """What lies about the origin put up on its edge: its y upwards, its top to the front (-Y), leaning to the rear."""
+    """Return a solid at the origin put up on its edge: its y upwards, its top to the front (-Y), leaning to the rear."""
     return moved(turned(solid, 0, np.pi / 2 - np.radians(lean_deg)), at)
 
 

@@ -1,4 +1,4 @@
-"""What stands in shelves: rows of books, boxes, a vase or a plant."""
+"""The contents of shelves: rows of books, boxes, a vase or a plant."""
 
 from __future__ import annotations
 

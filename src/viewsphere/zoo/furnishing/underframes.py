@@ -1,4 +1,4 @@
-"""What carries a table's top where it is not four legs: a pedestal, three feet, trestles, frames of steel tube."""
+"""The frames under a table's top other than four legs: a pedestal, three feet, trestles, frames of steel tube."""
 
 from __future__ import annotations
 

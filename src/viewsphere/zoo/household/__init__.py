@@ -1,1 +1,1 @@
-"""What the things of a household are built and printed with: vessels, prints, screens, leaves."""
+"""The common parts of household things: vessels, prints, screens, leaves."""

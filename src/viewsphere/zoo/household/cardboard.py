@@ -74,7 +74,7 @@ def walls(
 def _side(
     c: Canvas, x: float, w: float, h: float, ink: Color, hole: bool, words: Sequence[str], rng: np.random.Generator
 ) -> None:
-    """What one side shows: a word, signs in a corner, small print, a hand hole."""
+    """Paint one side: a word, signs in a corner, small print, a hand hole."""
     if hole:
         half = min(0.045, 0.25 * w)
         c.paint(rect(c, (x + w / 2 - half, 0.74 * h), (x + w / 2 + half, 0.74 * h + 0.028), 0.013), (0.07, 0.06, 0.05))

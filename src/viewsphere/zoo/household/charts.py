@@ -1,4 +1,4 @@
-"""How pictures lie on surfaces: texture coordinates by corner, so that seams stay sharp."""
+"""The mapping of pictures to surfaces: texture coordinates by corner, so that seams stay sharp."""
 
 from __future__ import annotations
 

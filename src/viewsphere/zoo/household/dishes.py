@@ -1,4 +1,4 @@
-"""What plates and bowls look like: glazes, woods, bands around, flowers on the rim."""
+"""The look of plates and bowls: glazes, woods, bands around, flowers on the rim."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What random members of families are drawn with."""
+"""The random draws for members of families."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ def chance(rng: np.random.Generator, share: float) -> bool:
 
 
 def seed(rng: np.random.Generator) -> int:
-    """Where a generator of a model's details starts."""
+    """Return a seed for the generator of a model's details."""
     return int(rng.integers(1 << 31))

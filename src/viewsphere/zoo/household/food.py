@@ -1,4 +1,4 @@
-"""What lies in bowls and on plates."""
+"""The food in bowls and on plates."""
 
 from __future__ import annotations
 

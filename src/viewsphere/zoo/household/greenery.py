@@ -27,7 +27,7 @@ Outline = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class Bed:
-    """Where a plant grows: the soil's radius and height; how far the plant reaches above it, metres; its green."""
+    """The bed of a plant: the soil's radius and height; the plant's reach above the soil, metres; its green."""
 
     radius: float
     level: float

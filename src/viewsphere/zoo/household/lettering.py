@@ -51,7 +51,7 @@ _GLYPHS = {
 
 
 def advance(letter: str) -> float:
-    """How far a letter leads on, shares of its height."""
+    """Return the advance width of a letter, as a share of its height."""
     return {" ": 0.5, "I": 0.5, "1": 0.6, ".": 0.4}.get(letter, 0.92)
 
 

@@ -18,7 +18,7 @@ PAPER: Color = (0.93, 0.92, 0.88)
 
 @dataclass(frozen=True)
 class Label:
-    """What a label says and shows: its words, one of `PICTURES` and of `GROUNDS`; colours of ground, decoration, letters."""
+    """The content of a label: its words, one of `PICTURES` and of `GROUNDS`; colours of ground, decoration, letters."""
 
     title: str
     line: str

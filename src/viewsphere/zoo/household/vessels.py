@@ -24,7 +24,7 @@ class Vessel:
         return float(np.interp(height, self.inside[::-1, 1], self.inside[::-1, 0]))
 
     def holding(self, solid: Solid, slack: float) -> Solid:
-        """What lies in the vessel, pressed against the inside where it would stick out by more than `slack`, metres."""
+        """Return a solid in the vessel, pressed against the inside where it would stick out by more than `slack`, metres."""
         x, y, z = solid.vertices.T
         z = np.maximum(z, self.inside[-1, 1] - slack)
         room = np.interp(z, self.inside[::-1, 1], self.inside[::-1, 0]) + slack

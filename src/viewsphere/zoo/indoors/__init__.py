@@ -1,1 +1,1 @@
-"""What interiors are built from: plans of rooms, walls with their openings, coverings, and how people furnish rooms."""
+"""The common parts of interiors: plans of rooms, walls with their openings, coverings, and the furnishing of rooms."""

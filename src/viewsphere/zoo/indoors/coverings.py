@@ -1,4 +1,4 @@
-"""What covers floors, walls and ceilings, and the paint of doors and windows; colours sRGB 0..1."""
+"""The coverings of floors, walls and ceilings, and the paint of doors and windows; colours sRGB 0..1."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WallKind = Literal["paint", "stripes", "tiles"]
 
 @dataclass(frozen=True)
 class Floor:
-    """What a floor is covered with."""
+    """The covering of a floor."""
 
     kind: FloorKind = "planks"
     color: Color = (0.6, 0.43, 0.27)
@@ -26,7 +26,7 @@ class Floor:
 
 @dataclass(frozen=True)
 class Wall:
-    """What a room's walls are covered with; `accent` is the colour of the stripes or the joints."""
+    """The covering of a room's walls; `accent` is the colour of the stripes or the joints."""
 
     kind: WallKind = "paint"
     color: Color = (0.9, 0.88, 0.84)

@@ -63,7 +63,7 @@ class Stand:
 
     @property
     def rectangle(self) -> Rectangle:
-        """What the member covers of the floor, in a box along the axes."""
+        """The floor area of the member, in a box along the axes."""
         w, d, _ = self.size
         c, s = abs(math.cos(math.radians(self.turn_deg))), abs(math.sin(math.radians(self.turn_deg)))
         a, b = (w * c + d * s) / 2, (w * s + d * c) / 2
@@ -262,7 +262,7 @@ class Furnishing:
         return sorted(chance, key=lambda side: (len(self.room.of(side)), chance[side]))
 
     def _along(self, family: str, seed: int, p: Any, side: Side, gap: float) -> Iterator[Stand]:
-        """All spots along a wall."""
+        """Yield the free spots along a wall."""
         (x, y), turn = self.room.middle(side), -90.0 * SIDES.index(side)
         wall = Stand(family, seed, p, x, y, turn)
         w, d, _ = extent(p)
@@ -299,7 +299,7 @@ class Furnishing:
         return [self._before(o.side, o.span, SWING) for o in self.room.openings if o.opens != "window"]
 
     def _windows(self, height: float) -> list[Rectangle]:
-        """What has to stay free before windows, of things so high."""
+        """Return the areas that stay free before windows, for things of this height."""
         found = [o for o in self.room.openings if o.opens == "window"]
         low = [self._before(o.side, (o.span[0] - 0.35, o.span[1] + 0.35), DRAPE - 0.01) for o in found]
         return low + [self._before(o.side, o.span, SIGHT) for o in found if height > o.foot + 0.15]

@@ -1,4 +1,4 @@
-"""How people furnish rooms: what stands in each kind of room, and where."""
+"""The furnishing habits of people: the things in each kind of room, and their positions."""
 
 from __future__ import annotations
 

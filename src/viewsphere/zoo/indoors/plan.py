@@ -72,11 +72,13 @@ class Room:
         ]
 
     def along(self, side: Side, room: Room, x: float) -> float:
-        """What lies x to the right of the middle of another room's wall, along this room's wall on that side."""
+        """Return a position along this room's wall on that side, from the position x to the right of the middle of another
+        room's wall.
+        """
         (a, b), (c, d) = room.middle(side), self.middle(side)
         right, up = RIGHT[side]
         return x + (a - c) * right + (b - d) * up
 
     def of(self, side: Side) -> tuple[Opening, ...]:
-        """What opens in a wall."""
+        """Return the openings in a wall."""
         return tuple(opening for opening in self.openings if opening.side == side)

@@ -18,8 +18,8 @@ SKIRTING = (0.014, 0.085)
 
 
 def on_side(solid: Solid, room: Room, side: Side, outwards: bool = False) -> Solid:
-    """What was built on the wall y = 0 that faces -Y, its middle at x = 0, brought to this side of the room; it faces the room,
-    or outwards.
+    """Return a solid moved to this side of the room; it faces the room, or outwards.
+    It was built on the wall y = 0 that faces -Y, its middle at x = 0.
     """
     quarter = SIDES.index(side) + 2 * outwards
     return moved(turned(solid, 2, -quarter * math.pi / 2), (*room.middle(side), 0.0))

@@ -68,7 +68,7 @@ class Armchair:
 
 
 def pieces(p: Armchair) -> list[Piece]:
-    """All pieces; feet on z = 0."""
+    """Return the pieces of an armchair; feet on z = 0."""
     if p.body == "wood":
         return [*_wood_frame(p), *_loose_cushions(p)]
     body = _tub(p) if p.body == "tub" else [*_base(p), *_upholstered_arms(p), *_back(p)]
@@ -260,7 +260,7 @@ def _tub(p: Armchair) -> list[Piece]:
 
 
 def _flare(points: Float, p: Armchair) -> Float:
-    """How far points of a tub's wall lean outwards."""
+    """Return the outward lean of points on a tub's wall."""
     up = np.clip((points[:, 2] - p.seat_height) / 0.4, 0, 1)[:, None]
     plan = points[:, :2] / np.linalg.norm(points[:, :2], axis=1, keepdims=True)
     return np.column_stack([0.05 * up * plan, np.zeros(len(points))])

@@ -91,7 +91,7 @@ class Dining:
 
 
 def pieces(p: Dining) -> list[Piece]:
-    """All pieces; feet on z = 0, left and right alike."""
+    """Return the pieces of a dining chair; feet on z = 0, left and right alike."""
     wood = timber(p.wood)
     return [*_legs(p, wood), *_aprons(p, wood), *_seat(p, wood), *_stretchers(p, wood), *_back(p, wood), *_arms(p, wood)]
 

@@ -73,7 +73,7 @@ class Folding:
 
 
 def pieces(p: Folding) -> list[Piece]:
-    """All pieces; feet on z = 0."""
+    """Return the pieces of a folding chair; feet on z = 0."""
     return {"steel": _steel, "slatted": _slatted, "director": _director}[p.kind](p)
 
 

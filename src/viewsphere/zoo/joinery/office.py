@@ -64,7 +64,7 @@ class Office:
 
 
 def pieces(p: Office) -> list[Piece]:
-    """All pieces; castors on z = 0."""
+    """Return the pieces of an office chair; castors on z = 0."""
     frame = plastic("frame", p.frame)
     metal = CHROME if p.bright else frame
     back = {"mesh": _mesh_back, "padded": _padded_back, "executive": _executive_back}[p.back]

@@ -59,7 +59,7 @@ class Stool:
 
     @property
     def sag(self) -> float:
-        """How far the seat's sides rise, per metre of x squared."""
+        """The rise of the seat's sides, per metre of x squared."""
         return 0.9 if self.seat == "saddle" else 0.0
 
     @property
@@ -69,7 +69,7 @@ class Stool:
 
 
 def pieces(p: Stool) -> list[Piece]:
-    """All pieces; feet on z = 0."""
+    """Return the pieces of a stool; feet on z = 0."""
     base = {"wood": _wooden, "steel": _steel, "three": _three, "column": _column}[p.base]
     return [*_seat(p), *base(p), *_back(p)]
 

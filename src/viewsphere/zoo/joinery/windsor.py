@@ -68,7 +68,7 @@ class Shell:
 
 
 def windsor_pieces(p: Windsor) -> list[Piece]:
-    """All pieces of a Windsor chair."""
+    """Return the pieces of a Windsor chair."""
     wood = timber(p.wood)
     x, y = p.width / 2, p.depth / 2
     corners = [

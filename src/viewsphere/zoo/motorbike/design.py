@@ -92,7 +92,7 @@ class Coats:
 
 
 def coats(p: Motorcycle) -> Coats:
-    """All materials of a motorcycle."""
+    """Return the materials of a motorcycle."""
     chrome = metal("chrome", (0.82, 0.83, 0.85), 0.12)
     return Coats(
         paint=coated("paint", p.color, "gloss"),

@@ -1,4 +1,4 @@
-"""All that turns with the handlebar: fork, bar, grips, mirrors, headlight, front wheel and its mudguard."""
+"""The parts that turn with the handlebar: fork, bar, grips, mirrors, headlight, front wheel and its mudguard."""
 
 from __future__ import annotations
 

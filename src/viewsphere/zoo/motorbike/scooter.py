@@ -12,7 +12,7 @@ from viewsphere.zoo.shapes.solids import Float, both_sides, join, lathe, mirrore
 
 
 def scooter_pieces(p: Motorcycle, c: Coats) -> list[Piece]:
-    """All that does not turn with the bar, but for wheels."""
+    """Return the pieces that do not turn with the bar, except for wheels."""
     return [*_shield(p, c), *_rear(p, c), *_lamps(p, c), *_running(p, c)]
 
 

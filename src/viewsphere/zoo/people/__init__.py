@@ -1,1 +1,1 @@
-"""What people of the zoo are made of: a skeleton, fields that are flesh and clothes, weights, and what they do."""
+"""The parts of the zoo's people: a skeleton, fields that are flesh and clothes, weights, and their actions."""

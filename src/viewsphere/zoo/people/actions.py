@@ -1,8 +1,9 @@
-"""What people do, as clips: walk, run, stand, sit. Feet that stand, stand still: legs follow the feet, not the other way round.
+"""The actions of people, as clips: walk, run, stand, sit. Legs follow the feet, so feet on the ground do not slide.
 
-A foot's way over a stride is told in the person's own axes, in which the ground moves backwards evenly: down on the heel, flat,
-up on the ball, and forward through the air; hip and knee follow by inverse kinematics. Spans and angles are about those of
-normal gait (Winter 1991, Biomechanics and Motor Control of Human Gait; Perry and Burnfield 2010, Gait Analysis).
+A foot's path over a stride is in the person's own axes, in which the ground moves backwards evenly. The foot comes down on the
+heel, is flat, rises on the ball, and moves forward through the air; hip and knee follow by inverse kinematics. Spans and angles
+are about those of normal gait (Winter 1991, Biomechanics and Motor Control of Human Gait; Perry and Burnfield 2010, Gait
+Analysis).
 """
 
 from __future__ import annotations
@@ -32,8 +33,9 @@ SEAT = 0.45
 
 @dataclass(frozen=True)
 class Manner:
-    """How someone moves: `swing` of the arms and `lively`, both about 1; `stance`: half of the distance between the feet, as
-    shares of that between the hips; `lean` of the trunk, degrees; `phase` 0 to 1, where in a stride a still picture is taken.
+    """The manner of a person's movement: `swing` of the arms and `lively`, both about 1.
+    `stance`: half of the distance between the feet, as a share of that between the hips; `lean` of the trunk, degrees.
+    `phase` 0 to 1: the time in a stride of a still picture.
     """
 
     swing: float = 1.0
@@ -100,7 +102,7 @@ def _reaching(s: Skeleton, manner: Manner, g: Gait, phases: Sequence[float]) -> 
 
 
 def still(s: Skeleton, manner: Manner, walks: bool) -> Pose:
-    """How someone is seen who is asked for no action: standing, or amid a walk."""
+    """Return the pose of a person without an action: standing, or amid a walk."""
     if not walks:
         return standing(s, manner, manner.phase)
     return _reaching(s, manner, gait("walk", float(s["L_Hip"][2] - s["L_Ankle"][2])), (manner.phase,))[0]
@@ -185,7 +187,7 @@ def sitting(s: Skeleton, manner: Manner, phase: float) -> Pose:
 
 @dataclass(frozen=True)
 class _Foot:
-    """Where a foot is at a phase of its own stride, which begins as it comes down."""
+    """The foot at a phase of its own stride, which begins as the foot comes down."""
 
     s: Skeleton
     prefix: str
@@ -216,7 +218,9 @@ class _Foot:
 
     @property
     def ankle(self) -> Float:
-        """Where the ankle is (3,): while the foot is down it turns about its heel or its ball, which stay on the ground."""
+        """The position of the ankle (3,).
+        While the foot is down, the ankle turns about its heel or its ball, which stay on the ground.
+        """
         p, c = self.phase, self.g.contact
         if p < c:
             return self._down(p, self.pitch)
@@ -299,7 +303,7 @@ class _Body:
             above = world
 
     def pose(self) -> Pose:
-        """What has been made."""
+        """Return the finished pose."""
         return Pose(self._turns, np.array(self.root, np.float64))
 
 

@@ -1,4 +1,4 @@
-"""How a person is built."""
+"""The build of a person."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def trunk(sections: Float, power: float = 2.4) -> Field:
 
 
 def joined(k: float, *fields: Field) -> Field:
-    """All of them, with fillets of about k metres where they meet (polynomial smooth minimum, Quilez)."""
+    """Return the union of the fields, with fillets of about k metres where they meet (polynomial smooth minimum, Quilez)."""
 
     def value(p: Float) -> Float:
         found = fields[0](p)
@@ -85,7 +85,7 @@ def without(field: Field, taken: Field, k: float) -> Field:
 
 
 def within(field: Field, other: Field, k: float) -> Field:
-    """What lies in both, with an edge rounded by about k metres."""
+    """Return the intersection of both fields, with an edge rounded by about k metres."""
     return lambda p: -_blend(-field(p), -other(p), k)
 
 
@@ -95,7 +95,7 @@ def grown(field: Field, by: float | Field) -> Field:
 
 
 def plane(point: ArrayLike, normal: ArrayLike) -> Field:
-    """All that lies behind a plane."""
+    """Return the half-space behind a plane."""
     c, n = np.asarray(point, np.float64), np.asarray(normal, np.float64)
     n = n / np.sqrt((n * n).sum())
     return lambda p: ((p - c) * n).sum(axis=1)

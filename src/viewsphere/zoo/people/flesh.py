@@ -132,5 +132,5 @@ def hand(b: Build, s: Skeleton) -> Field:
 
 
 def bare_foot_place(s: Skeleton) -> Float:
-    """Where the left foot's shoe stands: the place under its ankle (3,)."""
+    """Return the place of the left foot's shoe: the point on the ground under its ankle (3,)."""
     return s["L_Ankle"] * (1, 1, 0)

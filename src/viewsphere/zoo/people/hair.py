@@ -43,7 +43,7 @@ def hair(head: Head, style: Style, phase: float) -> Solid | None:
 
 
 def rise(head: Head, style: Style, phase: float) -> Field:
-    """How high hair stands upon the skull, metres."""
+    """Return the height of hair upon the skull, metres."""
     s, line = head.size, hairline(head, style)
 
     def height(p: Float) -> Float:
@@ -54,7 +54,7 @@ def rise(head: Head, style: Style, phase: float) -> Field:
 
 
 def falls(head: Head, style: Style, phase: float) -> Field | None:
-    """What of the hair hangs down or is bound; None for hair that does neither."""
+    """Return the part of the hair that hangs down or is bound; None for hair that does neither."""
     s = head.size
 
     def with_locks(field: Field) -> Field:

@@ -14,7 +14,7 @@ from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, moved, turne
 
 @dataclass(frozen=True)
 class Face:
-    """What differs from face to face, each about -1 to 1."""
+    """The differences between faces, each about -1 to 1."""
 
     jaw: float = 0.0
     nose: float = 0.0

@@ -110,7 +110,7 @@ def _guide(body: _Body, b: Build) -> Skeleton:
 
 
 def _arm(v: Float) -> Float:
-    """How much of each vertex's weight is that of an arm, (V,)."""
+    """Return the arm's share of each vertex's weight, (V,)."""
     return v[:, 3:][:, ARM].sum(axis=1)
 
 

@@ -86,7 +86,7 @@ def _universal(gender: str, year: str, muscle: str, weight: str) -> str:
 
 
 def data() -> Human | None:
-    """What was set up; None where it was not."""
+    """Return the data of the MakeHuman setup; None without a setup."""
     file = cache_of("people") / FILE
     return _read(file, file.stat().st_mtime_ns) if file.is_file() else None
 

@@ -24,7 +24,7 @@ from viewsphere.zoo.shapes.solids import Float, Solid, both_sides
 
 @dataclass(frozen=True)
 class Looks:
-    """How a person looks apart from build and clothes; colours sRGB. `fold` are phases of hair and folds."""
+    """The look of a person apart from build and clothes; colours sRGB. `fold` are phases of hair and folds."""
 
     face: Face = field(default_factory=Face)
     skin: Color = (0.80, 0.60, 0.48)
@@ -62,7 +62,7 @@ def mannequin(b: Build, s: Skeleton, looks: Looks, outfit: Outfit) -> tuple[Mesh
 
 
 def materials(looks: Looks, outfit: Outfit) -> dict[str, Material]:
-    """What a person is made of, by name."""
+    """Return the materials of a person, by name."""
     found = (
         Material("skin", linear(looks.skin), roughness=0.55, specular=0.6),
         Material("white", linear((0.90, 0.88, 0.86)), roughness=0.25),

@@ -1,4 +1,4 @@
-"""What a person wears, drawn or given, and the clothes as solids."""
+"""The clothes of a person, drawn or given, as choices and as solids."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ class Outfit:
 
     @property
     def sleeve(self) -> float:
-        """Where sleeves end: 0 at the shoulder, 1 at the elbow, 2 at the wrist."""
+        """The end of the sleeves: 0 at the shoulder, 1 at the elbow, 2 at the wrist."""
         return {"t_shirt": 0.62, "shirt": 1.93, "jumper": 1.97, "jacket": 1.99}[self.top]
 
     @property
     def loose(self) -> float:
-        """How far the top's cloth is from the skin, metres."""
+        """The distance of the top's cloth from the skin, metres."""
         return {"t_shirt": 0.010, "shirt": 0.011, "jumper": 0.015, "jacket": 0.021}[self.top]
 
     @property
     def leg(self) -> float:
-        """Where legs of the bottom end: 0 at the hip, 1 at the knee, 2 at the ankle."""
+        """The end of the legs of the bottom: 0 at the hip, 1 at the knee, 2 at the ankle."""
         return {"trousers": 2.0, "shorts": 0.86, "skirt": 0.95}[self.bottom]
 
 
@@ -70,7 +70,7 @@ class Tailor:
 
     @property
     def _ease(self) -> float:
-        """How far the legs of the bottom are from the skin, metres."""
+        """The distance of the legs of the bottom from the skin, metres."""
         return {"trousers": 0.009, "shorts": 0.014, "skirt": 0.0}[self.outfit.bottom]
 
     @property
@@ -79,7 +79,7 @@ class Tailor:
         return _unit(self.skeleton["L_Elbow"] - self.skeleton["L_Shoulder"])
 
     def cuff(self) -> tuple[Float, Float]:
-        """Where the left sleeve ends: a point and the direction down the arm."""
+        """Return the end of the left sleeve: a point and the direction down the arm."""
         s, t = self.skeleton, self.outfit.sleeve
         if t <= 1:
             return s["L_Shoulder"] + max(t, 0.10) * (s["L_Elbow"] - s["L_Shoulder"]), self.arm

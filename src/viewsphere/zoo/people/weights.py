@@ -1,4 +1,4 @@
-"""Which joints bend which point of a body in its bind pose."""
+"""The weights of joints on each point of a body in its bind pose."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class Frontage:
 
 
 def frontages(block: Block) -> tuple[Frontage, ...]:
-    """Those of the front (-y), right (+x), rear and left."""
+    """Return the frontages of the front (-y), right (+x), rear and left."""
     (x0, y0), (x1, y1) = block.low, block.high
     wide, long = block.size
     return (

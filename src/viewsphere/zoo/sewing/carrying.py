@@ -1,4 +1,4 @@
-"""What a backpack is carried by, its back, and its pockets."""
+"""The straps of a backpack, its back, and its pockets."""
 
 from __future__ import annotations
 

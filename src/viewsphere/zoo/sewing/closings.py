@@ -1,4 +1,4 @@
-"""How a backpack closes: a zip, a lid with a hip belt below, a rolled top, a buckled flap."""
+"""The closures of a backpack: a zip, a lid with a hip belt below, a rolled top, a buckled flap."""
 
 from __future__ import annotations
 

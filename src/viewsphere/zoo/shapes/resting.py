@@ -1,4 +1,4 @@
-"""Where things can stand on a model: its level faces, as data."""
+"""The surfaces of a model on which things can stand: its level faces, as data."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ class Solid:
 
 
 def join(*solids: Solid) -> Solid:
-    """All solids as one."""
+    """Return the solids as a single solid."""
     starts = np.cumsum([0, *(len(s.vertices) for s in solids)])
     return Solid(
         np.concatenate([s.vertices for s in solids]),

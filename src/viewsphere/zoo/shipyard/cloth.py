@@ -86,7 +86,7 @@ class Sail:
 
 @dataclass(frozen=True)
 class Cut:
-    """How sails look: colours, pattern, seams, the number and the sign above it."""
+    """The look of sails: colours, pattern, seams, the number and the sign above it."""
 
     color: Color = (0.95, 0.94, 0.9)
     second: Color = (0.75, 0.1, 0.12)

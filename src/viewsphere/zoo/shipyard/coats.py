@@ -61,7 +61,7 @@ def coats(
     varnished: bool = False,
     inside: Color | None = None,
 ) -> Coats:
-    """All materials of a boat of these colours; varnished: the hull is bright wood."""
+    """Return the materials of a boat of these colours; varnished: the hull is bright wood."""
     planks: Color = (min(1, wood[0] * 0.82), wood[1] * 0.78, wood[2] * 0.75)
     return Coats(
         hull=varnish("hull", hull) if varnished else gelcoat("hull", hull),

@@ -90,7 +90,7 @@ def motor_lines(p: MotorBoat) -> Lines:
 
 
 def motor_boat(p: MotorBoat) -> list[Piece]:
-    """All pieces in the ship's frame."""
+    """Return the pieces of a motor boat in the ship's frame."""
     c = coats(p.color, p.bottom, p.boot, p.stripe, p.deck, p.wood, p.cushion, p.accent, p.varnished)
     lines = motor_lines(p)
     deck = Deck(lines, 0.035 * p.beam, _openings(p))

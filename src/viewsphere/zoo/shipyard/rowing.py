@@ -84,7 +84,7 @@ def rowing_lines(p: RowingBoat) -> Lines:
 
 
 def rowing_boat(p: RowingBoat) -> list[Piece]:
-    """All pieces in the ship's frame."""
+    """Return the pieces of a rowing boat in the ship's frame."""
     lines = rowing_lines(p)
     c = coats(
         p.color,

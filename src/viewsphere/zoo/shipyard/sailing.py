@@ -90,7 +90,7 @@ def sailing_lines(p: SailingBoat) -> Lines:
 
 
 def sailing_boat(p: SailingBoat) -> list[Piece]:
-    """All pieces in the ship's frame."""
+    """Return the pieces of a sailing boat in the ship's frame."""
     c = coats(p.color, p.bottom, p.boot, p.stripe, p.deck, p.wood, p.stripe, p.stripe, p.varnished, inside=(0.9, 0.89, 0.85))
     lines = sailing_lines(p)
     wide = (0.3 if p.cabin else 0.34) * p.beam

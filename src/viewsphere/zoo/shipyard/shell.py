@@ -21,8 +21,10 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class Paint:
-    """Where colours change, metres: bottom: z up to which the antifouling goes; boot: width of the stripe above it;
-    stripe: depth of the sheer stripe's edges below the sheer, or None."""
+    """The borders between colours, metres.
+    bottom: z up to which the antifouling goes; boot: width of the stripe above it.
+    stripe: depth of the sheer stripe's edges below the sheer, or None.
+    """
 
     bottom: float = 0.03
     boot: float = 0.05

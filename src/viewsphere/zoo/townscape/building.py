@@ -36,7 +36,7 @@ SEAM = FLOOR + STOREY + 0.5
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things are on the front: columns of windows, the door, the wing; x from the middle of the main block, metres."""
+    """The positions on the front: columns of windows, the door, the wing; x from the middle of the main block, metres."""
 
     columns: tuple[float, ...]
     door_x: float
@@ -116,7 +116,7 @@ def fabric(p: House) -> Fabric:
 
 
 def pieces(p: House, rng: np.random.Generator) -> list[Piece]:
-    """All of the house, its footprint centred about the origin."""
+    """Return the pieces of the house, its footprint centred about the origin."""
     f, plan = fabric(p), layout(p)
     height = FLOOR + STOREY * p.storeys + 0.12
     place = _main(p, plan, f, height, rng)

@@ -74,7 +74,7 @@ def meadow(rng: np.random.Generator, points: Float) -> Float:
 
 
 def _drop(y: Float, crossings: tuple[float, ...]) -> Float:
-    """How far the kerb is dropped at these y, 0 to 1."""
+    """Return the drop of the kerb at these y, 0 to 1."""
     off = np.abs(y[:, None] - np.asarray(crossings)).min(axis=1, initial=np.inf)
     return np.clip((CROSSING + 0.5 - off) / 0.5, 0, 1)
 
@@ -107,7 +107,7 @@ def sections(crossings: tuple[tuple[float, ...], tuple[float, ...]]) -> list[Pie
 
 
 def _side(side: int, crossings: tuple[float, ...]) -> list[Piece]:
-    """All strips of one side, from the gutter outwards."""
+    """Return the strips of one side, from the gutter outwards."""
     y = _lines(crossings)
     drop = _drop(y, crossings)
     top = STEP + (DROPPED - STEP) * drop

@@ -1,4 +1,4 @@
-"""How houses, driveways and paths share the plots along a street, from the families' parameters alone.
+"""The division of the plots along a street among houses, driveways and paths, from the families' parameters alone.
 
 x is measured from the middle of the road towards the plot; side is 1 on the right (+X) and -1 on the left.
 """

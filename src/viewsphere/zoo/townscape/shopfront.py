@@ -53,7 +53,7 @@ class Bay:
 
 
 def bay(p: Shop) -> Bay:
-    """Where the shop's windows are: all of the width but for pilasters and the door to the flats."""
+    """Return the bay of the shop's windows: the whole width except pilasters and the door to the flats."""
     free = p.width - 0.7 - (SIDE_DOOR + 0.45 if p.side_door else 0.0)
     return Bay((p.width - 0.7 - free) / 2 * -p.side_door, free, p.ground - FASCIA - 0.25)
 
@@ -65,7 +65,7 @@ def side_door(p: Shop) -> Opening | None:
 
 
 def shop_pieces(p: Shop, c: ShopCoats, rng: np.random.Generator) -> list[Piece]:
-    """All of the front."""
+    """Return the pieces of the front."""
     pieces = [*_windows(p, c, rng), *_fascia(p, c)]
     if p.awning:
         pieces += _awning(p, c)
@@ -112,7 +112,7 @@ def _windows(p: Shop, c: ShopCoats, rng: np.random.Generator) -> list[Piece]:
 
 
 def _goods(spans: list[tuple[float, float]], riser: float, c: ShopCoats, rng: np.random.Generator) -> list[Piece]:
-    """What is displayed, right behind the panes."""
+    """Return the displayed goods, right behind the panes."""
     by_material: dict[int, list[Solid]] = {}
     for a, z in spans:
         x = a

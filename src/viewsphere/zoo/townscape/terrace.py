@@ -88,7 +88,7 @@ def fabric(p: Shop) -> Fabric:
 
 
 def pieces(p: Shop, rng: np.random.Generator) -> list[Piece]:
-    """All of the building, its walls centred about the origin."""
+    """Return the pieces of the building, its walls centred about the origin."""
     f = fabric(p)
     front = _front(p, f, rng)
     back = [Piece(q.part, q.material, turned(q.solid, 2, np.pi)) for q in _back(p, f, rng)]
