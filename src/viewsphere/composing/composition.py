@@ -67,8 +67,8 @@ def _as_it_stands(thing: Thing, piece: SceneryPiece) -> Thing:
 class Composition(Sendable):
     """The contents of the frames of a recipe with a place, company or planes; no mesh is read before `things`.
 
-    `subjects`: the subjects of the frames. `groups`: the models that may meet; with splits by model, the models of the same
-    split.
+    `subjects`: the subjects of the frames.
+    `groups`: the models that may meet; with splits by model, the models of the same split.
     """
 
     recipe: Recipe

@@ -230,7 +230,7 @@ def animated_file(spec: ModelSpec, field: str) -> Path:
 def animation(
     path: Path, confined: bool, clip: str | None, field: str, blenders: Blenders, fps: float | None = None
 ) -> Timeline:
-    """Return the first and last times of a file for this clip; None is the file's first clip.
+    """Return the timeline of a file while this clip plays; None is the file's first clip.
     Raises RecipeError, which begins with the field, for an unreadable file, an unknown clip, and a file without movement.
     """
     try:

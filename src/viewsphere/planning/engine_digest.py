@@ -1,4 +1,4 @@
-"""The digest of an engine's program, which with the recipe determines the look of its pictures."""
+"""The digest of an engine's program, on which the look of pictures depends beside the recipe."""
 
 from __future__ import annotations
 

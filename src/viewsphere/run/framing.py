@@ -155,7 +155,7 @@ class Framing:
 
     def _seen(self, ring: Ring, shot: Shot, instant: int) -> float:
         """Return the quality of a frame: the least visibility of its targets.
-        With `wanted` in the recipe, it is minus the distance from the wanted visibility and truncation.
+        With `wanted` in the recipe, it is minus the distance from the wanted ranges of visibility and truncation.
         """
         recipe = self.plan.recipe
         wanted = shot.targets(recipe.scenes is not None)

@@ -372,7 +372,7 @@ class Missing:
 
     @cached_property
     def _there(self) -> tuple[Counter[str], int]:
-        """The number of finished shots of each model at that time, and the number of their frames."""
+        """The number of shots of each model in `_finished`, and the number of their frames."""
         shots, total = Counter[str](), 0
         for _, subject, frames in chain.from_iterable(index.held(self._finished) for index in self.portion.indices):
             shots[subject] += 1
@@ -381,7 +381,7 @@ class Missing:
 
     @cached_property
     def _left(self) -> Counter[str]:
-        """The number of missing shots at that time of each incomplete model, in the models' order."""
+        """The number of shots of each incomplete model that `_finished` lacks, in the models' order."""
         return sum((index.counts for index in self.portion.indices), Counter[str]()) - self._there[0]
 
     @property

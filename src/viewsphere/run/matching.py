@@ -29,8 +29,9 @@ SHOTS = 4
 class Matches:
     """The positions in another picture of the points that each pixel of a picture shows.
 
-    xy (H, W, 2) float64, pixels, NaN where the pixel has none; z (H, W) float64, metres along the other camera's axis, infinite
-    for the sky, NaN where there is no pixel; state (H, W) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid.
+    xy (H, W, 2) float64: pixels, NaN where the pixel has none.
+    z (H, W) float64: metres along the other camera's axis, infinite for the sky, NaN where there is no pixel.
+    state (H, W) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid.
     """
 
     xy: NDArray[np.float64]

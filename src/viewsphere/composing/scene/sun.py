@@ -54,7 +54,7 @@ def _apparent_sun(t: float) -> tuple[float, float]:
 
 
 def _refraction(elevation: float) -> float:
-    """The apparent rise of the sun through the air, degrees."""
+    """Return the angle by which the air raises the apparent sun, degrees."""
     if elevation > 85:
         return 0.0
     tangent = math.tan(math.radians(elevation))

@@ -19,7 +19,8 @@ Float = NDArray[np.float64]
 @dataclass(frozen=True, eq=False)
 class RigPose:
     """The rig at an instant.
-    `world_from_rig` (4, 4): OpenCV axes of its first sensor, metres; `focus`: its target point, world metres.
+    `world_from_rig` (4, 4): OpenCV axes of its first sensor, metres.
+    `focus`: its target point, world metres.
     `intrinsics`: its lens, where the rig zooms.
     """
 

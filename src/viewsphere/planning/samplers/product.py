@@ -121,8 +121,8 @@ def _seen_from(stock: Stock, subject: str, poses: Sequence[int]) -> tuple[float,
 
 
 def _target(stock: Stock, first: Thing, run: Run, target: Vector | None, box_of: BoxOf) -> Vector | None:
-    """Return the default target of cameras: its position at the first frame, or the position that follows it.
-    None means the first object's centre.
+    """Return the default target of cameras, None for the first object's centre.
+    The target of an animated object is its centre at the first frame, or with `follow` its centre at each time step.
     """
     moves = run.step is not None and run.step.model is not None
     if moves and stock.recipe.viewpoints.target == "follow":

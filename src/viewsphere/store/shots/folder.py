@@ -44,7 +44,9 @@ RUN = "run.json"
 @dataclass(frozen=True)
 class Gap:
     """The missing rows of a part, or of the channels that it adds to other parts.
-    `first`: its first missing row; `shots` and `frames`: the numbers of missing ones; `of`: the number of all frames.
+    `first`: the first missing row.
+    `shots` and `frames`: the numbers of missing shots and frames.
+    `of`: the number of all frames.
     """
 
     part: int

@@ -22,7 +22,8 @@ UP = np.array([0.0, 0.0, 1.0])
 @dataclass(frozen=True)
 class Paint:
     """The borders between colours, metres.
-    bottom: z up to which the antifouling goes; boot: width of the stripe above it.
+    bottom: z up to which the antifouling goes.
+    boot: width of the stripe above it.
     stripe: depth of the sheer stripe's edges below the sheer, or None.
     """
 

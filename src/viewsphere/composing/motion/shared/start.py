@@ -52,8 +52,10 @@ class Pose:
 class Start:
     """The start of a motion.
 
-    placed: world from object as the thing's placer put it; seconds: length of the sequence.
-    rng: a generator for the values drawn for these names; lanes: lanes of the place, world axes.
+    placed: world from object as the thing's placer put it.
+    seconds: length of the sequence.
+    rng: a generator for the values drawn for these names.
+    lanes: lanes of the place, world axes.
     timeline: frames of the model's file while its clip plays, None where the file has none.
     field: the recipe's field, with which messages begin.
     way: the thing's pose on the path to its place, at a time in seconds from the path's start; None where it has no path.

@@ -34,13 +34,16 @@ def forgetful(make: Callable[[], Any]) -> Any:
 class Room:
     """The free space for objects.
 
-    `free`: the free floor, None: all of it; `gap`: smallest distance between any two things, metres.
-    `spots`: the spots that the recipe names; `field`: the recipe's field for the room, with which messages begin.
+    `free`: the free floor, None for the whole floor.
+    `gap`: smallest distance between any two things, metres.
+    `spots`: the spots that the recipe names.
+    `field`: the recipe's field for the room, with which messages begin.
     `taken`: things already in place (the model that company joins, at the origin, facing -Y).
     `below`: metres from z = 0, where things stand, down to the floor, if they stand on a surface above it.
     `clearance`: metres of air above, None for no limit.
     `seen_from`: azimuth and elevation of the camera, degrees, None if unknown.
-    `memory`: keeps simulated results; `moves`: whether the paths of things to their places are needed, too.
+    `memory`: keeps simulated results.
+    `moves`: whether the paths of things to their places are needed, too.
     `built` gives the parts of the place's mesh up to a height above the floor, within a layout's reach, metres.
     `blocked` holds these parts for the placed things.
     `lanes`, `bays` and `pavements`: those of the place.
