@@ -101,7 +101,7 @@ __getattr__ = names_of(
 
 @cache
 def labels() -> dict[str, Label]:
-    """All labels by name, first the channels that recipes keep by default, then the others in alphabetical order."""
+    """Return every label by name: first the channels that recipes keep by default, then the others in alphabetical order."""
     found = plugins.loadable(Label)
     return {name: found[name] for name in sorted(found, key=lambda name: (name not in DEFAULT_CHANNELS, name))}
 
@@ -150,7 +150,7 @@ def sample_labels() -> dict[str, SampleLabel]:
 
 @cache
 def on_request() -> dict[str, ObjectLabel | SampleLabel]:
-    """All labels that a recipe's `annotations` may name."""
+    """Return every label that a recipe's `annotations` may name."""
     return {label.name: label for label in object_labels() if label.on_request} | sample_labels()
 
 
@@ -162,7 +162,7 @@ def makers() -> dict[str, ObjectLabel]:
 
 @cache
 def channels() -> dict[str, Channel]:
-    """All channels that a recipe's `channels` may name: first the passes, then the labels of pixels."""
+    """Return every channel that a recipe's `channels` may name: first the passes, then the labels of pixels."""
     return PASSES | {name: label.channel for name, label in channel_labels().items()}
 
 
@@ -181,12 +181,14 @@ def is_in(source: str, sample: Sample) -> bool:
 
 
 def drawings() -> tuple[Drawing, ...]:
-    """What `drawable` lists."""
+    """Return the drawings that `drawable` lists."""
     return tuple(drawable().values())
 
 
 def alone(channels: Container[str]) -> Callable[[Sample, int], Picture] | None:
-    """What stands for the picture of samples with these channels, at a size; None where they have one, or nothing does."""
+    """Return the substitute for the picture of samples with these channels, a function of a sample and a size. Returns None
+    where the samples have a picture, or no label has a substitute.
+    """
     if picture_of(channels) is not None:
         return None
     found = (label.drawing and label.drawing.alone for name, label in channel_labels().items() if name in channels)

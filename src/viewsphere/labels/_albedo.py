@@ -1,4 +1,4 @@
-"""How much light surfaces send back: the luminance of their own colours at points."""
+"""The share of light that surfaces send back: the luminance of their own colours at points."""
 
 from __future__ import annotations
 

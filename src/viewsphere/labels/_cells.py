@@ -30,8 +30,8 @@ MARGIN = 0.96
 
 
 def drawn(sample: Sample) -> Picture:
-    """All cells that are not empty, (H, W, 3): objects in their colours, stuff in those of `semantic`; darker where the camera
-    does not see them, pale outside of its picture.
+    """Return a picture (H, W, 3) of the cells that are not empty. Objects have their own colours, stuff has the colours of
+    `semantic`. Cells that the camera does not see are darker, and cells outside of its picture are pale.
     """
     grid = sample.voxel_grid
     light = _light(grid.classes > 0)
@@ -52,7 +52,7 @@ def drawn(sample: Sample) -> Picture:
 
 
 def _light(full: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """How light each cell is on the first of its sides that nothing covers, 0 where it is covered or empty."""
+    """Return the brightness of each cell, on the first of its sides that nothing covers; 0 for covered and empty cells."""
     out = np.zeros(full.shape, np.float32)
     for axis, way, light in FACES:
         beside = np.zeros_like(full)

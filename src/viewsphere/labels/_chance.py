@@ -1,4 +1,4 @@
-"""What labels leave to chance: the same numbers wherever, and in whichever order, samples are made."""
+"""Random numbers of labels, which do not depend on the machine or on the order of samples."""
 
 from __future__ import annotations
 

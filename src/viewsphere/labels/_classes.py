@@ -1,4 +1,4 @@
-"""What maps of classes share: colours, other ids, and what contradicts them."""
+"""The colours, the other ids and the contradictions that maps of classes share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewsphere.model.classes import FIRST_THING, SKY, STUFF, STUFF_IDS, class_c
 from viewsphere.model.sample import Sample
 
 KEY = tuple(STUFF.items())
-"""What the colours of stuff mean."""
+"""The meaning of each colour of stuff."""
 
 
 def class_names() -> str:
@@ -27,7 +27,7 @@ def with_classes(classes: Array, ids: Mapping[int, int]) -> Array:
 
 
 def wrong_classes(sample: Sample, classes: Array, instances: Array) -> Iterator[str]:
-    """What is wrong with a map of classes of a sample whose objects are seen where a map of instances says."""
+    """Yield the errors in a sample's map of classes, given the map of instances that places its visible objects."""
     by_id = np.zeros(max([0, *(o.id for o in sample.objects), int(instances.max(initial=0))]) + 1, np.int64)
     for o in sample.objects:
         by_id[o.id] = thing_class(o.category_id)

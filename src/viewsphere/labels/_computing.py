@@ -61,11 +61,12 @@ def sight_of(
     around: Around | None = None,
     traits: Sequence[Callable[[], Traits]] | None = None,
 ) -> Sight:
-    """What a camera sees of a shot at an instant (counted from 0 there), with the places of its objects.
+    """Return the view that a camera has of a shot at an instant (counted from 0 there), with the places of its objects.
 
-    `boxes[i]` is the 3D box (8, 3) of object i + 1's model then in the object's axes, `models[i]` the path of that model in the
-    data set, `real_sizes[i]` its true size (by default the one its spec gives in numbers), and `traits[i]` gives what it says
-    of itself to labels that ask for it; `geometry` is the shot's stage and `visibility` what this camera sees of it.
+    `boxes[i]` is the 3D box (8, 3) of object i + 1's model at that instant, in the object's axes. `models[i]` is the path of
+    that model in the data set. `real_sizes[i]` is its true size, by default the size that its spec gives in numbers.
+    `traits[i]` returns the model's metadata, for labels that request it. `geometry` is the shot's stage, and `visibility` is
+    this camera's view of it.
     """
     objects = shot.objects
     if not len(objects) == len(boxes) == len(models) == geometry.object_count:
@@ -148,5 +149,5 @@ class Rendered:
 
     @property
     def looks(self) -> Looks | None:
-        """What it looks like."""
+        """The model's appearance: its colours and materials."""
         return self.traits().looks()

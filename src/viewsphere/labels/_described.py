@@ -1,4 +1,4 @@
-"""What sentences say of objects in a picture, and where it holds."""
+"""The statements that captions make about objects in a picture, and the conditions for each."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def middle_of(box: Bounds) -> tuple[float, float]:
 
 
 def place_of(box: Bounds, width: int, height: int) -> str:
-    """Where in a picture the middle of a box is, in words."""
+    """Return the words for the part of a picture that contains the middle of a box."""
     x, y = middle_of(box)
     return PLACES[_third(y, height)][_third(x, width)]
 
@@ -145,7 +145,7 @@ ONE = ("place", "size", "hidden", "cut", "view")
 
 
 def of_one(form: str, o: ObjectAnnotation, size: tuple[int, int], has_front: bool) -> str:
-    """What a form says of an object in a picture of this size, empty where it does not hold."""
+    """Return a form's statement about an object in a picture of this size; empty where the form does not apply."""
     match form:
         case "place":
             return f"is {place_of(o.box2d, *size)} of the picture" if o.box2d else ""

@@ -1,4 +1,4 @@
-"""What both labels of normals share: the proof that they are unit vectors, and the picture."""
+"""The shared parts of both labels of normals: the proof of unit length, and the picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What labels of motion in the picture share: flow and scene flow to another instant, and what contradicts them."""
+"""The shared parts of labels of motion in the picture: flow and scene flow to another instant, and their contradictions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ EDGE = 1e-3
 
 
 def flow(sight: Sight, instants: int) -> NDArray[np.float32]:
-    """How far the seen point is so many instants later from where it is, (H, W, 2) pixels; NaN where it has no pixel then."""
+    """Return the motion (H, W, 2), in pixels, of each seen point from now to so many instants later. NaN where the point has no
+    pixel then.
+    """
     match = sight.match(instants)
     return np.full((*sight.visibility.triangle.shape, 2), np.nan, np.float32) if match is None else match.flow
 

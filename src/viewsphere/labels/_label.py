@@ -80,13 +80,13 @@ Extent = tuple[float, float]
 
 @dataclass(frozen=True)
 class Drawing:
-    """How `preview` shows a label, and under which name: pixels of the picture changed, lines drawn over it at a scale, or
-    another picture (of the sample's size) beside it.
+    """The way that `preview` shows a label, and its name there. A drawing changes pixels of the picture, draws lines over it at
+    a scale, or puts another picture (of the sample's size) beside it.
 
-    `trails` are lines that show what was before, too: they are given what the sensor's samples so far are, the sample itself
-    last, none of them more than `labels.TAIL` instants before it. Instead of `beside`, `within` gives a picture that tells
-    apart the values of an extent, and `extent` a sample's own, so that all pictures of a sequence may have the same colours.
-    `alone` stands for the picture of a sample that has none, at this size. `key` says what colours mean, None: words alone.
+    `trails` are lines that show the past, too. They receive the sensor's samples so far, the sample itself last; none is more
+    than `labels.TAIL` instants before it. Instead of `beside`, `within` gives a picture that distinguishes the values of an
+    extent. `extent` is a sample's own extent, so that all pictures of a sequence may have the same colours. `alone` replaces
+    the picture of a sample that has none, at this size. `key` gives the meaning of colours; None is words alone.
     """
 
     name: str
@@ -253,7 +253,7 @@ def channel_of(sample: Sample, name: str) -> Array | None:
 
 
 def mixed(triangles: Array, numbers: Array) -> int:
-    """How many of some triangles have several numbers, one being each pixel's."""
+    """Return the number of the given triangles that have several numbers; each pixel has one triangle and one number."""
     one = np.zeros(int(triangles.max()) + 1, numbers.dtype)
     one[triangles] = numbers  # of each triangle one of its numbers
     return len(np.unique(triangles[one[triangles] != numbers]))

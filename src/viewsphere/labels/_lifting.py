@@ -1,4 +1,4 @@
-"""What labels of places share: which points are not seen in their pixels, or not at their depth."""
+"""The check that labels of places share: it finds points that their pixels do not show, or not at their depth."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def exact_depth(sample: Sample) -> Array | None:
 
 
 def misplaced(sample: Sample, points: Float, pixels: NDArray[np.bool_], slack: Float) -> NDArray[np.bool_]:
-    """Which of the points (N, 3) of a camera's axes, metres, are not on the rays of these pixels (H, W), N of which are True,
-    or not at their depth, where that is exact; `slack` (N,) are the metres that are nothing but rounding.
+    """Return a mask of the points (N, 3), metres in a camera's axes, that are off the rays of these pixels (H, W). N pixels are
+    True. Points off their depth count too, where depth is exact; `slack` (N,) is the rounding error in metres.
     """
     rays = pixel_rays(sample.camera.intrinsics)
     rays = rays.reshape(-1, 3) if pixels.all() else rays[pixels]

@@ -1,4 +1,4 @@
-"""How preview and report draw what engines paint beside pictures; passes are no labels."""
+"""The drawings that preview and report use for the passes that engines paint beside pictures; passes are not labels."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def computed(object_id: int, values: Iterable[Mapping[str, Any]], placement: Pla
 
 
 def whole_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str, Any]:
-    """All fields of an object, as `json.dumps(..., allow_nan=False)` takes it."""
+    """Return every field of an object, in the types that `json.dumps(..., allow_nan=False)` accepts."""
     known = {**o.more, **{name: getattr(o, name) for name in _OWN}}
     record = {"id": o.id, **{f.name: f.plain(known[f.name]) for f in _fields(labels) if f.name in known}}
     return record if o.source is None else {**record, "source": dict(o.source)}
@@ -141,5 +141,5 @@ class _Restored(ObjectAnnotation):
         return sorted({*object.__dir__(self), *_OWN, *filter(makers.has, makers.of)})
 
     def __getstate__(self) -> dict[str, Any]:
-        """All fields, so that an object travels to other processes without its shot."""
+        """Return every field, so that an object travels to other processes without its shot."""
         return {name: getattr(self, name) for name in _OWN}

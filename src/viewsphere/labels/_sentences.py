@@ -90,8 +90,8 @@ class Filled:
 
 
 def wrong(sample: Sample, caption: Caption, objects: Sequence[ObjectAnnotation], fronts: Sequence[bool]) -> str | None:
-    """What a caption should be by its sample's other labels, where it is something else; `objects` are those that it is of, and
-    `fronts` says of each whether it has a front.
+    """Return the caption that a sample's other labels require, where the given one differs; else None. `objects` are the
+    objects of the caption, and `fronts` states for each whether it has a front.
     """
     text = caption.text
     match caption.form:
@@ -115,7 +115,7 @@ def wrong(sample: Sample, caption: Caption, objects: Sequence[ObjectAnnotation],
 
 
 def _phrases(sample: Sample, o: ObjectAnnotation) -> list[tuple[str, Words]]:
-    """All noun phrases of an object, none where it is not known what it looks like."""
+    """Return every noun phrase of an object; none where its appearance is unknown."""
     if "looks" not in sample.asked:
         return []
     return list(phrases(o, (o.color or "", o.material or "")))
@@ -141,7 +141,7 @@ def counted(groups: Sequence[tuple[str, int]], plurals: Mapping[str, str]) -> tu
 
 
 def wrong_count(caption: Caption, told: Sequence[ObjectAnnotation], plurals: Mapping[str, str]) -> Iterator[str]:
-    """What is wrong with a sentence of counts where these objects are told of."""
+    """Yield the errors in a sentence of counts that covers these objects."""
     texts, ids = counted(grouped(told), plurals), tuple(o.id for o in told)
     if caption.text not in texts or caption.objects != ids:
         yield f"{caption.text!r:.80}: expected {texts[0]!r:.200} or the like, of objects {ids}; found objects {caption.objects}"
@@ -158,7 +158,7 @@ def _wrong_relation(sample: Sample, text: str, one: ObjectAnnotation, other: Obj
 
 
 def _related(sample: Sample, one: ObjectAnnotation, relation: str, other: ObjectAnnotation) -> Iterator[str]:
-    """All sentences of a relation."""
+    """Yield every sentence of a relation."""
     for first in _phrases(sample, one):
         for second in _phrases(sample, other):
             yield related((one, *first), relation, (other, *second))

@@ -41,7 +41,7 @@ class Around(Protocol):
         ...
 
     def moment(self, instants: int) -> Moment | None:
-        """Where all is so many instants later, None where the shot does not have that instant."""
+        """Return the state of the scene so many instants later; None where the shot does not have that instant."""
         ...
 
     @property
@@ -61,7 +61,7 @@ class Around(Protocol):
 
     @property
     def finish(self) -> Finish:
-        """How light becomes the picture."""
+        """The settings by which light becomes the picture."""
         ...
 
     @property
@@ -70,17 +70,17 @@ class Around(Protocol):
         ...
 
     def turning(self, seconds: float) -> Turning:
-        """How all moves while the columns of the picture are measured one after another, within so many seconds."""
+        """Return the motion of the scene while the columns of the picture are measured in turn, within so many seconds."""
         ...
 
     @property
     def painted(self) -> Painted:
-        """What surfaces look like at the picture's instant."""
+        """The appearance of surfaces at the picture's instant."""
         ...
 
     @property
     def drawn_as(self) -> tuple[str, ...]:
-        """What randomness in the picture's labels follows from besides a seed."""
+        """The names that determine the randomness in the picture's labels, besides a seed."""
         ...
 
 
@@ -138,21 +138,23 @@ class Sight:
     )
 
     def once(self, name: str, make: Callable[[], Made]) -> Made:
-        """What a label computes for all objects together, made when the first of them is labelled."""
+        """Return a label's result for all objects together; `make` computes it when the first of them is labelled."""
         if name not in self._made:
             self._made[name] = make()
         return self._made[name]
 
     def neighbour(self, instants: int = 0, sensor: str | None = None) -> View | None:
-        """What a sensor, by default the own one, may see so many instants later; None without such a sensor or instant."""
+        """Return the possible view of a sensor, by default this one, so many instants later. None without such a sensor or
+        instant.
+        """
         return self.around.view(instants, sensor) if self.around else None
 
     def moment(self, instants: int = 0) -> Moment | None:
-        """Where all is so many instants later; None without such an instant."""
+        """Return the state of the scene so many instants later; None without such an instant."""
         return self.around.moment(instants) if self.around else None
 
     def match(self, instants: int = 0, sensor: str | None = None) -> Match | None:
-        """Where the picture's points are in a neighbour; kept, so that labels share it."""
+        """Return the places of the picture's points in a neighbour. The result is kept, so that labels share it."""
         if (instants, sensor) not in self._matches:
             own, other = self.neighbour(), self.neighbour(instants, sensor)
             self._matches[instants, sensor] = Match(own, self.visibility, other) if own and other else None
@@ -169,7 +171,7 @@ class Sight:
         return partner and partner[1]
 
     def partner_match(self) -> Match | None:
-        """Where the picture's points are in the picture that is rectified with it, None without one."""
+        """Return the places of the picture's points in the picture that is rectified with it; None without such a picture."""
         partner = self.around.partner if self.around else None
         return None if partner is None else self.match(0, partner[0])
 
@@ -184,7 +186,7 @@ class Sight:
 
     @cached_property
     def corners(self) -> NDArray[np.float64]:
-        """All vertices before the perspective division, as `truth.visibility.homogeneous` gives them."""
+        """The vertices of the scene before the perspective division, as `truth.visibility.homogeneous` gives them."""
         return homogeneous(self.geometry, self.camera) if self.visibility.corners is None else self.visibility.corners
 
     @cached_property
@@ -241,7 +243,7 @@ class Sight:
         return np.array([*boxes], np.float64).reshape(-1, 4)
 
     def alone(self, i: int) -> Alone:
-        """What the camera would see if the object of id i + 1 were alone; drawn once."""
+        """Return the camera's view of the object of id i + 1 alone; it is drawn once."""
         if i not in self._alone:
             self._alone[i] = self._drawn_alone(i)
         return self._alone[i]

@@ -1,4 +1,4 @@
-"""What labels of states share: whether the seen point is seen in another picture, too."""
+"""The shared parts of labels of states: whether another picture shows the seen point, too."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def state(sight: Sight, match: Match | None) -> NDArray[np.uint8]:
 
 
 def drawing(channel: str) -> Drawing:
-    """How a channel of states is shown beside a picture."""
+    """Return the drawing of a channel of states beside a picture."""
     colors: list[list[int]] = COLORS.tolist()
     names = (f"{channel}: visible", "occluded", "outside", "behind", "invalid")
     return Drawing(

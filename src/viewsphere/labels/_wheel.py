@@ -61,7 +61,7 @@ def picture(flow: NDArray[np.floating], longest: float | None = None) -> Picture
 
 
 def drawing(channel: str, most: float = MOST) -> Drawing:
-    """How a channel of flow, or the x and y of one of scene flow, is shown beside a picture; `most`: see `longest_of`."""
+    """Return the drawing beside a picture of a channel of flow, or of the x and y of scene flow; `most`: see `longest_of`."""
     ways = np.array([[[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]])
     colors: list[list[int]] = picture(ways, 1.0)[0].tolist()
     names = (f"{channel}: right", "down", "left", "up")

@@ -18,11 +18,11 @@ PLURALS = {
 """Words whose plural no rule gives."""
 
 VOWEL = re.compile(r"(?!eu|one|ufo|uni|use|usu|uti)[aeiou]|heir|honest|honou?r|hour", re.IGNORECASE)
-"""What a word begins with that has the article an."""
+"""The beginnings of words that take the article an."""
 
 
 def noun_of(category: str) -> str:
-    """What an object of a category is called."""
+    """Return the noun for an object of a category."""
     return " ".join(category.replace("_", " ").split()) or "object"
 
 

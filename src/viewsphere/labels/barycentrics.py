@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from viewsphere.labels._sight import Sight
 
 TOLERANCE = 1e-5
-"""How far the sum of weights may be from 1, as a share of the largest one: those of a ground that reaches to the horizon are
-large, and float32.
+"""The largest distance of the sum of weights from 1, as a share of the largest weight. Weights of a ground that reaches to the
+horizon are large, and float32.
 """
 
 

@@ -96,8 +96,9 @@ class Captions(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What there is to tell of a picture: the objects that are told of, the words for what they look like, by their ids, and
-    those of them that have a front; the picture's size; what is around them, and what falls or hangs in the air.
+    """The facts that captions may state about a picture. These are the objects in the captions, the words for their appearance
+    by their ids, and the objects that have a front. The picture's size, the surroundings, and what falls or hangs in the air
+    complete them.
     """
 
     told: Sequence[ObjectAnnotation]
@@ -122,7 +123,7 @@ class Seen:
 
     @property
     def list(self) -> str:
-        """What is seen, with numbers: three chairs and a car."""
+        """The visible objects with their numbers: three chairs and a car."""
         return listing(self.groups, self.plurals)
 
 
@@ -147,7 +148,9 @@ def _seen(sight: Sight, around: Around, objects: Sequence[ObjectAnnotation], opt
 
 
 def _weather(around: Around) -> tuple[str, bool]:
-    """What the sky is like, empty where it is no daylight or not seen, and whether the sun is low."""
+    """Return the words for the sky, and whether the sun is low. The words are empty without daylight, or where the picture does
+    not show the sky.
+    """
     scene, behind = around.shot.scene, around.finish.background
     is_sky = behind.color is None and behind.image is None and not behind.transparent
     if scene.sky.kind != "daylight" or scene.blend is not None or not is_sky:

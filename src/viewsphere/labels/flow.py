@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:
-    """Where the seen point is an instant later, less where it is now, (H, W, 2) pixels, right and down.
+    """Return the motion of each seen point to the next instant, (H, W, 2) pixels, right and down.
 
-    NaN where it has no pixel then: behind the camera, on nothing that is there then, on a flat picture.
+    NaN where the point has no pixel then: behind the camera, on a thing that is absent then, on a flat picture.
     """
     return _flow.flow(sight, 1)
 

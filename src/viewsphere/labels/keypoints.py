@@ -47,7 +47,9 @@ class Options(Frozen):
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:
-    """All fields of the object's points, in the order of its model's; of a model without any, of no points."""
+    """Return every field of the object's points, in the order of its model's points; a model without points gives empty
+    fields.
+    """
     states = sight.once("keypoints", lambda: _states(sight))
     return _fields(sight.placement(i), states[i])
 
@@ -99,7 +101,7 @@ def _fields(placement: Placement, states: Any) -> Mapping[str, Any]:
 
 
 def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """All fields, from the states, which are kept."""
+    """Return every field, computed from the states, which are kept."""
     found = _fields(placement, kept or ())
     if len(found["keypoint_states"]) != len(found["keypoints"]):
         raise ValueError(f"{len(found['keypoints'])} states, one a named point of the model")

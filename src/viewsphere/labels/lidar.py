@@ -62,8 +62,8 @@ def _hits(sight: Sight, around: Around, lidar: Lidar) -> Hits:
 
 
 def _intensity(lidar: Lidar, distance: Float, reflected: Float) -> Float:
-    """What a surface sends back, Lambert's cosine times its albedo, weakened by the square of the distance where the sensor
-    does not make up for it.
+    """Return the intensity that a surface sends back: Lambert's cosine times its albedo. The square of the distance weakens it
+    where the sensor does not compensate.
     """
     near = lidar.reference_range
     return reflected if near is None else reflected * (near / distance) ** 2
@@ -81,7 +81,7 @@ def _drawn(
 
 
 def _returns(lidar: Lidar, distance: Float, intensity: Float, draw: Draw) -> NDArray[np.bool_]:
-    """Which points return: those that none of the causes of drop-out takes."""
+    """Return a mask of the points that return: no cause of drop-out removes them."""
     chance = np.full(len(distance), 1.0 - lidar.dropout)
     for curve, values in ((lidar.dropout_by_range, distance), (lidar.dropout_by_intensity, intensity)):
         if curve:

@@ -51,7 +51,7 @@ def compute(sight: Sight) -> NDArray[np.uint8]:
 
 
 def _sides(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """All pixels but the last along an axis, and all but the first."""
+    """Return two slices along an axis: every pixel but the last, and every pixel but the first."""
     before = (slice(None),) * axis
     return (*before, slice(None, -1)), (*before, slice(1, None))
 

@@ -75,7 +75,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def _rectangle(corners: Any, upright: Any) -> Iterator[str]:
-    """What is wrong with a rectangle, whose upright box is known."""
+    """Yield the errors in a rectangle, given its upright box."""
     sides = np.roll(corners, -1, axis=0) - corners
     reach = 1 + float(np.abs(corners).max())
     if np.abs(sides[0] + sides[2]).max() > TOLERANCE * reach or abs(float(sides[0] @ sides[1])) > TOLERANCE * reach**2:
@@ -87,7 +87,7 @@ def _rectangle(corners: Any, upright: Any) -> Iterator[str]:
 
 
 def _tight(corners: Any, points: Any, slack: float) -> Iterator[str]:
-    """What is wrong with a rectangle around points."""
+    """Yield the errors in a rectangle around points."""
     for k in range(2):
         side = corners[k + 1] - corners[k]
         length = float(np.hypot(*side))

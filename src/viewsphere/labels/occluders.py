@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Occluder:
-    """What is seen in place of an object: id of another object, 0 for scenery and ground, and the share of the object's pixels
-    in the image at which that is so.
+    """A thing that hides an object: `id` of another object, or 0 for scenery and ground. `share` is the share of the object's
+    pixels in the image that it hides.
     """
 
     id: int
@@ -34,7 +34,7 @@ class Occluder:
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:
-    """What the hidden pixels of the object show; where several things lie before it, the nearest one counts."""
+    """Return the things that the hidden pixels of the object show; of several things before it, the nearest counts."""
     if sight.is_unobstructed(i):
         return {"occluders": ()}
     alone = sight.alone(i).in_image(sight.camera.width, sight.camera.height)

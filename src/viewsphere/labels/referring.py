@@ -71,7 +71,7 @@ class Expression:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """All visible objects of a picture of this size, and the words for what they look like, by their ids."""
+    """The visible objects of a picture of this size, and the words for their appearance by their ids."""
 
     objects: Sequence[ObjectAnnotation]
     words: Mapping[int, Words]
@@ -84,7 +84,7 @@ class Scene:
 
     @cached_property
     def places(self) -> Sequence[str]:
-        """Where each object is, in words."""
+        """The place of each object, in words."""
         return [place_of(o.box2d, *self.size) if o.box2d else "" for o in self.objects]
 
     @cached_property

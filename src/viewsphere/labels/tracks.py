@@ -90,7 +90,7 @@ def _whole_end(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def positions(sample: Sample) -> NDArray[np.float64]:
-    """Where a sample's points are in its picture, (N, 2) pixels; NaN where its lens does not show them."""
+    """Return the positions of a sample's points in its picture, (N, 2) pixels; NaN where its lens does not show them."""
     return project(sample.camera.intrinsics, in_camera(sample))[0]
 
 

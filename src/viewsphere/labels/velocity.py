@@ -49,7 +49,7 @@ def compute(sight: Sight, i: int) -> Mapping[str, Any]:
 
 
 def keep(o: ObjectAnnotation) -> Any:
-    """All three, None where they are not known."""
+    """Return the three fields; None where they are unknown."""
     kept = [None if getattr(o, name) is None else getattr(o, name).tolist() for name in FIELDS]
     return kept if any(kept) else None
 

@@ -93,7 +93,7 @@ def _occupy(sight: Sight, points: Float, owner: NDArray[np.int32], filled: NDArr
 
 
 def _shown(sight: Sight, rows: Rows) -> Rows:
-    """Those of triangles that may be seen."""
+    """Return the rows of triangles that may be visible."""
     return rows[sight.geometry.triangle_cutout[rows] != NEVER]
 
 
@@ -104,7 +104,7 @@ def _scenery(sight: Sight) -> Rows:
 
 
 def _closed(sight: Sight, i: int, rows: Rows) -> NDArray[np.bool_]:
-    """Which of these triangles of thing i belong to pieces that are closed without others."""
+    """Return a mask of these triangles of thing i: True for triangles of pieces that are closed without others."""
     g = sight.geometry
     vertices = g.coordinates[g.vertex_start[i] : g.vertex_start[i + 1]]
     triangles = g.triangles[rows] - np.int32(g.vertex_start[i])
@@ -118,12 +118,12 @@ def _closed(sight: Sight, i: int, rows: Rows) -> NDArray[np.bool_]:
 
 @cache
 def _known() -> dict[bytes, NDArray[np.bool_]]:
-    """What `_closed` found of meshes, by their digests."""
+    """The results of `_closed` for meshes, by their digests."""
     return {}
 
 
 def _indoors(sight: Sight, points: Float, grid: Grid) -> NDArray[np.bool_]:
-    """Which cells have scenery above their centres, and scenery or ground below."""
+    """Return a mask of the cells that have scenery above their centres, and scenery or ground below."""
     g, (x, y, z) = sight.geometry, grid.size
     if not g.has_scenery:
         return np.zeros(grid.size, np.bool_)
@@ -135,7 +135,7 @@ def _indoors(sight: Sight, points: Float, grid: Grid) -> NDArray[np.bool_]:
 
 
 def _state(sight: Sight, grid: Grid) -> NDArray[np.uint8]:
-    """How each cell's centre is seen."""
+    """Return the visibility state of each cell's centre."""
     from viewsphere.geometry import kernels_voxels as kernels
 
     codes, (ahead, up, right) = np.array([OUTSIDE, FREE, OCCLUDED], np.uint8), grid.size
@@ -165,7 +165,7 @@ def _slabs(camera: Camera, grid: Grid) -> Iterator[tuple[tuple[slice, slice], Fl
 
 
 def _along(camera: Camera, points: Float) -> Float:
-    """What 1/s of `truth.visibility` is the inverse of."""
+    """Return the lengths whose inverse is the 1/s of `truth.visibility`."""
     x, y, z = points.T
     return np.sqrt(x * x + y * y + z * z) if has_unit_rays(camera.distortion) else np.ascontiguousarray(z)
 
@@ -232,7 +232,7 @@ def _wrong_codes(sample: Sample, runs: Array) -> Iterator[str]:
 
 
 def _wrong_surface(sample: Sample, cells: VoxelGrid) -> Iterator[str]:
-    """Where surface is seen, and depth does not say so, and the other way round."""
+    """Yield the places where cells and depth disagree about a seen surface, in either direction."""
     depth, grid = exact_depth(sample), cells.grid
     if depth is None:
         return
