@@ -13,10 +13,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Scope:
-    """What is known of a data set before any of it is rendered. `rig`: that of its first part, None where nobody knows it, as
-    of imported pictures; `is_moving`: its pictures are of sequences; `most_objects`: of one picture; `channels` and
-    `annotations`: labels and passes that it keeps, and those that can be computed of its shots; `pictures`: a few of each part,
-    of those of which different things are known, where the shots of any part are not kept, as those of imported ones.
+    """The known facts about a data set before any of it is rendered. `rig` is the rig of its first part, None where it is
+    unknown, as for imported pictures. `is_moving`: its pictures are of sequences. `most_objects` is the largest number of
+    objects in a picture. `channels` and `annotations` are the labels and passes that it keeps, and the labels that can be
+    computed from its shots. `pictures` are a few pictures of each part, one for each different set of known facts. They are
+    given where a part does not keep its shots, as imported parts do not.
     """
 
     categories: tuple[Category, ...]

@@ -74,7 +74,7 @@ BODY = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
 
 
 class Options(Frozen):
-    """Which types of images are recorded."""
+    """The types of images that are recorded."""
 
     images: tuple[Kind, ...] = Field(
         default=("scene", "depth_planar", "segmentation"),
@@ -84,7 +84,7 @@ class Options(Frozen):
 
 
 def needs(options: Options) -> tuple[str, ...]:
-    """What the images are made of."""
+    """Return the channels that the images need."""
     return tuple(dict.fromkeys(KINDS[kind][2] for kind in options.images if kind != "scene"))
 
 
@@ -145,7 +145,7 @@ class AirSim(Tree):
 
 
 def _pose(camera: Camera) -> list[float]:
-    """Where a camera is, x y z, and how its body is turned, w x y z; NED."""
+    """Return the position of a camera, x y z, and the rotation of its body, w x y z; NED."""
     place = transform(NED, camera.center)
     turned = quaternion_from_matrix(product(product(NED, np.ascontiguousarray(camera.R.T)), BODY))
     return [value + 0.0 for value in (*place.tolist(), *turned)]

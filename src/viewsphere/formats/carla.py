@@ -1,4 +1,4 @@
-"""What CARLA's cameras save: pictures, depth in 24 bits, semantic tags and instances, with cameras and boxes in CARLA's terms.
+"""Files of CARLA's cameras: pictures, depth in 24 bits, semantic tags and instances, cameras and boxes in CARLA's terms.
 
     <sequence>/<sensor>/rgb/000000.png                      pictures, by the number of the instant
     <sequence>/<sensor>/depth/000000.png                    metres along z: (R + 256 G + 65536 B) / (256^3 - 1) * 1000
@@ -131,7 +131,7 @@ class Carla(Tree):
 
 
 def _camera(camera: Camera) -> dict[str, Any]:
-    """Where a camera is, and what it shows."""
+    """Return the pose of a camera, and its image size and angle of view."""
     right, down, ahead = camera.R
     return {
         "transform": transform(camera.center, ahead, right, -down),

@@ -70,7 +70,7 @@ class CocoPanoptic(Tree):
         return (json_bytes(head)[:-1] + b',"images":[\n', "images", b'\n],"annotations":[\n', "annotations", b"\n]}\n")
 
     def _segments(self, sample: Sample, ids: NDArray[np.int64]) -> Iterator[dict[str, Any]]:
-        """What COCO says of each segment of a picture, in the order of ids."""
+        """Yield COCO's record of each segment of a picture, in the order of ids."""
         classes = class_of(sample.channels["panoptic"])
         for number in np.unique(ids[ids > 0]).tolist():
             mask = ids == number

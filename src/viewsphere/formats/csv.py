@@ -84,7 +84,7 @@ def writer(
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
-    """All that is not as it would be exported now."""
+    """Yield every difference from the current export."""
     with temporary("csv") as aside:
         with _table(aside / TABLE) as append:
             ours, others = _expected(dataset, options, append), _expected(dataset, options, lambda rows: None)
@@ -105,7 +105,7 @@ def _picture(sample: Sample) -> Iterator[Expected]:
 
 
 def _name(sample: Sample) -> str:
-    """Where the sample's picture lies in the export; empty where there is none."""
+    """Return the path of the sample's picture in the export; empty without a picture."""
     if sample.picture_file is None:
         return ""
     return f"{sample.split or 'all'}/{sample.index:08d}{PurePosixPath(sample.picture_file).suffix}"

@@ -41,7 +41,7 @@ NAMES = r"[^\x00-\x1f]+"
 
 
 class Options(Frozen):
-    """Which objects are too small."""
+    """The size below which objects are too small."""
 
     smallest: int = Field(default=0, ge=0, le=10**9, description="objects that show fewer pixels are `difficult`, and not read")
 
@@ -79,7 +79,7 @@ class Matrix(Tree):
 
 
 def _object(o: ObjectAnnotation, difficult: bool) -> dict[str, Any]:
-    """What is said of an object that is seen."""
+    """Return the record of a visible object."""
     assert o.box2d is not None
     x0, y0, x1, y1 = o.box2d
     return {

@@ -42,7 +42,7 @@ from viewsphere.store import Dataset
 KINDS = (".png", ".jpg", ".webp")
 MILLIMETRE = 0.001
 NAN = {"$numberDouble": "NaN"}
-"""What stands for a number that is none, until `_json` has written it: no text of JSON looks so."""
+"""The placeholder of a NaN until `_json` has written it: no text of JSON looks so."""
 
 STATES = (0, 1)
 """Of points in the picture: visible, occluded."""
@@ -117,7 +117,7 @@ def _json(entry: dict[str, Any]) -> bytes:
 
 
 def _taken(sample: Sample) -> dict[str, Any]:
-    """When and by which camera a picture was taken."""
+    """Return the time and the camera of a picture."""
     said: dict[str, Any] = {"sequence": sample.sequence, "sensor": sample.sensor}
     said |= {"instant": sample.instant, "time": float(sample.time)}
     if sample.known_camera is not None:

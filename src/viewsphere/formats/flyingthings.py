@@ -63,7 +63,7 @@ OPENGL = (1.0, -1.0, -1.0, 1.0)
 
 
 class Options(Frozen):
-    """Which of the three sets' folders there are."""
+    """The choice of the set, of three, whose folders the export writes."""
 
     set: Literal["flyingthings3d", "monkaa", "driving"] = Field(
         default="flyingthings3d", description="`flyingthings3d`: TRAIN and TEST; `monkaa`, `driving`: no splits"

@@ -46,7 +46,7 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 
 NOTHING = np.float32(1e10)
-"""What Blender says of the depth of pixels that see nothing."""
+"""The depth that Blender gives to pixels that see nothing."""
 LIBRARIES = ("v108", "v110")
 """The oldest HDF5 that has to read the files, and the newest whose layout they may have."""
 
@@ -62,7 +62,7 @@ SOURCES: dict[str, str] = {
 
 
 class Options(Frozen):
-    """What is in the containers."""
+    """The contents of the containers."""
 
     keys: tuple[Key, ...] = Field(
         default=("colors", "depth", "class_segmaps", "instance_segmaps"),
@@ -113,7 +113,7 @@ class Hdf5(Tree):
         return file.getvalue()
 
     def _array(self, sample: Sample, key: str) -> NDArray[Any] | None:
-        """What is under a key, None where the sample lacks it."""
+        """Return the array of a key; None where the sample lacks it."""
         if key == "colors":
             return sample.picture
         if SOURCES[key] not in sample.channels:
@@ -143,7 +143,7 @@ _CHANGES: dict[str, Callable[[Any], Any]] = {
 
 
 def _told(sample: Sample) -> dict[str, Any]:
-    """What is kept as JSON."""
+    """Return the metadata that the container keeps as JSON."""
     nothing: dict[str, Any] = {"idx": 0, "category_id": 0, "name": "background", "category": ""}
     seen = (o for o in sample.objects if o.area)
     named = ({"idx": o.id, "category_id": o.category_id, "name": o.key, "category": o.category} for o in seen)

@@ -45,7 +45,7 @@ LONGEST = 255
 
 
 class Options(Frozen):
-    """What a class is."""
+    """The meaning of a class."""
 
     by: Literal["category", "pose_category"] = Field(
         default="category", description="`category`: what the object is; `pose_category`: which side of it is seen"

@@ -55,7 +55,7 @@ MATCHED = {"noc": (0, 1), "occ": (0, 1, 2)}  # states of points: with a match in
 
 
 class Options(Frozen):
-    """Which benchmark."""
+    """The benchmark."""
 
     set: Literal["scene_flow_2015", "stereo_flow_2012"] = Field(
         default="scene_flow_2015", description="`scene_flow_2015`: two disparities and objects; `stereo_flow_2012`: without"

@@ -63,7 +63,7 @@ class KittiOdometry(Tree):
         self._timeline = Timeline(dataset)
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """What a sensor adds: its picture or points, and, of the left camera, the pose."""
+        """Yield the files of a sensor's sample: its picture or points, and, with the left camera, the pose."""
         course, (shot, instant, place) = self._timeline.course(sample), self._timeline.taken(sample)
         car = car_in(shot, "kitti_odometry")
         number, frame = f"{course.number:02d}", f"{sample.instant:06d}"

@@ -53,7 +53,7 @@ from viewsphere.store import Dataset
 
 
 class Options(Frozen):
-    """Whose folders."""
+    """The benchmark whose folders the export writes."""
 
     set: Literal["middlebury", "eth3d"] = Field(
         default="middlebury", description="`middlebury`: both disparities; `eth3d`: that of the left picture"
@@ -61,7 +61,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """What is no stereo pair."""
+    """Yield the reasons why a data set has no stereo pairs."""
     yield from refusals.stereo(scope)
     yield from two_eyes(scope)
 
@@ -88,7 +88,7 @@ class Middlebury(Tree):
                 yield from _colmap(sample, baseline, pictures)
 
     def _folders(self, sample: Sample) -> tuple[str, str]:
-        """Where the pictures are, and where their disparity is."""
+        """Return the folder of the pictures, and the folder of their disparity."""
         name = f"{self._eyes.numbers(sample)[0]:08d}"
         if sample.sequence:
             name = f"{scene(sample)}_{number(sample.instant, instants(self.dataset, sample))}"

@@ -41,7 +41,7 @@ KINDS = (".png", ".jpg")
 
 
 class Options(Frozen):
-    """What is boxed."""
+    """The extent of boxes."""
 
     boxes: Literal["visible", "whole"] = Field(
         default="visible",
@@ -74,7 +74,9 @@ class Mot(Tree):
         yield Piece(f"{folder}/seqinfo.ini", b"", self._info(sample, name, suffix))
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """What all frames of a sequence say alike is the name of the section that they are in, and written once."""
+        """Return the parts of a file. The common text of a sequence's frames is the name of their section, and is written
+        once.
+        """
         if path.endswith("seqinfo.ini"):
             return (next(iter(counts)).encode(),)
         return (self._labels.encode(),) if path.endswith("labels.txt") else LINES

@@ -67,7 +67,7 @@ class Nocs(Tree):
     """The tree of scenes."""
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """What is of a picture."""
+        """Yield the files of a picture."""
         if "nocs" not in sample.channels:
             raise UserError(f"nocs: expected channel nocs; found none of frame {sample.index}")
         split, scene, number = sample.split or "all", *_place(sample)

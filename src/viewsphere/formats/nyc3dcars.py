@@ -61,7 +61,7 @@ HEADS = {
 
 
 class Options(Frozen):
-    """Where on the globe the world's origin lies."""
+    """The position of the world's origin on the globe."""
 
     latitude: float = Field(default=40.7142, ge=-90, le=90, description="degrees north (default: New York)")
     longitude: float = Field(default=-74.0064, ge=-180, le=180, description="degrees east")

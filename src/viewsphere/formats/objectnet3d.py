@@ -56,7 +56,7 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """What no viewpoint can tell."""
+    """Yield the reasons why viewpoints cannot describe a data set."""
     yield from no_viewpoints(scope)
 
 

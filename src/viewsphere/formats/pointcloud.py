@@ -38,7 +38,7 @@ AXES = {
 
 
 class Options(Frozen):
-    """Which points there are, and in which axes."""
+    """The choice of points, and their axes."""
 
     axes: Literal["camera", "world"] = Field(
         default="camera", description="`camera`: x right, y down, z ahead; `world`: those of all pictures of a scene, z up"

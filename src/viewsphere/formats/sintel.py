@@ -57,7 +57,7 @@ MOST = 1024
 
 
 class Options(Frozen):
-    """Which of Sintel's archives are written."""
+    """The choice of Sintel's archives."""
 
     stereo: bool = Field(default=False, description="the archive of stereo pairs, too; of a rig of two rectified cameras")
 
@@ -102,7 +102,7 @@ class Sintel(Tree):
                 yield File(f"{root}/invalid/{name}.png", states_png(sample, "flow_state", 3, 4))
 
     def _pair(self, sample: Sample, root: str, side: str, name: str) -> Iterator[File]:
-        """What the archive of stereo pairs has of a picture."""
+        """Yield the files of a picture in the archive of stereo pairs."""
         yield File(f"{root}/clean_{side}/{name}", picture(sample, ".png"))
         if side == "left":
             yield File(f"{root}/disparities/{name}", Coded(sample.index, "sintel disparity.png", partial(_disparity, sample)))

@@ -115,7 +115,7 @@ UPWARD = np.diag([1.0, -1, 1])
 
 
 class Options(Frozen):
-    """Which of SYNTHIA's trees."""
+    """The choice of SYNTHIA's trees."""
 
     layout: Literal["seqs", "rand"] = Field(
         default="rand", description="`seqs`: sequences, with depth, objects and cameras; `rand`: pictures, with classes"
@@ -123,7 +123,7 @@ class Options(Frozen):
 
 
 def needs(options: Options) -> tuple[str, ...]:
-    """What sequences have more."""
+    """Return the additional channels of sequences."""
     return ("depth", "instances") if options.layout == "seqs" else ()
 
 

@@ -47,7 +47,7 @@ from viewsphere.store import Dataset
 
 
 class Options(Frozen):
-    """Which benchmark."""
+    """The benchmark."""
 
     kind: Literal["tapvid", "tapvid3d"] = Field(
         default="tapvid", description="`tapvid`: where points are in the pictures; `tapvid3d`: in the camera's axes"

@@ -33,7 +33,7 @@ from viewsphere.store.shots.sample_records import whole_sample
 
 
 class Options(Frozen):
-    """Where shards end, and how numbers are kept."""
+    """The size of shards, and the encoding of numbers."""
 
     samples_per_shard: int = Field(default=1000, ge=1, description="most samples of a shard")
     bytes_per_shard: int | None = Field(
@@ -74,7 +74,7 @@ def writer(
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
-    """All bytes that are not as they would be exported now, by the files inside of shards."""
+    """Yield every difference from the current export in bytes, by the files inside of shards."""
     shards, sizes = _Shards(dataset, options), dict[str, int]()
     for piece in shards.all():
         sizes[piece.file] = piece.begin + len(piece.data)
@@ -149,7 +149,7 @@ class _Shards:
         yield from (split.add(data, name, sample.index) for name, data in files)
 
     def end(self) -> Iterator[Piece]:
-        """What the last shards end with, and the indices."""
+        """Yield the ends of the last shards, and the indices."""
         categories = [dict(c.__dict__) for c in self._dataset.categories]
         for split in self._splits.values():
             yield from split.end()
@@ -166,7 +166,7 @@ class _Shards:
 
 
 def _record(sample: Sample) -> dict[str, Any]:
-    """All of a sample but its pixels, and but the paths of a store that is not there."""
+    """Return a sample's record without its pixels, and without the paths of a store, which the shards do not contain."""
     record = whole_sample(sample)
     objects = [{name: value for name, value in o.items() if name != "model"} for o in record["objects"]]
     return {**{name: value for name, value in record.items() if name != "files"}, "objects": objects}

@@ -1,4 +1,4 @@
-"""Random numbers of labels, which do not depend on the machine or on the order of samples."""
+"""Random numbers of labels: the same in every process, and for every order of samples."""
 
 from __future__ import annotations
 

@@ -229,7 +229,7 @@ class StoredModels:
 
     @classmethod
     def of(cls, dataset: Dataset, shot: Shot, sample: Sample) -> StoredModels:
-        """Those that a sample of a shot shows."""
+        """Return the models that a sample of a shot shows."""
         there = {o.id: o for o in sample.objects}  # a sample of a sequence lacks what is not there
         shown = ((thing, there[thing.id]) for thing in shot.objects if thing.id in there)
         return cls(dataset, {(thing.model, thing.step): (o.track or o.key, o.key) for thing, o in shown})

@@ -135,7 +135,7 @@ class Bop(Tree):
             yield item(f"{folder}/scene_gt_coco.json", annotation, "annotations")
 
     def _imagewise(self, sample: Sample, found: list[Entry]) -> Iterator[tuple[str, Content]]:
-        """What is behind the key of a picture in its files' names, and what they hold."""
+        """Yield the key of each file of a picture, the part of its name behind the picture's key, with the file's content."""
         yield f"rgb{suffix_of(sample, *KINDS)}", picture(sample, *KINDS)
         yield "depth.png", depth_file(sample, self._options.depth_scale)
         yield "camera.json", json_bytes(camera(sample, self._options.depth_scale))

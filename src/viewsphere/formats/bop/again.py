@@ -26,11 +26,11 @@ SHIFTED = (
 
 
 def again(path: Path) -> Again:
-    """All pictures of a data set of scenes, or of one of its splits, and all of its models with their symmetries.
+    """Return every picture of a data set of scenes, or of one of its splits, and every model with its symmetries.
 
-    Pixels count from the first one's centre, as BOP says, unless masks fit the models clearly better from elsewhere. The world
-    is that of cam_R_w2c; without it that of each camera, where up is up in the picture. Raises StoreError for
-    pictures that lack their file, their lens or the pose of an object, and for objects without a model.
+    Pixels count from the first one's centre, as in BOP, unless masks fit the models clearly better from elsewhere. The world is
+    the world of cam_R_w2c. Without cam_R_w2c it is the world of each camera, where up is up in the picture. Raises StoreError
+    for pictures that lack their file, their lens or the pose of an object, and for objects without a model.
     """
     root, files = path, sorted(path.glob("*/*/scene_camera.json"))
     if not files:

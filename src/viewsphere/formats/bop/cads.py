@@ -24,7 +24,7 @@ from viewsphere.store.foreign import ForeignModel
 from viewsphere.store.paths import file_inside
 
 FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
-"""Where data sets have their models; the first that is there counts."""
+"""The folders in which data sets have their models; the first that exists counts."""
 
 METRES = np.diag([1 / MM, 1 / MM, 1 / MM, 1.0])
 
@@ -42,8 +42,8 @@ def model_files(root: Path) -> dict[int, Path]:
 
 
 def symmetries_of(root: Path) -> dict[int, Symmetries]:
-    """What models_info.json says of models that have symmetries, in millimetres, by their objects' numbers. Raises StoreError
-    for what is no symmetry.
+    """Return the symmetries in models_info.json, in millimetres, by the numbers of their objects. Models without symmetries are
+    left out. Raises StoreError for invalid symmetries.
     """
     file = file_inside(root, f"{model_folder(root)}/models_info.json")
     found = {int(number): _symmetries(one, f"{file}: {number}") for number, one in load(file).items() if number.isdecimal()}
@@ -51,7 +51,7 @@ def symmetries_of(root: Path) -> dict[int, Symmetries]:
 
 
 def model_spec(file: Path) -> ModelSpec:
-    """How a model's file is read: as it is, in its own axes, from millimetres."""
+    """Return the spec that reads a model's file as it is, in its own axes, from millimetres."""
     axes: dict[str, Any] = {"up": "+z", "forward": "-y", "unit": 1 / MM, "centring": "as_is"}
     return ModelSpec(key="model", source=str(file), category="object", category_id=1, **axes)
 

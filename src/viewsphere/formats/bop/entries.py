@@ -1,4 +1,4 @@
-"""What BOP says of a picture: its camera, its objects' poses, how much of them is seen, their masks."""
+"""The BOP records of a picture: its camera, its objects' poses, their visible shares and their masks."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def depth_file(sample: Sample, scale: float) -> Coded:
 
 
 def entries(sample: Sample, numbers: Mapping[str, int], scale: float) -> list[Entry]:
-    """All objects that have pixels in the picture, seen or hidden; raises UserError where an imported picture lacks depth, or
-    an object its whole mask.
+    """Return every object that has pixels in the picture, seen or hidden. Raises UserError where an imported picture lacks
+    depth, or an object its whole mask.
     """
     if "depth" not in sample.channels:
         raise UserError(f"frame {sample.index}: expected channel depth; found none")
@@ -142,7 +142,7 @@ def runs(mask: Rle) -> dict[str, Any]:
 
 
 def targets(scene: int, image: int, found: list[Entry]) -> list[dict[str, int]]:
-    """How many objects of each model BOP's localisation task wants found in a picture."""
+    """Return the number of objects of each model that BOP's localisation task expects in a picture."""
     counts: dict[int, int] = {}
     for entry in found:
         if entry.info["visib_fract"] >= LEAST_VISIBLE:

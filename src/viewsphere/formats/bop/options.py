@@ -1,4 +1,4 @@
-"""What may be said of an export to BOP."""
+"""The options of an export to BOP."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewsphere.model.frozen import Frozen
 
 
 class Options(Frozen):
-    """How files are laid, and how fine depth is."""
+    """The layout of files, and the resolution of depth."""
 
     layout: Literal["scenewise", "imagewise", "webdataset"] = Field(
         default="scenewise",

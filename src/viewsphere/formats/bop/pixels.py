@@ -1,8 +1,8 @@
-"""Where a data set of BOP's counts pixels from, as its masks tell.
+"""The origin from which a data set of BOP's counts pixels, estimated from its masks.
 
-BOP's documentation and back-projection have the centre of the first pixel at (0, 0), as pictures and depth have it. What makes
-masks and scene_gt_info need not: bop_toolkit's renderer has the corner of the first pixel there; and pyrender, by which
-BlenderProc's writer makes them, takes the first sample of several in a pixel, wherever the graphics card has that.
+BOP's documentation and back-projection have the centre of the first pixel at (0, 0), and so have pictures and depth. The tools
+that make masks and scene_gt_info may differ. bop_toolkit's renderer has the corner of the first pixel there. BlenderProc's
+writer makes masks with pyrender. It takes the first sample of several in a pixel, wherever the graphics card has that sample.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ Shift = tuple[float, float]
 
 @dataclass(frozen=True)
 class Fit:
-    """What is to be added to cx and cy for masks to fit, pixels, and which share of their pixels differs from the models'
-    without this shift and with it.
+    """The shift in pixels to add to cx and cy so that masks fit. `differed` and `differs` are the shares of their pixels that
+    differ from the models' pixels, without this shift and with it.
     """
 
     shift: Shift = (0.0, 0.0)

@@ -43,11 +43,11 @@ UNKNOWN = np.full((8, 3), np.nan)
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All pictures of the scenes in `<split>/<scene>/`, with lenses, poses, depth, masks and boxes as far as they are there.
+    """Return every picture of the scenes in `<split>/<scene>/`, with the lenses, poses, depth, masks and boxes that exist.
 
-    A picture without its camera's pose counts as taken from the world's origin. Categories are the objects, named as
-    dataset_info.json of viewsphere's own exports says, else `obj_<number>`. Raises StoreError with every picture that lacks its
-    file, its lens or the pose of an object, and every model that cannot be read; with `keep_going` these are left out and
+    A picture without its camera's pose counts as taken from the world's origin. Categories are the objects, named as in
+    dataset_info.json of viewsphere's own exports, else `obj_<number>`. Raises StoreError with every picture that lacks its
+    file, its lens or the pose of an object, and every model that cannot be read. With `keep_going` these are left out and
     reported.
     """
     problems: list[str] = []
@@ -168,7 +168,7 @@ def _frame(scene: Path, image: int, said: dict[str, Any], gt: list[Any], info: l
 
 
 def _checked(said: Mapping[str, Any]) -> dict[str, Any]:
-    """What is said of how much of an object is seen; raises ValueError for other numbers than there can be."""
+    """Return the checked counts, share and boxes of an object's visibility; raises ValueError for impossible numbers."""
     boxes = {name: [*map(int, said[name])] for name in ("bbox_obj", "bbox_visib")}
     whole, share = int(said["px_count_all"]), float(said["visib_fract"])
     if whole < 0 or not 0 <= share <= 1 or any(len(box) != 4 for box in boxes.values()):

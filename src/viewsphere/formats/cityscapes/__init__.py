@@ -65,7 +65,7 @@ TYPES = 4
 
 
 class Options(Frozen):
-    """Whether there is disparity."""
+    """The option of disparity."""
 
     stereo: bool = Field(default=False, description="disparity of the left pictures, too; of a rig of two rectified cameras")
 

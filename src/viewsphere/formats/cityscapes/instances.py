@@ -22,7 +22,9 @@ INSIDE = {(1, 0): (0, 0), (0, 1): (-1, 0), (-1, 0): (-1, -1), (0, -1): (0, -1)}
 
 
 class Region(NamedTuple):
-    """What is drawn at once: the label's id, the number in the instance map, the mask (H, W), and rings of pixels (N, 2)."""
+    """A region that is drawn at once: the label's id, the number in the instance map, the mask (H, W), and rings (N, 2) in
+    pixels.
+    """
 
     label: int
     number: int
@@ -31,10 +33,10 @@ class Region(NamedTuple):
 
 
 def regions(labels: NDArray[np.uint8], instances: NDArray[np.integer]) -> list[Region]:
-    """All regions of a picture, from maps (H, W) of labels' ids and of objects' ids, in the order in which they are drawn.
+    """Return every region of a picture, in the order of drawing, from maps (H, W) of labels' ids and of objects' ids.
 
-    Instances in several pieces come first, as a line from piece to piece, which is drawn with them, is then drawn over. So an
-    instance's number follows from its place in this order, as in Cityscapes' own tools.
+    Instances in several pieces come first. A line from piece to piece is drawn with them, and later regions are drawn over it.
+    So an instance's number follows from its place in this order, as in Cityscapes' own tools.
     """
     apart = np.where(np.isin(labels, INSTANCES), instances, 0)
     found = [(int(labels[mask][0]), mask, _rings(mask)) for mask in (apart == i for i in np.unique(apart[apart > 0]))]

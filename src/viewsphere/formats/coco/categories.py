@@ -68,7 +68,7 @@ def official_ids(categories: tuple[Category, ...]) -> dict[int, int]:
 
 
 def notes(categories: Sequence[Category], options: Options) -> Iterator[str]:
-    """What a user may not expect of the ids: categories that COCO does not have, or has once."""
+    """Yield notes on unexpected ids: categories that COCO does not have, or has once."""
     if options.category_ids == "contiguous":
         return
     for category, number in zip(categories, official_ids(tuple(categories)).values(), strict=True):

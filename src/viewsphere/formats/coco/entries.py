@@ -33,7 +33,7 @@ Masks = Mapping[int, NDArray[np.bool_]]
 
 @dataclass(frozen=True)
 class Entry:
-    """What the files of a split have of a sample: its image, its annotations, and its captions, JSON."""
+    """The records of a sample in the files of a split: its image, its annotations, and its captions, JSON."""
 
     split: str
     image: bytes

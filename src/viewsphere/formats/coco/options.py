@@ -1,4 +1,4 @@
-"""What recipes and the command line may say of the format."""
+"""The options of the format in recipes and on the command line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewsphere.model.frozen import Frozen
 
 
 class Options(Frozen):
-    """How categories are numbered, where pictures lie, and how masks are written."""
+    """The numbers of categories, the folders of pictures, and the encoding of masks."""
 
     category_ids: Literal["contiguous", "coco"] = Field(
         default="contiguous",
@@ -28,5 +28,5 @@ class Options(Frozen):
     )
 
     def folder(self, split: str) -> str:
-        """Where a split's pictures are, from the export's folder."""
+        """Return the folder of a split's pictures, relative to the export's folder."""
         return f"images/{split}" if self.pictures == "images" else split

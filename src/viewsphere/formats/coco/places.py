@@ -1,4 +1,4 @@
-"""Where COCO's files and its pictures lie, in its own trees and in those that others write."""
+"""The places of COCO's files and pictures, in COCO's own trees and in the trees that other tools write."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from viewsphere.store.paths import file_inside, is_name
 from viewsphere.urls.inside import is_inside
 
 KINDS = ("instances_", "person_keypoints_")
-"""How files of annotations begin, before the split; the first of them that a folder has counts."""
+"""The beginnings of names of annotation files, before the split; the first that a folder has counts."""
 
 BARE = "image_info_"
-"""How files of pictures without annotations begin."""
+"""The beginning of names of files of pictures without annotations."""
 
 NAMELESS = ("labels", "annotations", "_annotations.coco", "coco_annotations")
 """Files of one split, whose name is its folder's: FiftyOne's, supervision's, Roboflow's and BlenderProc's."""
@@ -24,7 +24,7 @@ ONLY = "train"
 """The split of one that lies in no folder of several."""
 
 FOLDERS = ("", "data", "images")
-"""Where the pictures of such a file lie, beside it."""
+"""The folders of the pictures of such a file, beside it."""
 
 
 def annotation_files(path: Path) -> list[tuple[str, Path]]:

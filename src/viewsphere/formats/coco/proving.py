@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from viewsphere.store import Dataset
 
 OPENED: tuple[Where, ...] = ((), ("categories",), ("models",), ("images",), ("annotations",))
-"""What of an instances file is compared, and read, item by item."""
+"""The parts of an instances file that the proof reads and compares item by item."""
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
-    """All that is not as it would be exported now. Of the `sampled` frames pycocotools' masks have to be those of the stored
-    instance maps, and detections made from the latter have to score AP 1.
+    """Yield every difference from the current export. For the `sampled` frames, pycocotools' masks must equal the stored
+    instance maps, and detections made from these maps must score AP 1.
     """
     names = file_names(dataset)
     with temporary("coco") as aside:
@@ -39,7 +39,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
 
 
 def _expected(dataset: Dataset, append: Callable[[Entry], None], options: Options) -> Iterator[Expected]:
-    """All files but the instances, for which every frame is appended elsewhere."""
+    """Yield every file but the instances; for the instances, `append` receives each frame."""
     entries = Entries(dataset, options)
     for sample in dataset:
         masks = seen(sample)
@@ -49,7 +49,7 @@ def _expected(dataset: Dataset, append: Callable[[Entry], None], options: Option
 
 
 def _nowhere(entry: Entry) -> None:
-    """Where frames are appended whose files alone are wanted."""
+    """Ignore a frame, for callers that need only its files."""
 
 
 def _frame(where: Where, value: Any) -> int | None:

@@ -34,15 +34,15 @@ MOST_IMAGES_BESIDE = 10
 """Largest distance of a polygon's corner from the image, in image sizes."""
 
 HEAD = ("info", "licenses", "categories")
-"""What a file says of itself."""
+"""The parts of a file that describe the file itself."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All images and annotations of a folder with instances files, or of one such file.
+    """Return every image and annotation of a folder with instances files, or of one such file.
 
-    Every file becomes a split, named like the file without `instances_`, or like its folder, and its images are looked for
-    where COCO and its relatives keep them (`viewsphere.formats.coco.places`). Ids of categories are kept. Raises StoreError
-    with every mistake: dangling and repeated ids, missing images, invalid boxes and segmentations; with `keep_going` broken
+    Every file becomes a split, named like the file without `instances_`, or like its folder. Its images are searched in the
+    folders that COCO and its relatives use (`viewsphere.formats.coco.places`). Ids of categories are kept. Raises StoreError
+    with every mistake: dangling and repeated ids, missing images, invalid boxes and segmentations. With `keep_going` broken
     entries are left out and reported.
     """
     files = annotation_files(path)

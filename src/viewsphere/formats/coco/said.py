@@ -1,5 +1,5 @@
-"""What a COCO data set made elsewhere says of itself beside its pictures: info, licences, and what its categories have beside
-their names, such as `keypoints` and `skeleton`. It is kept in the plan, and goes out again.
+"""Metadata of an imported COCO data set: info, licences, and the fields that its categories have beside their names, such as
+`keypoints` and `skeleton`. The plan keeps them, and an export writes them again.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Said = Mapping[str, Any]
 
 
 def said(splits: Iterable[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:
-    """What COCO's files say, each with its split's name, for the plan; of what two say of one name, the first. Raises
-    ValueError for numbers that JSON does not have.
+    """Return the metadata of COCO's files, each given with its split's name, for the plan. Where two files define one name, the
+    first counts. Raises ValueError for numbers that JSON does not have.
     """
     info: dict[str, Any] = {}
     licences: dict[str, Any] = {}
@@ -76,19 +76,19 @@ class Licences:
 
 
 def imported_info(dataset: Dataset, split: str) -> dict[str, Any] | None:
-    """What the file of a split said of itself, where all of the data set comes from there."""
+    """Return the `info` of a split's imported file, where the whole data set comes from there; else None."""
     told = [one["info"][split] for one in _told(dataset) if split in one.get("info", {})]
     return told[0] if len(told) == 1 and sum(part.frames > 0 for part in dataset.plan.parts) == 1 else None
 
 
 def imported_info_of_parts(dataset: Dataset) -> list[dict[str, Any]]:
-    """What all files that were imported said of themselves, each once."""
+    """Return the `info` of every imported file, each once."""
     told = (info for one in _told(dataset) for info in one.get("info", {}).values())
     return list({_key(info): info for info in told}.values())
 
 
 def imported_categories(dataset: Dataset) -> dict[str, dict[str, Any]]:
-    """What imported categories have beside their names, by these in lower case, as `merge` joins them."""
+    """Return the fields that imported categories have beside their names, by the names in lower case, as `merge` joins them."""
     found: dict[str, dict[str, Any]] = {}
     for one in _told(dataset):
         for name, more in one.get("categories", {}).items():

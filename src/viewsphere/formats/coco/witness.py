@@ -1,4 +1,4 @@
-"""What pycocotools, which knows nothing of this package, makes of an exported file."""
+"""The comparison of an exported file with pycocotools, which is independent of this package."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SIGMA = 0.05
 """Of all points, in COCOeval's similarity of keypoints; found where they are, they are alike whatever it is."""
 
 MISTAKES = (LookupError, TypeError, ValueError, AttributeError, AssertionError, OSError)
-"""What pycocotools raises for files that are not as they should be."""
+"""The exceptions that pycocotools raises for invalid files."""
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ SHARED = 1
 
 
 class Options(Frozen):
-    """How the model is written."""
+    """The encoding of the model."""
 
     kind: Literal["text", "binary"] = Field(default="text", description="`text`: .txt files; `binary`: .bin files")
 
@@ -97,7 +97,9 @@ class Colmap(Tree):
         yield self._piece(sparse, "points3D", shown.points)
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """What the records are, those that all frames of a part share, and the others; in binary files their number first."""
+        """Return the parts of a file: the records that all frames of a part share, and the other records. Binary files begin
+        with the number of records.
+        """
         file = path.rpartition("/")[2].partition(".")[0]
         if file not in KINDS:
             return ("",)

@@ -12,13 +12,14 @@ from viewsphere.model.listed import ListedShot
 from viewsphere.store.again import Again, refuse_any
 
 FOLDERS = ("", "sparse/0", "sparse", "dense/0", "dense")
-"""Where COLMAP's programs put meshes, from the folder of the data set."""
+"""The folders in which COLMAP's programs put meshes, relative to the folder of the data set."""
 
 
 def again(path: Path) -> Again:
-    """All cameras of a folder with `sparse/0`, or of such a `sparse/0`, text or binary, in the order of their images' names.
+    """Return every camera of a folder with `sparse/0`, or of such a `sparse/0`, text or binary, in the order of their images'
+    names.
 
-    Pictures need not be there. Up is the axis of the world that is nearest to the cameras' mean up. Raises StoreError where
+    Pictures are not required. Up is the axis of the world that is nearest to the cameras' mean up. Raises StoreError where
     there is no model, for an image without its camera, and for a lens that viewsphere does not have.
     """
     model = read_model(path)

@@ -1,4 +1,4 @@
-"""Which points of the world a COLMAP model has, and which images show them."""
+"""The points of the world that a COLMAP model has, and the images that show them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Shown:
 
 
 class Sights:
-    """What the images of a data set show."""
+    """The points that the images of a data set show."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset

@@ -46,11 +46,11 @@ class _Image:
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All images of a folder with `sparse/0` and `images`, or of such a `sparse/0`, in the order of their names, with cameras;
-    no objects and no points.
+    """Return every image of a folder with `sparse/0` and `images`, or of such a `sparse/0`, in the order of their names, with
+    cameras. There are no objects and no points.
 
-    Splits are those that `<split>.txt` beside the model lists; without these all is `train`. The world's axes are COLMAP's.
-    Raises StoreError with every image that lacks its picture or its camera; with `keep_going` these are left out and reported.
+    Splits are the lists in `<split>.txt` beside the model; without these all is `train`. The world's axes are COLMAP's. Raises
+    StoreError with every image that lacks its picture or its camera; with `keep_going` these are left out and reported.
     """
     model = read_model(path)
     folder = model.cameras.parent

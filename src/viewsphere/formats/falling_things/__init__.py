@@ -68,7 +68,7 @@ SINGLE = 255
 
 
 class Options(Frozen):
-    """Which of two namings."""
+    """The choice of two namings."""
 
     naming: Literal["fat", "ndds"] = Field(
         default="fat", description="`fat`: that of Falling Things; `ndds`: that of NVIDIA's Dataset Synthesizer"
@@ -84,7 +84,7 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
 
 
 def _sides(rig: Rig) -> dict[str, str] | None:
-    """Which sensor is left, and which right; None for a rig of other sensors."""
+    """Return the left and the right sensor by name; None for a rig of other sensors."""
     names = [sensor.name for sensor in rig.sensors]
     if len(names) == 1:
         return {names[0]: "left"}

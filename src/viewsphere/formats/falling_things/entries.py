@@ -1,4 +1,4 @@
-"""What Falling Things says of objects, models and lenses; lengths in centimetres, objects' axes like a camera's."""
+"""Records of objects, models and lenses as in Falling Things; lengths in centimetres, objects' axes like a camera's."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PERMUTED = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def camera_data(camera: Camera) -> dict[str, Any]:
-    """Where the camera is in the world, and its lens."""
+    """Return the pose of the camera in the world, and its lens."""
     k = camera.intrinsics
     return {
         "location_worldframe": (camera.center * CM).tolist(),

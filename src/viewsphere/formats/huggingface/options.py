@@ -1,4 +1,4 @@
-"""What recipes and the command line may say of the format."""
+"""The options of the format in recipes and on the command line."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ from viewsphere.model.frozen import Frozen
 
 
 class Options(Frozen):
-    """Where files end."""
+    """The size of files."""
 
     samples_per_shard: int = Field(default=1000, ge=1, description="most samples of a file")

@@ -19,11 +19,15 @@ from viewsphere.plugins.format import Remark
 from viewsphere.store import Dataset
 
 FOREIGN = "parquet-cpp-arrow version "
-"""How pyarrow begins to say which version of it wrote a file; another version may write the same values in other bytes."""
+"""The beginning of the text in which pyarrow names the version that wrote a file. Another version may write the same values in
+other bytes.
+"""
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
-    """All that is not as it would be exported now; of the export that is made for it one file a split is there at a time."""
+    """Yield every difference from the current export. The proof makes an export of its own, of which one file a split exists at
+    a time.
+    """
     names = [CARD]
     with TemporaryDirectory() as aside:
         shards = Shards(Columns(dataset), Path(aside), options)
@@ -45,7 +49,7 @@ def _all(shards: Shards, dataset: Dataset) -> Iterator[str]:
 
 
 def _changes(aside: Path, folder: Path, name: str) -> Iterator[Remark]:
-    """What of a file is not as in that of the same name that was made for comparison."""
+    """Yield the differences between a file and the file of the same name made for comparison."""
     if same_bytes(aside / name, folder / name):
         return
     pa = arrow()

@@ -56,7 +56,7 @@ class _Place:
 
     @property
     def split(self) -> str:
-        """What its pictures are for, where no list says so."""
+        """The split of its pictures, where no list gives one."""
         return TRAIN if self.folder in ("", "training") else self.folder
 
     def at(self, name: str) -> str:
@@ -81,7 +81,8 @@ class _Place:
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All labelled pictures of a folder with `training`, or of that itself: what viewsphere.formats.kitti says.
+    """Return every labelled picture of a folder with `training`, or of `training` itself, as viewsphere.formats.kitti
+    describes.
 
     Raises StoreError with every mistake: pictures, labels and calibrations that are missing, broken or outside, and broken
     lines; with `keep_going` these are left out and reported.
@@ -222,7 +223,9 @@ def _object(number: int, row: Row, category: Category, picture: _Frame, camera: 
 
 
 def _standing(solid: tuple[float, ...], camera: Camera | None) -> dict[str, Any]:
-    """What follows of where a 3D box stands: upright, its front (-Y) turned about the reference camera's y axis."""
+    """Return the fields that follow from a 3D box: it is upright, and its front (-Y) is turned about the reference camera's y
+    axis.
+    """
     height, width, length, x, y, z, turn = solid
     half = np.array([width, length, height]) / 2
     c, s = np.cos(turn), np.sin(turn)

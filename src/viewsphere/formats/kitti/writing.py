@@ -28,11 +28,11 @@ CALIBRATED = {
     "object": ("R0_rect:", "Tr_velo_to_cam:", "Tr_imu_to_velo:"),
     "tracking": ("R_rect", "Tr_velo_cam", "Tr_imu_velo"),
 }
-"""How the tasks begin the lines behind the projections: only one has colons."""
+"""The beginnings of the calibration lines behind the projections, by task; only `object` has colons."""
 
 
 class Options(Frozen):
-    """Which benchmark."""
+    """The benchmark."""
 
     task: Literal["object", "tracking"] = Field(
         default="object", description="`object`: a file of labels for each picture; `tracking`: one for each sequence"
@@ -62,7 +62,9 @@ class Kitti(Tree):
         self._unplanned = lru_cache(maxsize=4)(self._found)
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """What a sensor adds: its picture or points, and, of the left camera, all that is of the frame as a whole."""
+        """Yield the files of a sensor's sample: its picture or points, and, with the left camera, the files of the frame as a
+        whole.
+        """
         rig, car, place = self._sensor(sample)
         name, image = f"{sample.index - place:06d}", "image_"
         if self._task == "tracking":

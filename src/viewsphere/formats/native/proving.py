@@ -18,11 +18,11 @@ OPENED: tuple[Where, ...] = (
     *((), ("vehicles",), ("poses",)),
     *(("poses", "*"), ("poses", "*", "vehicles_rendered")),
 )
-"""What of the JSON is compared item by item."""
+"""The parts of the JSON that the proof compares item by item."""
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
-    """All that is not as it would be exported now; there is nothing that is proved of the `sampled` frames alone."""
+    """Yield every difference from the current export; no proof is limited to the `sampled` frames."""
     with temporary("native") as aside:
         with poses(dataset, aside) as append:
             again = _expected(dataset, lambda entries: None)
@@ -31,7 +31,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator
 
 
 def _expected(dataset: Dataset, append: Callable[[Sequence[Entry]], None]) -> Iterator[Expected]:
-    """All files but the JSON, for which every frame is appended elsewhere."""
+    """Yield every file but the JSON; for the JSON, `append` receives each frame."""
     for sample in dataset:
         append(entries_of(dataset, sample))
         yield from files(dataset, sample)

@@ -37,11 +37,11 @@ LARGEST_POSE = 10_000_000
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All frames of a folder with `dataset1.json`, with cameras and poses; of the objects what the JSON says, their masks and
-    their 3D boxes in pixels.
+    """Return every frame of a folder with `dataset1.json`, with cameras and poses. Objects have their data from the JSON, their
+    masks and their 3D boxes in pixels.
 
-    A frame without a split is in `train`, an object's category is its vehicle's. Raises StoreError with every entry that
-    lacks a vehicle, a picture or a mask, or has no camera; with `keep_going` these entries are left out and reported.
+    A frame without a split is in `train`, and an object's category is its vehicle's. Raises StoreError with every entry that
+    lacks a vehicle, a picture or a mask, or has no camera. With `keep_going` these entries are left out and reported.
     """
     file = path / "dataset1.json" if path.is_dir() else path
     vehicles, poses, digest = _load(file)

@@ -60,7 +60,7 @@ POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("gre
 
 
 class Options(Frozen):
-    """Who reads it, and what is trained on."""
+    """The program that reads the export, and the pixels that it trains on."""
 
     kind: Literal["nerfstudio", "instant-ngp", "nerf-synthetic"] = Field(
         default="nerfstudio", description="whose files: `nerfstudio`, `instant-ngp`, or `nerf-synthetic`, NeRF's own scenes"

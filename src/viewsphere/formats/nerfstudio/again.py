@@ -14,12 +14,12 @@ from viewsphere.model.listed import ListedShot
 from viewsphere.store.again import Again, refuse_any
 
 FOLDERS = ("", "exports/mesh", "exports/poisson", "exports/tsdf", "exports")
-"""Where nerfstudio's users put meshes, from the folder of transforms.json."""
+"""The folders in which nerfstudio's users put meshes, relative to the folder of transforms.json."""
 
 
 def again(path: Path) -> Again:
-    """All cameras of a world's folder, or of one of its files. Pictures have to be there only where the file does not say w and
-    h. Raises StoreError where there is no such file, and for a frame that lacks its lens or its pose.
+    """Return every camera of a world's folder, or of one of its files. Pictures are required only where the file does not give
+    w and h. Raises StoreError where there is no such file, and for a frame that lacks its lens or its pose.
     """
     problems: list[str] = []
     shots: dict[str, ListedShot] = {}

@@ -13,7 +13,7 @@ MOST = {"nerfstudio": 5, "instant-ngp": 4, SYNTHETIC: 0}
 
 
 def lens_problem(lens: Intrinsics, kind: str) -> str | None:
-    """What of a lens the files of a kind have no words for."""
+    """Return the part of a lens that files of this kind cannot express; None for a lens that they can."""
     own = lens.distortion.coefficients if isinstance(lens.distortion, Distortion) else ()
     if own and not MOST[kind]:
         return f"expected pinhole cameras; found {len(own)} coefficients"

@@ -24,11 +24,11 @@ MODELS = ("OPENCV", "OPENCV_FISHEYE", "PINHOLE", "SIMPLE_PINHOLE")
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All pictures of a world's folder, or of one of its files, with cameras and depth; no objects.
+    """Return every picture of a world's folder, or of one of its files, with cameras and depth; no objects.
 
-    Splits are those of the file's lists, or of transforms_<split>.json; without these all is `train`. What the file says beside
-    the frames counts where a frame does not say it. Raises StoreError with every frame that lacks its picture, its lens or its
-    pose; with `keep_going` these are left out and reported.
+    Splits are the file's lists, or come from transforms_<split>.json; without these all is `train`. Values beside the frames in
+    the file are defaults for its frames. Raises StoreError with every frame that lacks its picture, its lens or its pose; with
+    `keep_going` these are left out and reported.
     """
     files = transforms_files(path)
     problems: list[str] = []
@@ -133,7 +133,9 @@ def pose_said(said: Mapping[str, Any]) -> NDArray[np.float64]:
 
 
 def _number(said: Mapping[str, Any], name: str, other: float) -> float:
-    """What is said as a number, else the other one; raises ValueError for what is none."""
+    """Return the value of this name as a number, by default the other one; raises ValueError for a value that is not a
+    number.
+    """
     value = other if said.get(name) is None else said[name]
     if not isinstance(value, (int, float)) or not abs(value) < math.inf:
         raise ValueError(f"expected {name}, a number; found {value!r:.60}")

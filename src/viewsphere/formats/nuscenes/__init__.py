@@ -57,7 +57,7 @@ from viewsphere.store import Dataset
 
 
 class Options(Frozen):
-    """How the tables are found."""
+    """The name of the tables' folder."""
 
     version: str = Field(
         default="v1.0-mini", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=64, description="name of the tables' folder"
@@ -88,7 +88,9 @@ class NuScenes(Tree):
         self._kinds = {} if shot is None else dict(zip(channels_of(shot.rig), modalities(shot.rig), strict=True))
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """What a sensor adds; the first one of an instant, all that is of the instant as a whole, too."""
+        """Yield the files and records of a sensor's sample. The first sensor of an instant also adds the records of the whole
+        instant.
+        """
         course, (shot, instant, place) = self._timeline.course(sample), self._timeline.taken(sample)
         start, story = sample.index - place, self._story(course)
         view, channel = View(sample, shot, instant, place, course, story), channels_of(shot.rig)[place]

@@ -53,12 +53,12 @@ def channels_of(rig: Rig) -> tuple[str, ...]:
 
 
 def modalities(rig: Rig) -> tuple[str, ...]:
-    """What its sensors are, in its order: `camera` or `lidar`."""
+    """Return the modality of each sensor, in the rig's order: `camera` or `lidar`."""
     return tuple("camera" if sensor.lidar is None else "lidar" for sensor in rig.sensors)
 
 
 def alike(what: str, named: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Why things of these names, each with that of nuScenes, cannot be told apart."""
+    """Yield an error for names that are equal in nuScenes, from pairs of a name and its name there."""
     counts = Counter(own for _, own in named)
     for name in (name for name, count in counts.items() if count > 1):
         found = ", ".join(other for other, own in named if own == name)

@@ -51,13 +51,13 @@ def placed(matrix: Float) -> Record:
 
 
 def ego_from_sensor(rig: Rig, sensor: int) -> Record:
-    """Where a sensor, by its place in the rig, stands in the ego's axes; that of a LiDAR is turned to its own."""
+    """Return the pose of a sensor, by its place in the rig, in the ego's axes; a LiDAR's pose is turned to its own axes."""
     axes = np.eye(4) if rig.sensors[sensor].lidar is None else CAMERA_FROM_LIDAR
     return placed(compose(compose(unmoved(CAMERA_FROM_LIDAR), mounted(rig, sensor)), axes))
 
 
 def world_from_ego(world_from_rig: Float) -> Record:
-    """Where the ego stands in the world."""
+    """Return the pose of the ego in the world."""
     return placed(compose(world_from_rig, CAMERA_FROM_LIDAR))
 
 

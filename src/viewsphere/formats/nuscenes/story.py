@@ -1,4 +1,4 @@
-"""What of a sequence is there: its instants, by sensor and by object, so that a record knows those before and behind it."""
+"""The instants of a sequence by sensor and by object, so that a record can refer to its neighbours in time."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Story:
 
 
 def story_of(timeline: Timeline, course: Course) -> Story:
-    """What a sequence's finished and chosen samples show; its shots are read for it."""
+    """Return the instants, sensors, objects, lenses and splits of a sequence's finished and chosen samples; reads its shots."""
     sensors, objects = dict[int, list[int]](), dict[int, list[int]]()
     lenses, splits, instants = dict[int, Intrinsics](), dict[str, None](), dict[int, None]()
     for shot in timeline.shots(course):

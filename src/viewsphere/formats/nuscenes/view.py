@@ -143,13 +143,13 @@ def points(sample: Sample) -> bytes:
 
 
 def _hits(seen: Sequence[Sample]) -> Counter[int]:
-    """How many points of all LiDARs are on each object, by its id."""
+    """Return the number of points of all LiDARs on each object, by its id."""
     found = [sample.channels[LIDAR]["instance"] for sample in seen if LIDAR in sample.channels]
     return Counter(np.concatenate(found).tolist() if found else ())
 
 
 def _shares(seen: Sequence[Sample]) -> dict[int, float]:
-    """How much of each object, by its id, the camera sees that sees most of it; without cameras, the LiDAR."""
+    """Return each object's largest visible share among the cameras, by its id; without cameras, among the LiDARs."""
     cameras = [sample for sample in seen if LIDAR not in sample.channels] or seen
     found = dict[int, float]()
     for o in (o for sample in cameras for o in sample.objects):

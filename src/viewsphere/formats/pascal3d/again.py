@@ -36,11 +36,11 @@ class _Group:
 
 
 def again(path: Path) -> Again:
-    """All pictures with objects whose viewpoint is known, in the folder of a release, and the CAD models that they show.
+    """Return every picture with objects of known viewpoint, in the folder of a release, and the CAD models that they show.
 
-    A picture is one shot where its objects have one lens, as where it says K, else one for each lens: the format's projection
-    has the principal point where it sees an object's origin. The world is that of a shot's first object. Raises StoreError for
-    records that are none, and for objects without a CAD model.
+    A picture is one shot where its objects have one lens, as where the record gives K. Else it is one shot for each lens,
+    because the format's projection has the principal point at an object's origin in the picture. The world is the world of a
+    shot's first object. Raises StoreError for invalid records, and for objects without a CAD model.
     """
     if not any(path.glob("Annotations/*/*.mat")):
         raise StoreError(f"{path}: expected PASCAL3D+ (Annotations/<category>_pascal/<index>.mat); found no such file")

@@ -1,4 +1,4 @@
-"""What PASCAL3D+'s records, of the folders of all categories, and its lists tell of each picture."""
+"""The facts about each picture in PASCAL3D+'s records, of the folders of all categories, and in its lists."""
 
 from __future__ import annotations
 

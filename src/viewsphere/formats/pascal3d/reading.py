@@ -56,7 +56,7 @@ class _Shown(Listed):
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All pictures of a folder with `Annotations` and `Images`: what viewsphere.formats.pascal3d says.
+    """Return every picture of a folder with `Annotations` and `Images`, as viewsphere.formats.pascal3d describes.
 
     Raises StoreError with every mistake: records, pictures and CAD models that are missing, broken or outside, and broken
     objects; with `keep_going` these are left out and reported.
@@ -191,7 +191,7 @@ def _keypoints(o: Seen) -> dict[str, Any]:
 
 
 def _standing(o: Seen, box: Float | None, lens: Intrinsics | None) -> dict[str, Any]:
-    """What is known of where an object is: its pose, or only a coarse view, or nothing."""
+    """Return the known fields of an object's place: its pose, or only a coarse view, or nothing."""
     motion = o.motion if o.motion is not None else _turned(o.view, lens) if o.is_fine and lens is not None else None
     if motion is not None:
         pose = rigid(motion[:, :3], motion[:, 3])

@@ -159,7 +159,7 @@ def _whole(said: Mapping[str, Any], name: str, most: int) -> int | None:
 
 
 def _view(value: Any) -> dict[str, float]:
-    """What is said of a viewpoint: nothing where there is none."""
+    """Return the numbers of a viewpoint by name; empty where there is no viewpoint."""
     rows = structs_of(np.zeros(0) if value is None else value, "a struct `viewpoint`")
     if not rows:
         return {}

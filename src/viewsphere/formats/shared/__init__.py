@@ -1,1 +1,1 @@
-"""What several formats need."""
+"""Code that several formats need."""

@@ -21,7 +21,7 @@ class _Portable(pickle.Pickler):
     """Pickles arrays by their shape, type and bytes: numpy's own way names modules that other versions of it do not have."""
 
     def reducer_override(self, obj: Any) -> Any:
-        """How an array is made again; all else as ever."""
+        """Return the call that restores an array; other values as usual."""
         if isinstance(obj, np.ndarray):
             return np.ndarray, (obj.shape, obj.dtype.str, bytearray(np.ascontiguousarray(obj).tobytes()))
         return NotImplemented

@@ -69,7 +69,7 @@ class Moment:
 
 
 class Rigs:
-    """Which rigs take a data set's samples."""
+    """The rigs that take a data set's samples."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset
@@ -123,7 +123,7 @@ def measured_png(sample: Sample, metres: float) -> Coded:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Where points are in a picture, (N, 2) pixels, in the world, (N, 3) metres, and their colours, (N, 3) uint8."""
+    """Points of a picture: their pixels (N, 2), their places in the world (N, 3), metres, and their colours (N, 3) uint8."""
 
     pixels: Float
     world: Float

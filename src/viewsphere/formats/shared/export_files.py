@@ -1,4 +1,4 @@
-"""What the files of an export hold, to write them and to prove them."""
+"""The contents of an export's files, to write them and to prove them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Coded:
-    """What an encoding, by its name, makes of a frame; exports of one pass that share it make it once."""
+    """The encoded bytes of a frame, by the encoding's name; exports of one pass that share an encoding make them once."""
 
     frame: int
     name: str
@@ -37,7 +37,7 @@ Expected = tuple[int | None, str, Content]
 """The frame that a file belongs to (None: to no single one), the file's path from the export's folder, and its content."""
 
 PNG = b"\x89PNG"
-"""How every PNG begins."""
+"""The beginning of every PNG."""
 
 BLOCK = 1 << 20
 """Bytes of a file that are compared at once."""
@@ -108,7 +108,9 @@ def _problem(dataset: Dataset, content: Content, file: Path) -> str | None:
 
 
 def _different(wanted: bytes, found: bytes) -> str | None:
-    """How two files' bytes differ; pictures of equal pixels do not: another version of the encoder may have written one."""
+    """Return the difference between two files' bytes. Pictures of equal pixels do not differ: another version of the encoder
+    may have written one of them.
+    """
     at = next((i for i, (a, b) in enumerate(zip(wanted, found, strict=False)) if a != b), min(len(wanted), len(found)))
     problem = f"expected {len(wanted)} bytes that are exported, found {len(found)}, others from byte {at} on"
     if not wanted.startswith(PNG):

@@ -12,7 +12,7 @@ from viewsphere.formats.shared.export_files import Coded
 from viewsphere.model.sample import Sample
 
 FLO_TAG = b"PIEH"
-"""How .flo files begin, and Sintel's .dpt and .cam: the little-endian float 202021.25."""
+"""The beginning of .flo files, and of Sintel's .dpt and .cam: the little-endian float 202021.25."""
 
 UNKNOWN = np.float32(1e10)
 """Flow that is not known, in .flo files: all beyond 1e9."""

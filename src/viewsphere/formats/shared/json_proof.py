@@ -22,9 +22,9 @@ MOST_SHOWN = 3
 def check_json(
     wanted: Path, found: Path, opened: Collection[Where], frame_of: Callable[[Where, Any], int | None]
 ) -> Iterator[Remark]:
-    """What of the file `found` is not as in `wanted`, by rows (see `rows`); `frame_of` says which frame a row belongs to.
+    """Yield the rows (see `rows`) of the file `found` that differ from `wanted`; `frame_of` returns the frame of a row.
 
-    Equal files are read only as bytes, and no more of others is held in memory than rows that have changed places.
+    Equal files are read only as bytes. For other files, memory holds only the rows that have changed places.
     """
     if not found.is_file() or same_bytes(wanted, found):
         return

@@ -1,4 +1,4 @@
-"""What KITTI's benchmarks share: which sensors a car has, how they are calibrated, lines of labels, and files of points."""
+"""The shared parts of KITTI's benchmarks: the sensors of a car, their calibration, lines of labels, and files of points."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def car_of(rig: Rig) -> Car | None:
 
 
 def other_cars(scope: Scope) -> Iterator[str]:
-    """Why a data set's rig is no car of KITTI's, or has none of its points."""
+    """Yield the reasons why a data set's rig is no car of KITTI's, or has none of its points."""
     yield from pointless(scope)
     if scope.rig is not None and car_of(scope.rig) is None:
         found = ", ".join(sensor.name for sensor in scope.rig.sensors)
@@ -75,7 +75,7 @@ def projection(lens: Intrinsics, along: float = 0.0) -> Float:
 
 
 def _along(left: Float, right: Float) -> float:
-    """How far the right camera stands along the left one's x axis."""
+    """Return the position of the right camera along the left one's x axis."""
     return float(transform(left[:3, :3].T, right[:3, 3] - left[:3, 3])[0])
 
 
@@ -108,10 +108,10 @@ def velodyne(sample: Sample) -> bytes:
 
 NO_BOX = (-1.0, -1.0, -1.0, -1000.0, -1000.0, -1000.0, -10.0)
 NO_ANGLE, NO_SHARE = -10.0, -1
-"""What stands for values of imported objects that nobody knows."""
+"""The placeholders for unknown values of imported objects."""
 
 DONT_CARE = "dont_care"
-"""What an imported picture's `source` calls the boxes, half-open corners, of regions that evaluations leave out."""
+"""The name in an imported picture's `source` of the boxes, half-open corners, of regions that evaluations leave out."""
 
 
 def nobody_cares(region: Box) -> str:
@@ -130,7 +130,9 @@ def row(o: ObjectAnnotation, kind: str, in_grades: bool) -> str:
 
 
 def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
-    """How much of it lies outside of the picture, a share or a grade; of imported objects the one may be known, or neither."""
+    """Return the part of an object outside of the picture, as a share or a grade. Imported objects may have only one of them,
+    or neither.
+    """
     if in_grades and "truncation_level" in o.more:
         return int(o.more["truncation_level"])
     if math.isnan(o.truncation):

@@ -1,4 +1,4 @@
-"""Where a rig's sensors are, in the axes that formats of driving have, and what its LiDAR measures."""
+"""The poses of a rig's sensors in the axes of driving formats, and the measurements of its LiDAR."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from viewsphere.store.paths import file_inside, is_name
 
 RIGHT_ANGLES = 1e-3
 MOST = 1e9
-"""What all numbers of a pose are below."""
+"""The limit below which every number of a pose is."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,9 @@ class Posed:
 
 
 def without_world(path: Path, expected: str, *patterns: str) -> StoreError:
-    """What is to be raised where a folder lacks what is expected: the worlds in it, by their files' patterns, are named."""
+    """Return the error for a folder that lacks the expected files; it names the worlds in the folder, by their files'
+    patterns.
+    """
     found = sorted({file.relative_to(path).parts[0] for pattern in patterns for file in path.glob(f"*/{pattern}")})
     names = ", ".join(name for name in found if is_name(name))
     worlds = f"worlds in {names:.200}: give one of these" if names else "none"

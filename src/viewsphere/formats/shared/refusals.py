@@ -1,4 +1,4 @@
-"""What several formats cannot hold, for their `refuses`."""
+"""The limits that several formats share, for their `refuses`."""
 
 from __future__ import annotations
 

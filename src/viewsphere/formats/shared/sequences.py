@@ -1,4 +1,4 @@
-"""What formats of sequences have in common: which sensors are the left and the right eye, folders of scenes, their ends."""
+"""The shared parts of formats of sequences: the sensors of the left and the right eye, folders of scenes, their ends."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def two_eyes(scope: Scope) -> Iterator[str]:
 
 
 class Eyes:
-    """Which sensors a format calls left and right: the first that are rectified with one another; a lone camera is left."""
+    """The sensors that a format calls left and right: the first that are rectified with one another; a lone camera is left."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset

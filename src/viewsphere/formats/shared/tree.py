@@ -1,6 +1,6 @@
-"""What most formats are: a tree of files, of which every sample gives some whole, and parts of others.
+"""The form of most formats: a tree of files. Every sample gives some files whole, and parts of others.
 
-A format's module has a class of its own, below `Tree`, and takes its functions from that:
+A format's module has a class of its own, below `Tree`, and gets its functions from this class:
 
     preparer, writer, verify = functions(Yolo)
 """
@@ -68,7 +68,7 @@ def member(path: str, key: str, value: Any, section: str = "") -> Piece:
 
 
 Layout = Iterable[bytes | str]
-"""What a file is put together of: bytes, and all pieces of the sections of these names."""
+"""The parts of a file, in order: bytes, and every piece of the sections of these names."""
 
 LINES: Layout = ("",)
 LIST: Layout = (b"[\n", "", b"\n]\n")
@@ -76,8 +76,8 @@ OBJECT: Layout = (b"{\n", "", b"\n}\n")
 
 
 class Tree(ABC):
-    """What a format makes of a data set; below it, a class for each format. Errors of the data set that only then are known are
-    raised as UserError, and leave nothing written.
+    """The files that a format makes of a data set; each format has a class below it. Some errors of the data set are known only
+    while it writes. They are raised as UserError, and leave nothing written.
     """
 
     def __init__(self, dataset: Dataset, *options: Any) -> None:
@@ -92,8 +92,8 @@ class Tree(ABC):
 
     @abstractmethod
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """What a sample adds. Samples may come in any order, in several processes; their pieces are put together in the order
-        of frames.
+        """Yield the files and pieces that a sample adds. Samples may come in any order, in several processes; their pieces are
+        joined in the order of frames.
         """
 
     def rest(self) -> Iterator[File]:
@@ -101,7 +101,7 @@ class Tree(ABC):
         yield from ()
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """How a file is put together; `counts` are the numbers of what its sections hold."""
+        """Return the parts of a file; `counts` are the numbers of items in its sections."""
         return LIST if path.endswith(".json") else LINES
 
     def notes(self) -> Iterator[str]:
@@ -110,7 +110,7 @@ class Tree(ABC):
 
 
 class Functions(NamedTuple):
-    """What a format's module has of a tree: see `viewsphere.formats.Format`."""
+    """The functions that a format's module gets from a tree: see `viewsphere.formats.Format`."""
 
     preparer: Callable[..., Callable[[Sample], list[Piece]]]
     writer: Callable[..., Any]
@@ -176,7 +176,7 @@ def _lacking_told(tree: Tree, sample: Sample) -> Generator[None]:
 
 
 def _nowhere(pieces: list[Piece]) -> None:
-    """Where pieces go that nobody wants."""
+    """Ignore pieces, for callers that need none."""
 
 
 def _expected(tree: Tree, add: Callable[[list[Piece]], None]) -> Iterator[Expected]:
@@ -242,7 +242,7 @@ class _Collected:
 
 
 def _different(wanted: Path, found: Path) -> Iterator[Remark]:
-    """Where a file that is put together is not what it should be."""
+    """Yield the first difference between a file of joined pieces and the expected file."""
     if not found.is_file() or same_bytes(wanted, found):
         return
     with open_file(wanted) as ours, open_file(found) as theirs:

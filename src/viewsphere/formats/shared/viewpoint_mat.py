@@ -29,7 +29,7 @@ NAMES = r"[A-Za-z][A-Za-z0-9_]{0,62}"
 """Of variables and fields in MATLAB."""
 
 KIT = "PASCAL/VOCdevkit/VOC2012"
-"""Where PASCAL3D+ has what it takes of PASCAL VOC."""
+"""The folder in which PASCAL3D+ keeps its files from PASCAL VOC."""
 
 OWN = ("vertices", "faces", "pnames")
 """Fields of a CAD model that are no points."""
@@ -50,7 +50,7 @@ SQUARE = 1e-9
 
 
 class Options(Frozen):
-    """What is told of objects."""
+    """The optional data of objects."""
 
     anchors: bool = Field(default=True, description="the models' named points (the label `keypoints`) as anchors")
 
@@ -70,13 +70,15 @@ def no_viewpoints(scope: Scope) -> Iterator[str]:
 
 
 def _oblong(lens: Intrinsics) -> str:
-    """What of a lens has no square pixels, as text; empty for one that has."""
+    """Return the text of the lens numbers that make pixels not square; empty for a lens with square pixels."""
     is_square = not lens.skew and math.isclose(lens.fx, lens.fy, rel_tol=SQUARE)
     return "" if is_square else f"fx {lens.fx:g}, fy {lens.fy:g}, skew {lens.skew:g}"
 
 
 def scipy_io(name: str) -> Any:
-    """What writes .mat files; raises MissingExtraError, for a format of this name, where it is not installed."""
+    """Return the module that writes .mat files; raises MissingExtraError, for a format of this name, where it is not
+    installed.
+    """
     try:
         from scipy import io
     except ImportError:
@@ -242,8 +244,8 @@ def _said(source: Mapping[str, Any], anchors: int) -> Any:
 
 
 def _viewpoint(o: ObjectAnnotation, sample: Sample, place: NDArray[np.float64], anchors: int) -> dict[str, float]:
-    """How a camera sees a model's origin, which is at `place` in its axes; distance 0, as of what nobody has measured, of one
-    behind it.
+    """Return the view of a model's origin, which is at `place` in the camera's axes. The distance of an origin behind the
+    camera is 0, like an unmeasured one.
     """
     ahead = bool(place[2] > 0)
     x, y, z = transform(sample.camera.K, place).tolist()

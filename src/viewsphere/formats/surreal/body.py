@@ -39,7 +39,9 @@ _FINGER = re.compile(r"thumb|index|middle|ring|pinky")
 
 
 def joints(names: Sequence[str]) -> tuple[Naming, NDArray[np.intp]]:
-    """Whose names these are, and the places in them of the 24 joints; raises ValueError, which says what lacks."""
+    """Return the naming of a person's joints, and the places of the 24 joints in `names`; raises ValueError with the missing
+    joints.
+    """
     places = {_plain(name): i for i, name in reversed([*enumerate(names)])}
     lacking = {naming: [name for name in naming if _plain(name) not in places] for naming in NAMINGS}
     best = min(NAMINGS, key=lambda naming: len(lacking[naming]))

@@ -97,7 +97,7 @@ class Surreal(Tree):
         return (mat()[:HEAD], "")
 
     def rest(self) -> Iterator[File]:
-        """What is of whole clips."""
+        """Yield the files of whole clips."""
         last = ""
         for key, places in self.dataset.shots():
             first = self.dataset.sample_at(key, places[0])
@@ -125,7 +125,7 @@ class Surreal(Tree):
         return Clip(path, number + 1, samples, tuple(own), place)
 
     def _strange(self, sample: Sample, first: Sample, place: int) -> str:
-        """What of a sample SURREAL cannot hold; empty for one that it can."""
+        """Return the reason why SURREAL cannot hold a sample; empty where it can."""
         now, then, start = sample.camera, first.camera, first.instant - first.instant % MOST
         if sample.instant != start + place:
             return f"all instants of a clip from {start} on; found {sample.instant} in place of {start + place}"
@@ -191,7 +191,7 @@ class Surreal(Tree):
 
 
 def film_encoder() -> Encoder:
-    """What writes videos; raises MissingExtraError where there is no ffmpeg."""
+    """Return the video encoder; raises MissingExtraError where there is no ffmpeg."""
     return encoder("format surreal", "")
 
 

@@ -58,7 +58,7 @@ MOST = 5
 
 
 class Options(Frozen):
-    """Whose sequences they look like."""
+    """The benchmark whose sequences the export resembles."""
 
     kind: Literal["tum", "icl-nuim"] = Field(
         default="tum", description="`tum`: right-handed, files by seconds; `icl-nuim`: mirrored, files by frames"

@@ -65,7 +65,7 @@ BACKWARD = ("backwardFlow", "backwardSceneFlow")
 
 
 class Options(Frozen):
-    """Which Virtual KITTI, and of what weather."""
+    """The version of Virtual KITTI, and its weather."""
 
     version: Literal["1.3.1", "2"] = Field(default="2", description="of the tree: one camera, or two and more maps")
     variation: str | None = Field(
@@ -78,7 +78,7 @@ class Options(Frozen):
 
 
 def needs(options: Options) -> tuple[str, ...]:
-    """Who moves, and what version 2 has more."""
+    """Return the motion of objects, and the additional channels of version 2."""
     return ("velocity", *(("flow_backward", "scene_flow", "scene_flow_backward") if options.version == "2" else ()))
 
 

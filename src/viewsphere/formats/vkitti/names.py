@@ -44,7 +44,7 @@ STUFF = {
     "vehicle": "Car",
     **dict.fromkeys(("wall", "door", "window"), "Building"),
 }
-"""What stuff is there; all else is Misc."""
+"""The names of the stuff in Virtual KITTI; all else is Misc."""
 
 THINGS = {name.casefold(): name for name in ("Car", "Van", "Truck")}
 

@@ -44,7 +44,7 @@ UNKNOWN = "Unknown"
 
 
 class Stand(NamedTuple):
-    """Where a box stands and how it is turned: the middle of its bottom, then rotation about y, x and z, radians."""
+    """The position and rotation of a box: the middle of its bottom, then rotation about y, x and z, radians."""
 
     place: tuple[float, float, float]
     turns: tuple[float, float, float]
@@ -61,7 +61,7 @@ def extrinsics(camera: Camera) -> list[float]:
 
 
 def stand(axes: Float, bottom: Float) -> Stand:
-    """How an object stands in axes whose y points down; `axes`: from its model's to these."""
+    """Return the stand of an object in axes whose y points down; `axes` transforms from its model's axes to these."""
     turned = product(axes, UPRIGHT)
     x = math.asin(max(-1.0, min(1.0, -float(turned[1, 2]))))
     y = math.remainder(math.atan2(turned[0, 2], turned[2, 2]) - math.pi / 2, 2 * math.pi)
@@ -70,12 +70,12 @@ def stand(axes: Float, bottom: Float) -> Stand:
 
 
 def in_camera(o: ObjectAnnotation) -> Stand:
-    """How an object stands in the camera's axes."""
+    """Return the stand of an object in the camera's axes."""
     return stand(o.camera_from_object[:3, :3], o.box3d_camera[:4])
 
 
 def in_world(o: ObjectAnnotation) -> Stand:
-    """How an object stands in the world whose y points down."""
+    """Return the stand of an object in the world whose y points down."""
     return stand(product(OURS.T, o.world_from_object[:3, :3]), product(o.box3d[:4], OURS))
 
 
@@ -99,7 +99,7 @@ def moves(o: ObjectAnnotation) -> bool:
 
 
 def texts(sample: Sample, camera: int) -> dict[str, bytes]:
-    """What a frame adds to version 2's texts, but for `info` and `colors`."""
+    """Return the lines that a frame adds to version 2's texts, but for `info` and `colors`."""
     k, at = sample.camera.intrinsics, (sample.instant, camera)
     found = {
         "intrinsic": line(*at, k.fx, k.fy, k.cx - 0.5, k.cy - 0.5),
@@ -116,7 +116,7 @@ def texts(sample: Sample, camera: int) -> dict[str, bytes]:
 
 
 def tracked(sample: Sample, names: Names) -> bytes:
-    """What a frame adds to version 1.3.1's tracks."""
+    """Return the lines that a frame adds to version 1.3.1's tracks."""
     rows = b""
     for o, (left, right, top, bottom), share in seen(sample):
         here, name = in_camera(o), names.things[o.category]
@@ -139,7 +139,9 @@ def word(text: str) -> str:
 
 
 def infos(sample: Sample, names: Names) -> Iterator[str]:
-    """What is told once of each object of a sequence, whether it is seen or not, after a mark."""
+    """Yield the model and the colour of each object of a sequence, seen or not, after a mark; the writer writes each text
+    once.
+    """
     for o in sample.objects:
         yield f"={o.id - 1} {names.things[o.category]} {' '.join(looks(o))}"
 

@@ -73,13 +73,13 @@ class _Object:
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All pictures and annotations of a folder with `Annotations` and `JPEGImages`, or of one that has VOCdevkit/VOC<year>; and
-    of what supervision (`annotations`, `images`) and FiftyOne (`labels`, `data`) write.
+    """Return every picture and annotation of a folder with `Annotations` and `JPEGImages`, or with VOCdevkit/VOC<year>. It also
+    reads the folders of supervision (`annotations`, `images`) and FiftyOne (`labels`, `data`).
 
-    Boxes count from 1 and end with their last pixel, as VOC's; where any begins before 1, all count from 0, as datumaro's and
-    FiftyOne's do, and end behind it.
+    Boxes count from 1 and end with their last pixel, as in VOC. Where any begins before 1, all count from 0 and end behind
+    their last pixel, as datumaro's and FiftyOne's do.
 
-    Raises StoreError with every mistake: pictures and annotations that are missing or outside, and broken objects; with
+    Raises StoreError with every mistake: pictures and annotations that are missing or outside, and broken objects. With
     `keep_going` these are left out and reported.
     """
     kit = _kit(path)

@@ -34,7 +34,7 @@ TRUNCATED, OCCLUDED = 0.15, 0.05
 
 
 class Options(Frozen):
-    """How pictures are kept, and which objects count as difficult."""
+    """The encoding of pictures, and the limit below which objects are difficult."""
 
     pictures: Literal["jpg", "png"] = Field(
         default="jpg",

@@ -12,14 +12,16 @@ NAMES = "obj.names"
 """Darknet's file of classes, a line each (https://github.com/AlexeyAB/darknet#how-to-train-to-detect-your-custom-objects)."""
 
 DARKNET = "data/"
-"""How paths in its lists begin: they are told from the program's folder, and this is the data set's."""
+"""The beginning of paths in Darknet's lists. They are relative to the program's folder, and this is the data set's folder
+there.
+"""
 
 IMAGES = "images"
 
 
 def darknet(file: Path) -> dict[str, Any]:
-    """What a data.yaml would say of a folder with `obj.names` and lists of pictures: `<split>.txt`, or `images.txt`, as
-    FiftyOne writes it. Raises StoreError where the names cannot be read.
+    """Return a data.yaml for a folder with `obj.names` and lists of pictures: `<split>.txt`, or `images.txt`, which FiftyOne
+    writes. Raises StoreError where the names cannot be read.
     """
     try:
         names = [line.strip() for line in text_of(file) if line.strip()]

@@ -22,8 +22,8 @@ MOST_POINTS = 1000
 
 @dataclass(frozen=True)
 class Kind:
-    """What data.yaml says of points: their names (their numbers where it has none), how many numbers each has (2: x, y, or 3:
-    and whether it is seen), and which of them change places in a mirror image.
+    """The properties of points in data.yaml: their names (their numbers where it has none), the numbers of each point, and
+    their swaps in a mirror image. A point has 2 numbers, x and y, or 3, with its visibility.
     """
 
     names: tuple[str, ...] = ()
@@ -42,7 +42,7 @@ class Row:
 
 
 def kind_of(told: Mapping[str, Any], file: Path) -> Kind:
-    """What a data.yaml says of points; raises StoreError for what is none."""
+    """Return the properties of points in a data.yaml; raises StoreError for invalid ones."""
     shape, flips, names = told.get("kpt_shape"), told.get("flip_idx") or [], told.get("kpt_names") or {}
     if shape is None:
         return Kind()
@@ -63,7 +63,7 @@ def _whole(values: Any) -> bool:
 
 
 def parsed_line(text: str, kind: Kind, classes: int) -> Row:
-    """What a line says; raises ValueError for one that says nothing."""
+    """Return the row of a line; raises ValueError for an invalid line."""
     try:
         number, *values = map(float, text.split())
     except ValueError:

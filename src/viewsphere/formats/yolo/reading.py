@@ -34,11 +34,11 @@ LARGEST_FILE = 10_000_000
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
-    """All pictures and labels of a folder with data.yaml, or of one such file: what viewsphere.formats.yolo says. A folder with
-    obj.names and lists, as Darknet has them, and a data.yaml that names no splits, beside `images`, are read, too.
+    """Return every picture and label of a folder with data.yaml, or of one such file, as viewsphere.formats.yolo describes. It
+    also reads a folder with obj.names and lists, as Darknet has them, and a data.yaml that names no splits, beside `images`.
 
     Raises StoreError with every mistake: splits and pictures that are missing or outside, broken lines, classes that have no
-    name; with `keep_going` these are left out and reported.
+    name. With `keep_going` these are left out and reported.
     """
     file = _described(path)
     told = _load(file)
@@ -161,7 +161,7 @@ def _unpictured(root: Path, relative: str, problems: list[str]) -> Iterator[str]
 
 
 def _labels_of(picture: str) -> str:
-    """Where a picture's labels lie: the last folder `images` of its path becomes `labels`."""
+    """Return the path of a picture's labels: the last folder `images` of its path becomes `labels`."""
     head, images, tail = f"/{picture}".rpartition("/images/")
     return str(PurePosixPath(f"{head}/labels/{tail}" if images else f"/{picture}").with_suffix(".txt"))[1:]
 

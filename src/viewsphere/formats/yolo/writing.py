@@ -22,7 +22,7 @@ STATES = {0: 2, 1: 1}  # of our keypoints; outside and behind the camera are not
 
 
 class Options(Frozen):
-    """What is labelled."""
+    """The labels that the export writes."""
 
     task: Literal["detect", "segment", "pose", "obb"] = Field(
         default="detect",
@@ -82,7 +82,9 @@ class Yolo(Tree):
         return " ".join([str(self._classes[o.category_id]), *(f"{value:.8g}" for value in numbers)])
 
     def _marked(self, o: ObjectAnnotation, size: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        """All points, (N, 3): x, y, v; 0 0 0 for those that the object does not have, or that are not in the picture."""
+        """Return every point, (N, 3): x, y, v; 0 0 0 for points that the object does not have, or that are outside the
+        picture.
+        """
         found = np.zeros((len(self._points), 3))
         if "keypoint_names" not in o.more:  # imported, as a box alone
             return found
