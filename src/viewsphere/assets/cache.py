@@ -136,7 +136,9 @@ def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = Non
 
 
 def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) -> Any:
-    """What `ask` says of a file, plain data, and which files it read for it; from the cache as long as they stay the same."""
+    """Return the plain data that `ask` computes from a file, from the cache while the file stays the same. `ask` also returns
+    the files that it read; these must stay the same, too.
+    """
     try:
         with open_file(path) as file:
             own = hashlib.file_digest(file, "sha256").hexdigest()
@@ -195,7 +197,7 @@ def _zoo_facts(spec: ModelSpec, mesh: Mesh) -> FileFacts:
 
 
 def cache_folder() -> Path:
-    """Where models are cached: `$VIEWSPHERE_CACHE/models`, else in the user's cache folder."""
+    """Return the folder of cached models: `$VIEWSPHERE_CACHE/models`, else in the user's cache folder."""
     return cache_of("models")
 
 

@@ -30,5 +30,5 @@ class Timeline:
 
 
 def no_animation(file: object) -> str:
-    """What is wrong with a file that is to play an animation, and in which nothing moves; it follows the recipe's field."""
+    """Return the error for a file without motion that is to play an animation; the text follows the recipe's field."""
     return f"expected a file in which something moves; found no animation in {file}"

@@ -112,7 +112,7 @@ def _default_spec(path: Path) -> ModelSpec:
 
 
 def _animation(spec: ModelSpec, build: Build | None) -> tuple[Timeline | None, tuple[str, ...]]:
-    """When the file's animations begin and end, and why that is not known."""
+    """Return the times of the file's animations, and the reasons why the times are unknown."""
     if spec.source.startswith(ZOO):
         built = None if build is None else build(spec)
         return _animation(in_file(spec, built), None) if isinstance(built, Path) else (None, ())

@@ -70,7 +70,7 @@ def placed(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, Fil
 def _placing_of(
     mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, FileFacts] | None
 ) -> tuple[Float, float, Float, tuple[str, ...]]:
-    """How the file's axes are turned (3, 3), and what `_placing` says of its first frame."""
+    """Return the rotation (3, 3) of the file's axes, and the result of `_placing` for the file's first frame."""
     turn = rotation(*axes(spec, facts), str(facts.path))
     return turn, *_placing(mesh if first is None else first[0], turn, facts, spec)
 

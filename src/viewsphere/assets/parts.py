@@ -22,9 +22,10 @@ OWN_SLASH = "\u2215"
 
 
 def taken(mesh: Mesh, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
-    """What `spec.parts` says of a whole model's mesh at a time step, with the materials and images that it uses.
+    """Return the parts of a whole model's mesh that `spec.parts` selects at a time step, with the materials and images that
+    they use.
 
-    Raises ModelError where that is nothing.
+    Raises ModelError where the selection is empty.
     """
     assert spec.parts is not None
     chosen = is_taken(mesh.parts, spec.parts)[mesh.triangle_part]

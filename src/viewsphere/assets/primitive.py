@@ -34,13 +34,13 @@ FAR = 1e3
 
 @dataclass(frozen=True)
 class FileFacts:
-    """What a file, or its format's specification, says about its axes and its unit.
+    """The facts that a file, or its format's specification, gives about its axes and its unit.
 
-    `unit` is metres in one unit of the file. The raw mesh's vertices plus `origin` are the file's
-    coordinates: it is zero unless the model lies so far away that float32 would lose its shape. `size` are the
-    extents along the file's own x, y and z, in its unit. `files` are all files read or looked for. `keypoints` are points that
-    the file names, in its coordinates; `marks` are objects that say what they are. `object_from_file` takes the file's
-    coordinates to the object's, once it is normalised.
+    `unit` is metres in one unit of the file. The raw mesh's vertices plus `origin` are the file's coordinates. `origin` is zero
+    unless the model is so far away that float32 would lose its shape. `size` are the extents along the file's own x, y and z,
+    in its unit. `files` are every file that the reader read or searched for. `keypoints` are points that the file names, in its
+    coordinates. `marks` are objects that state their purpose. `object_from_file` transforms the file's coordinates to the
+    object's, once it is normalised.
     """
 
     path: Path
@@ -260,7 +260,7 @@ def _normals(
 
 
 def _is_direction(vectors: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Which of the vectors (N, 3) are long enough to be directions, (N,) bool; False for NaN."""
+    """Return a mask (N,) of the vectors (N, 3) that are long enough to be directions; False for NaN."""
     return np.linalg.norm(vectors, axis=1) > 1e-12
 
 

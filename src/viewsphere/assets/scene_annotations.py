@@ -1,4 +1,4 @@
-"""What objects of a file are to those who are put among them: a floor, a surface, a lane, or things in a room."""
+"""Annotations of a file's objects for the objects placed among them: a floor, a surface, a lane, or things in a room."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ PROPERTY = "viewsphere"
 FLOOR, LANE, SURFACE, INDOORS = KINDS = ("floor", "lane", "surface", "indoors")
 
 NAMED = re.compile(rf"({FLOOR}|{LANE}|{SURFACE})(?![^\W\d_])", re.IGNORECASE)
-"""How the name of an object begins that is one of these; `surfaces` and `lanes` are other words."""
+"""The beginning of the name of an annotated object; `surfaces` and `lanes` are other words."""
 
 BLENDERS_NUMBER = re.compile(r"\.\d{3,}$")
-"""What Blender adds to a name that is taken."""
+"""The number that Blender appends to a name that exists already."""
 
 Point = tuple[float, float, float]
 Edge = tuple[int, int]
@@ -40,8 +40,9 @@ class Mark:
 
 @dataclass(frozen=True)
 class Marker:
-    """What a reader knows of an object: its name and custom properties, its part of the mesh (empty without triangles), the
-    points and edges of its lines, the places of its children that have no triangles by name, and whether others are below it.
+    """A reader's facts about an object: its name and custom properties, and its part of the mesh (empty without triangles).
+    Also: the points and edges of its lines, and the places by name of its children without triangles. `is_group`: other
+    objects are below it.
     """
 
     name: str
@@ -54,7 +55,9 @@ class Marker:
 
 
 def kind_of(name: str, said: Any = None) -> str:
-    """What an object is by its custom property, in lower case, as it stands there, else by its name; empty for nothing."""
+    """Return an object's kind: its custom property in lower case, valid or not, else the kind in its name. Empty without
+    either.
+    """
     if said not in (None, ""):
         return str(said).strip().lower()
     found = NAMED.match(name)
@@ -62,8 +65,8 @@ def kind_of(name: str, said: Any = None) -> str:
 
 
 def own_name(name: str) -> str:
-    """What a marked object is called in recipes: its name in lower case, without what it is and without Blender's number;
-    `lane` where nothing is left of `Lane.001`.
+    """Return the name of an annotated object in recipes: its name in lower case, without its kind and without Blender's number.
+    `Lane.001` gives `lane`, as nothing else is left.
     """
     plain = BLENDERS_NUMBER.sub("", name)
     return NAMED.sub("", plain, 1).strip(" ._-:").lower() or plain.strip().lower()
@@ -75,8 +78,8 @@ def naturally(name: str) -> tuple[Any, ...]:
 
 
 def mark_of(marker: Marker) -> Mark | None:
-    """What the object is; None for nothing. An object is a floor or surface by its name alone only where it has triangles,
-    which the mesh's parts say, and a lane only where it is a line, or has none.
+    """Return the annotation of an object; None without one. A name alone makes an object a floor or surface only where it has
+    triangles, which the mesh's parts show. It makes a lane only of a line, or of an object without triangles.
     """
     said = marker.said.get(PROPERTY)
     kind = kind_of(marker.name, said)

@@ -1,4 +1,4 @@
-"""Which Python has Blender, and whether it works."""
+"""The search for a Python that has Blender, and the test that it works."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def _module(python: Path) -> str | None:
 
 
 def _ldd(module: str | None) -> str:
-    """What Linux's `ldd` prints about a shared object's libraries."""
+    """Return the output of Linux's `ldd` about a shared object's libraries."""
     ldd = shutil.which("ldd")
     if module is None or ldd is None or not sys.platform.startswith("linux"):
         return ""

@@ -48,7 +48,7 @@ PREFIX = "viewsphere-blender-"
 TAIL_BYTES, TAIL_LINES = 4096, 6
 
 SHELLS_SIGNALS = 128
-"""What a shell adds to the number of a signal to make an exit status of it (POSIX, "Exit Status for Commands")."""
+"""The number that a shell adds to a signal's number to make an exit status (POSIX, "Exit Status for Commands")."""
 
 
 class BlenderProcess:

@@ -34,7 +34,7 @@ def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, A
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Check that every pose is rigid, and that the picture's own pose is the identity."""
+    """Yield an error unless every pose is rigid, and the picture's own pose is the identity."""
     poses = sample.camera_from_sensors
     turns = poses[:, :3, :3]
     if np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max() > TOLERANCE:

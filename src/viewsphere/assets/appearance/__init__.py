@@ -1,1 +1,1 @@
-"""What surfaces look like: colour words, physically based materials, coverage, repainting."""
+"""The appearance of surfaces: colour words, physically based materials, coverage, repainting."""

@@ -14,7 +14,7 @@ Float = NDArray[np.float64]
 
 _RIGHT = np.array([[0, 1, 0], [0, -1, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0], [-1, 0, 0]], np.float64)
 _UP = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 1, 0], [0, 1, 0]], np.float64)
-"""What is right and up for who looks at the sides +x, -x, +y, -y, +z, -z of a box."""
+"""The right and up directions of a viewer that faces the sides +x, -x, +y, -y, +z, -z of a box."""
 
 _GOLDEN = 0.6180339887498949
 

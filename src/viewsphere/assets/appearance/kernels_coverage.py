@@ -1,4 +1,4 @@
-"""Which texels triangles cover."""
+"""Kernels that find the texels that triangles cover."""
 
 import math
 
@@ -25,7 +25,7 @@ def add_triangles(steps, corners):
 
 @inner
 def _crossing(triangle, y):
-    """Where a horizontal line enters and leaves a triangle that it meets."""
+    """Return the x at which a horizontal line enters a triangle that it meets, and the x at which it leaves."""
     left, right = math.inf, -math.inf
     for i in range(3):
         ax, ay = triangle[i]

@@ -1,4 +1,4 @@
-"""What a mesh looks like: its surface in patches of one basic colour and one material, and the words for all of it."""
+"""The appearance of a mesh: its surface in patches of one basic colour and one material, and the words for the whole."""
 
 from __future__ import annotations
 
@@ -62,7 +62,9 @@ PLASTIC = 1.32471795724474602596
 
 
 def looks_of(mesh: Mesh, color: str | None = None, material: str | None = None) -> Looks:
-    """What a mesh looks like from around and above; `color` and `material` are words that somebody said of it."""
+    """Return the appearance of a mesh from around and above; `color` and `material` are the words that its spec or sidecar
+    gives.
+    """
     normals = face_normals(mesh.vertices.astype(np.float64), mesh.triangles)
     areas = np.sqrt((normals**2).sum(axis=1)) / 2
     if not areas.any():
@@ -91,7 +93,7 @@ def _spread(areas: Float) -> tuple[NDArray[np.int64], Float]:
 
 
 def _seen(places: Float, normals: Float) -> Float:
-    """How much of the surface around each point (N,) is seen from `DIRECTIONS` together, if it faces any of them."""
+    """Return the visible amount of the surface around each point (N,) from `DIRECTIONS` together, if it faces any of them."""
     step = float(np.sqrt((np.ptp(places, axis=0) ** 2).sum())) / CELLS or 1.0
     weights = np.zeros(len(places))
     for right, up, back in DIRECTIONS:

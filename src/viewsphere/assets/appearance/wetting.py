@@ -10,7 +10,7 @@ from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.model.classes import STUFF_IDS, stuff_of
 
 UPRIGHT = 0.35
-"""How wet walls are beside what faces up."""
+"""The wetness of walls as a share of the wetness of surfaces that face up."""
 
 UP = 0.5
 """z of a normal from which on a surface faces up."""
@@ -25,7 +25,7 @@ FILM = 0.5
 """Share of a soaked rough surface that a film covers."""
 
 LEAVES = 0.6
-"""How wet plants are beside what faces up."""
+"""The wetness of plants as a share of the wetness of surfaces that face up."""
 
 GREEN = {STUFF_IDS["grass"], STUFF_IDS["vegetation"]}
 """Classes of plants."""

@@ -20,7 +20,7 @@ Part = tuple[int, Field]
 """A part's number, and one of its primitives."""
 
 FROM_GLTF = np.array([0, 2, 1]), np.array([1, -1, 1], np.float32)
-"""Which of glTF's axes are the object's, and their signs."""
+"""The axis of glTF for each of the object's axes, and their signs."""
 
 
 def read_exported(file: Path, parts: Sequence[str], node: str | None = None, *, whole: bool = False) -> Mesh:
@@ -67,7 +67,7 @@ def read_exported(file: Path, parts: Sequence[str], node: str | None = None, *, 
 
 
 def _read_images(document: Document) -> None:
-    """All images in the file's order, so that they keep their numbers."""
+    """Read every image in the file's order, so that images keep their numbers."""
     for i, entry in enumerate(document.root.items("images")):
         data, _ = document.view(entry.integer("bufferView"))
         document.folder.image(f"#{i}", entry.text("name"), bytes(data))
@@ -90,7 +90,7 @@ def _meshes(document: Document, step: Field | None) -> Sequence[Field]:
 
 
 def _primitives(document: Document, meshes: Sequence[Field], parts: Sequence[str]) -> Iterator[Part]:
-    """All primitives in order; meshes are the parts that have triangles."""
+    """Yield every primitive in order; meshes are the parts that have triangles."""
     part = -1
     for mesh in meshes:
         name = mesh.text("name")

@@ -17,8 +17,8 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """How joints are turned: `turns` (J, 3, 3) about each joint, in the axes of the joint above it, which are those of the mesh
-    in the bind pose; `root` (3,) is where the first joint is, metres.
+    """The rotations of joints: `turns` (J, 3, 3) about each joint, in the axes of the joint above it. These are the axes of the
+    mesh in the bind pose. `root` (3,) is the position of the first joint, metres.
     """
 
     turns: Float
@@ -51,7 +51,7 @@ class RiggedModel:
     clips: Mapping[str, Clip]
 
     def posed(self, pose: Pose) -> Float:
-        """Where the joints are (J, 3) in a pose."""
+        """Return the positions (J, 3) of the joints in a pose."""
         return joints_at(self.places, self.above, pose)[:, :3, 3]
 
 

@@ -40,7 +40,9 @@ from viewsphere.model.symmetries import Continuous, Symmetries
 Float = NDArray[np.float64]
 
 ORDERS = tuple(range(2, 17))
-"""How often a turn may be repeated until the model is as it was. A prism of more sides is round, as far as `TOLERANCE` goes."""
+"""The numbers of equal turns that make a full turn of a model onto itself. A prism of more sides counts as round within
+`TOLERANCE`.
+"""
 
 PRIMES = {13: 1, 11: 1, 7: 1, 5: 8, 3: 12, 2: 18}
 """An axis of any of these orders has a turn of one of these, for which the search looks; and the most axes with such a turn
@@ -75,10 +77,10 @@ icosahedron, which has the most axes of one order. Without a limit, a nearly rou
 
 
 def find(surface: Surface) -> Symmetries:
-    """All symmetries of a surface (within `TOLERANCE`), in object axes and metres.
+    """Return every symmetry of a surface (within `TOLERANCE`), in object axes and metres.
 
-    A ball has the three axes of the object as continuous ones; anything else that is round has one, and one half turn if its
-    ends are alike. All else has its rotations, by axes: the largest group of them that holds all its products.
+    A ball has the three axes of the object as continuous axes. Any other round surface has one axis, and one half turn if its
+    ends are alike. Every other surface has its rotations, by axes: the largest group that holds all its products.
     """
     usual, lines = usual_axes(surface), list[Line]()
     round_ones = list(lines_around(surface, usual, [GOLDEN * i for i in (1, 2, 3)], lines, _as_round))
@@ -130,7 +132,7 @@ def _fittest(surface: Surface, lines: Sequence[Line]) -> Iterator[Float]:
 
 
 def lacking(surface: Surface, declared: Symmetries) -> Iterator[str]:
-    """What a model lacks of declared symmetries: the fields, and what was found instead."""
+    """Yield an error for each declared symmetry that a model lacks: the field, and the measured deviation."""
     limit = TOLERANCE * surface.diameter
     for name, values in (("discrete", declared.discrete), ("continuous", declared.continuous)):
         for i, value in enumerate(values):
@@ -166,7 +168,7 @@ def _whole(lines: Sequence[Line]) -> Sequence[Line]:
 
 
 def _turned(surface: Surface, lines: Sequence[Line]) -> Symmetries:
-    """What is round around one line, or around more than one and so around all."""
+    """Return the symmetries of a surface that is round around one line, or around several lines and so around every line."""
     line = lines[0]
     offset = _metres(surface, surface.center if len(lines) > 1 else line.offset)
     if len(lines) > 1:

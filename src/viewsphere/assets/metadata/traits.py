@@ -1,4 +1,4 @@
-"""What a model says of itself, in the file beside it or in its own; else what is found on its surface, where that is asked."""
+"""The metadata of a model, from its sidecar or its own file; otherwise found on its surface, where the spec requests it."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ BEYOND = 0.1
 
 
 def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | None = None) -> Traits:
-    """What a normalised model says of itself at a time step (None: as it rests), `facts` being its file's.
+    """Return the metadata of a normalised model at a time step (None: at rest); `facts` are its file's facts.
 
-    Raises ModelError, which names the sidecar and the field, for one that cannot be read, for a symmetry that the surface does
-    not have, and for points far outside of its box.
+    Raises ModelError, which names the sidecar and the field, for a sidecar that cannot be read. The same holds for a symmetry
+    that the surface does not have, and for points far outside of its box.
     """
     across = diameter(mesh.corners)
     path, sidecar = said_of(spec)

@@ -1,1 +1,1 @@
-"""Where a model's files lie: its folder, its textures, what a file name hides."""
+"""The files of a model: its folder, its textures, the parts that a path names, and files with misleading names."""

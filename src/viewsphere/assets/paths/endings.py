@@ -1,4 +1,4 @@
-"""How a process that reads a model ended without an answer, in words."""
+"""Messages for a process that read a model and ended without an answer."""
 
 from __future__ import annotations
 

@@ -158,7 +158,7 @@ class Finder:
         return self._listings[folder]
 
     def _why(self, names: list[str], folders: Iterable[Path]) -> str:
-        """Why there is no file: none exists, or the path leads outside."""
+        """Return the reason for a missing file: it does not exist, or the path leads outside."""
         outside = self.confined and not (DRIVE.match(names[-1]) or self.is_inside(self.model.parent / names[-1]))
         reason = "is outside the model's folder, not read; set confined: false to allow" if outside else "does not exist"
         nearest = self._nearest(PurePosixPath(names[-1]).name, folders)

@@ -70,7 +70,7 @@ def _run(job: Job) -> dict[str, Any]:
 
 
 def _end(job: Job, code: int, *, late: bool) -> str:
-    """Why a child ended without an outcome."""
+    """Return the reason why a child ended without an outcome."""
     if late or (code < 0 and -code == getattr(signal, "SIGXCPU", None)):
         return endings.too_slow(job.seconds)
     if code == 1 and (reason := _last_line(Path(job.folder) / LOG)):

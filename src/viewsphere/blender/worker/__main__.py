@@ -124,7 +124,7 @@ def _hello(_: dict[str, Any]) -> dict[str, Any]:
 
 
 def _devices() -> list[dict[str, str]]:
-    """All devices of this machine that this Blender can compute on, as dicts with kind and name."""
+    """Return every device of this machine that this Blender can compute on, as dicts with kind and name."""
     import _cycles
 
     found: list[dict[str, str]] = []

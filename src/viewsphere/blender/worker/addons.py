@@ -37,7 +37,7 @@ def remove_styles():
 
 
 def _trees():
-    """All node trees: groups, and those within materials, worlds, lights and scenes."""
+    """Yield every node tree: groups, and the trees within materials, worlds, lights and scenes."""
     yield from bpy.data.node_groups
     for owner in (*bpy.data.materials, *bpy.data.worlds, *bpy.data.lights, *bpy.data.scenes):
         tree = getattr(owner, "node_tree", None)
@@ -46,7 +46,7 @@ def _trees():
 
 
 def _driven():
-    """All data-blocks with drivers; shape keys, materials and meshes have their own."""
+    """Yield every data-block with drivers; shape keys, materials and meshes have their own."""
     for name in DRIVEN:
         for owner in getattr(bpy.data, name):
             if owner.animation_data is not None:

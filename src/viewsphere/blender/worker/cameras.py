@@ -1,4 +1,4 @@
-"""Where a file's camera stands, and how it sees, at frames of its animation."""
+"""The motion and the lens of a file's camera at frames of its animation."""
 
 from __future__ import annotations
 

@@ -194,7 +194,7 @@ def _layers(mesh, material):
 
 
 def _uses(told, key):
-    """All values of this name within an expression."""
+    """Return every value of this name within an expression."""
     if isinstance(told, dict):
         own = {told[key]} if isinstance(told.get(key), str) else set()
         return own.union(*(_uses(value, key) for value in told.values()))

@@ -22,7 +22,7 @@ LIGHT = (
     "Environment",
 )
 NAMES = (*LIGHT, *("".join(SHORT.get(word, word) for word in name.split()) for name in LIGHT))
-"""What these passes are called, in Blender 5 and, in the same order, before."""
+"""The names of these passes: first in Blender 5, then, in the same order, in earlier versions."""
 
 MATERIALS = ("viewsphere roughness", "viewsphere metallic")
 """Names of the passes (AOVs) of materials, and of the nodes that fill them."""
@@ -94,7 +94,7 @@ def _unlit(scene):
 
 
 def _centred(scene, least):
-    """What is to be set, by owner and name; nodes that say how opaque a surface has to be are set at once."""
+    """Return the settings to apply, as owner, name and value; sets the least opacity of surfaces in nodes at once."""
     for material in bpy.data.materials:
         node = material.node_tree.nodes.get(LEAST) if material.node_tree is not None else None
         if node is not None and node.outputs[0].default_value != least:

@@ -1,4 +1,4 @@
-"""How many frames of a file make a second: what the file itself says, or what its times are multiples of."""
+"""The frames a second of a file: the file's own rate, or the rate whose frames its times match."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import bpy
 from .playing import curves
 
 DEFAULT = 24.0
-"""What Blender takes of a file that says nothing."""
+"""The rate that Blender assumes for a file that gives none."""
 
 USUAL = (24.0, 25.0, 30.0, 50.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 48.0, 90.0, 100.0, 120.0)
 """Rates that animations are sampled at, the likeliest first."""

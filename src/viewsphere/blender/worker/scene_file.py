@@ -58,7 +58,7 @@ def _fix(one, name, value):
 
 
 def _all_curves(animation):
-    """All drivers and animation curves of an object's animation data."""
+    """Yield every driver and animation curve of an object's animation data."""
     yield from animation.drivers
     strips = (strip for track in animation.nla_tracks for strip in track.strips)
     for played in (animation, *strips):

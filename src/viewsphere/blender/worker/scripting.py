@@ -17,7 +17,9 @@ ENTRY = "shade"
 """The function that a script defines: `shade(scene, objects, shot)`."""
 
 ELSEWHERE = Matrix.Translation((1.0, 2.0, 3.0))
-"""Where the camera is when the scene is compared, and never while the script runs: so what goes with it is found, too."""
+"""The position of the camera during the comparison of scenes. The script never runs with this position, so the comparison also
+finds objects that follow the camera.
+"""
 
 
 def run(scene, told):
@@ -51,13 +53,13 @@ def run(scene, told):
 
 
 class _Standing:
-    """What labels depend on: of every instance of a mesh that a render shows, its place, its shape and how a camera sees it;
-    and what the camera is.
+    """The facts on which labels depend. For every instance of a mesh that a render shows, these are its place, its shape and
+    its visibility to a camera. The camera's own settings belong to them, too.
     """
 
     @classmethod
     def of(cls, scene):
-        """How the scene stands now, as a render would show it whose camera is at `ELSEWHERE`."""
+        """Return the state of the scene now, as a render would show it whose camera is at `ELSEWHERE`."""
         made, resting = cls(scene), scene.camera.matrix_world.copy()
         scene.camera.matrix_world = ELSEWHERE
         evaluate(scene, made)
@@ -97,7 +99,7 @@ class _Standing:
 
 
 def _seen(one, layer):
-    """How a camera and the pass of indices see an object, and what viewsphere knows it by."""
+    """Return an object's visibility to a camera and to the pass of indices, and viewsphere's identifier of it."""
     is_displaced = any(displaces(slot.material) for slot in one.material_slots)
     hidden = one.is_shadow_catcher, one.is_holdout, one.holdout_get(view_layer=layer), one.indirect_only_get(view_layer=layer)
     return one.visible_camera, *hidden, one.pass_index, one.get(ORDER), is_displaced

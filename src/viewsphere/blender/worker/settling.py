@@ -62,7 +62,7 @@ def _take_over(scene):
 
 
 def _kinds():
-    """All collections of data-blocks."""
+    """Return every collection of data-blocks."""
     return [getattr(bpy.data, p.identifier) for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
 
 
@@ -79,8 +79,9 @@ def _hold_still():
 
 
 class _Numbering:
-    """What a render shows, and whose it is. An object that is instanced for several owners of different numbers cannot have
-    all of these: its owners' instances become objects. So do particles that are born with time.
+    """The objects that a render shows, with the number of each one's owner. An object that is instanced for several owners of
+    different numbers cannot have all of these: its owners' instances become objects. So do particles that are born with
+    time.
     """
 
     def __init__(self, members):

@@ -22,9 +22,7 @@ INSIDE = {(1, 0): (0, 0), (0, 1): (-1, 0), (-1, 0): (-1, -1), (0, -1): (0, -1)}
 
 
 class Region(NamedTuple):
-    """A region that is drawn at once: the label's id, the number in the instance map, the mask (H, W), and rings (N, 2) in
-    pixels.
-    """
+    """A region that is drawn at once: label id, number in the instance map, mask (H, W), and rings (N, 2) in pixels."""
 
     label: int
     number: int

@@ -70,7 +70,7 @@ def no_viewpoints(scope: Scope) -> Iterator[str]:
 
 
 def _oblong(lens: Intrinsics) -> str:
-    """Return the text of the lens numbers that make pixels not square; empty for a lens with square pixels."""
+    """Return the numbers of a lens without square pixels, as text; empty for a lens with square pixels."""
     is_square = not lens.skew and math.isclose(lens.fx, lens.fy, rel_tol=SQUARE)
     return "" if is_square else f"fx {lens.fx:g}, fy {lens.fy:g}, skew {lens.skew:g}"
 

@@ -64,7 +64,7 @@ def needs() -> tuple[str, ...]:
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Yield every reason other than one person before one pinhole camera, and sizes that videos cannot have."""
+    """Yield the reasons why a data set is not one person before one pinhole camera, and the sizes that videos cannot have."""
     yield from refusals.sequences(scope)
     yield from unknown_shots(scope)
     yield from refusals.one_sensor(scope)

@@ -61,7 +61,9 @@ def extrinsics(camera: Camera) -> list[float]:
 
 
 def stand(axes: Float, bottom: Float) -> Stand:
-    """Return the stand of an object in axes whose y points down; `axes` transforms from its model's axes to these."""
+    """Return the position and rotation of an object in axes whose y points down; `axes` transforms from its model's axes to
+    these.
+    """
     turned = product(axes, UPRIGHT)
     x = math.asin(max(-1.0, min(1.0, -float(turned[1, 2]))))
     y = math.remainder(math.atan2(turned[0, 2], turned[2, 2]) - math.pi / 2, 2 * math.pi)
@@ -70,12 +72,12 @@ def stand(axes: Float, bottom: Float) -> Stand:
 
 
 def in_camera(o: ObjectAnnotation) -> Stand:
-    """Return the stand of an object in the camera's axes."""
+    """Return the position and rotation of an object in the camera's axes."""
     return stand(o.camera_from_object[:3, :3], o.box3d_camera[:4])
 
 
 def in_world(o: ObjectAnnotation) -> Stand:
-    """Return the stand of an object in the world whose y points down."""
+    """Return the position and rotation of an object in the world whose y points down."""
     return stand(product(OURS.T, o.world_from_object[:3, :3]), product(o.box3d[:4], OURS))
 
 
@@ -139,7 +141,7 @@ def word(text: str) -> str:
 
 
 def infos(sample: Sample, names: Names) -> Iterator[str]:
-    """Yield the model and the colour of each object of a sequence, seen or not, after a mark; the writer writes each text
+    """Yield the model and the colour of each object of a sequence, seen or not, after a mark; the export writes each text
     once.
     """
     for o in sample.objects:

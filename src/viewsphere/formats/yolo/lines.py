@@ -22,8 +22,8 @@ MOST_POINTS = 1000
 
 @dataclass(frozen=True)
 class Kind:
-    """The properties of points in data.yaml: their names (their numbers where it has none), the numbers of each point, and
-    their swaps in a mirror image. A point has 2 numbers, x and y, or 3, with its visibility.
+    """The properties of points in data.yaml: their names (their numbers where it has none), and their swaps in a mirror image.
+    `each` point has 2 numbers, x and y, or 3, with its visibility.
     """
 
     names: tuple[str, ...] = ()

@@ -61,8 +61,9 @@ def timeline(document: Document, clip: str | None, fps: float | None) -> dict[st
 
 
 def posed(document: Document, clip: str | None, seconds: float) -> Posed:
-    """Where an animation has the nodes that it moves so many seconds after its beginning; before its first key and after its
-    last as there. Without `clip` each node plays the first that moves it. Raises ModelError as `timeline` does.
+    """Return the poses of an animation's nodes so many seconds after its beginning. Before its first key and after its last,
+    the pose is that of the key. Without `clip` each node plays the first animation that moves it. Raises ModelError as
+    `timeline` does.
     """
     nodes: dict[int, dict[str, Float]] = {}
     for animation, channel, target in _channels(document, clip):

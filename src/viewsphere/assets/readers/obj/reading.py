@@ -141,7 +141,7 @@ class _Source:
 
 
 def _whole(folder: ModelFolder, source: _Source) -> tuple[Primitive, Int]:
-    """All triangles as one piece, and the face of each."""
+    """Return every triangle as one piece, and the face of each."""
     positions, colors = _vertices(folder, source)
     uv = np.nan_to_num(_padded(_rows(folder, source, "vt", 1, 2), 2, 0.0))
     vectors = _padded(_rows(folder, source, "vn", 3, 3), 3, np.nan)
@@ -203,7 +203,7 @@ def _corner_indices(folder: ModelFolder, source: _Source, tokens: list[str], tot
 
 
 def _without_faces(folder: ModelFolder, source: _Source) -> ModelError:
-    """Why a file without faces is no model."""
+    """Return the error of a file without faces."""
     if not source.v:
         return folder.error("no triangles found: no line begins with 'v', so this is no OBJ file; name a model file")
     folder.leave_out(len(source.v), "vertex")
@@ -245,7 +245,7 @@ def _rows(folder: ModelFolder, source: _Source, keyword: str, least: int, width:
 
 
 def _no_number(text: str, keyword: str, least: int) -> str:
-    """Why a statement's text is not read, and the remedy."""
+    """Return the reason why a statement's text cannot be read, and the remedy."""
     if re.fullmatch(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?", text):
         return f"{text!r} has a decimal comma; export the model with decimal points"
     return f"expected {least} or more numbers behind {keyword!r}, found {text[:40]!r}; the file may be truncated or damaged"

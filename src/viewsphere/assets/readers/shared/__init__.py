@@ -1,1 +1,1 @@
-"""What several readers need: polygons, smoothing, numbers, XML."""
+"""Code that several readers need: polygons, smoothing, numbers, XML."""

@@ -1,4 +1,4 @@
-"""How often DAE and 3MF files repeat their objects: a few lines of nested references can ask for billions."""
+"""The number of times that DAE and 3MF files repeat their objects. A few lines of nested references can request billions."""
 
 from __future__ import annotations
 
