@@ -85,7 +85,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     describes.
 
     Raises StoreError with every mistake: pictures, labels and calibrations that are missing, broken or outside, and broken
-    lines; with `keep_going` these are left out and reported.
+    lines. With `keep_going` these are left out and reported.
     """
     places = tuple(_places(path))
     if not places:

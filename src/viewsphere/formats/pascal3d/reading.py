@@ -59,7 +59,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """Return every picture of a folder with `Annotations` and `Images`, as viewsphere.formats.pascal3d describes.
 
     Raises StoreError with every mistake: records, pictures and CAD models that are missing, broken or outside, and broken
-    objects; with `keep_going` these are left out and reported.
+    objects. With `keep_going` these are left out and reported.
     """
     if not (path / "Annotations").is_dir() or not (path / "Images").is_dir():
         raise StoreError(f"{path}: expected a PASCAL3D+ data set (Annotations, Images, CAD); found no such folders")
