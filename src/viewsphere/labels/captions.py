@@ -97,8 +97,8 @@ class Captions(Frozen):
 @dataclass(frozen=True, eq=False)
 class Seen:
     """The facts that captions may state about a picture. These are the objects in the captions, the words for their appearance
-    by their ids, and the objects that have a front. The picture's size, the surroundings, and what falls or hangs in the air
-    complete them.
+    by their ids, and the objects that have a front. Also: the picture's size, the surroundings, and things that fall or hang
+    in the air.
     """
 
     told: Sequence[ObjectAnnotation]
