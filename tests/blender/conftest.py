@@ -64,7 +64,7 @@ def blenders():
     """Models and scenes are read by Blenders that stay up: a start takes longer than to read a small file."""
     kept = Blenders()
     with pytest.MonkeyPatch.context() as patch:
-        for module in ("via_blender", "scene_file"):
+        for module in ("readers.blender.reading", "scene_file"):
             patch.setattr(f"viewsphere.assets.{module}.BlenderProcess", kept.start)
         yield kept
         kept.end()
