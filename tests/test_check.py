@@ -17,6 +17,7 @@ from viewsphere.check import check
 from viewsphere.check.digests import damaged
 from viewsphere.check.frames.comparing import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
+from viewsphere.formats import native
 from viewsphere.geometry.mask import decode_rle, encode_rle
 from viewsphere.labels import Needs, channel_labels, channels, labels, labels_of, object_labels, on_request
 from viewsphere.labels._label import nothing
@@ -163,7 +164,7 @@ def test_an_export_s_proof_that_breaks_off(dataset, monkeypatch, error, message)
 
     (dataset.root / "native").mkdir()
     write_checksums(dataset.root / "native")
-    monkeypatch.setattr("viewsphere.formats.native.verify", broken)
+    monkeypatch.setattr(native, "FORMAT", native.FORMAT.model_copy(update={"verify": broken}))
     assert [(f.check, f.message) for f in check(dataset, rays=False).findings] == [("native", message)]
 
 

@@ -22,7 +22,7 @@ from installed import example, installed, write_package
 from sealing import seal_again
 from sequence_recipe import eventful_recipe
 from small import small_recipe, tree_hash
-from viewsphere import Dataset, generate, labels, plan, plugins, render
+from viewsphere import Dataset, Recipe, generate, labels, plan, plugins, render
 from viewsphere.check import check
 from viewsphere.errors import PluginError, RecipeError, UserError
 from viewsphere.formats import coco
@@ -385,18 +385,33 @@ def test_entry_points_are_read_once_and_again_where_a_package_was_installed(monk
     assert len(read) == 2
 
 
-def test_a_broken_package_is_listed_with_its_reason_and_breaks_nothing_else(small_dataset, tmp_path):
-    with installed(tmp_path / "site", "formats", "broken", "import no_such_package") as file:
+LACKING = "from viewsphere.errors import MissingExtraError\nraise MissingExtraError('broken needs foo: pip install foo')"
+
+
+@pytest.mark.parametrize(
+    ("source", "error"), [("import no_such_package", "ModuleNotFoundError"), (LACKING, "MissingExtraError: broken needs foo")]
+)
+def test_a_broken_package_is_listed_with_its_reason_and_breaks_nothing_else(small_dataset, tmp_path, source, error):
+    with installed(tmp_path / "site", "formats", "broken", source) as file:
         (found,) = (one for one in overview() if one.error is not None)
         assert (found.kind, found.name) == ("formats", "broken")
         assert found.distribution.endswith(" 1.0") and found.distribution.startswith("my_package")
-        assert found.error.startswith(f"{file}: ") and "ModuleNotFoundError" in found.error
+        assert found.error.startswith(f"{file}: ") and error in found.error
         assert "broken" not in writable_formats() and "coco" in writable_formats()
         assert all(one.name != "broken" for one in listed())
         export(small_dataset.root, ["csv"])
         assert check(small_dataset, rays=False, sample=0).ok
-        with pytest.raises(PluginError, match="broken cannot be imported: ModuleNotFoundError"):
+        with pytest.raises(PluginError, match=f"broken cannot be imported: {error}"):
             export(small_dataset.root, ["broken"])
+
+
+def test_any_material_is_one_that_is_shipped(tmp_path):
+    fields = {"models": [{"source": "zoo:car"}], "viewpoints": {"distance": 8}}
+    fields["scene"] = {"materials": [{"models": "*", "texture": "any"}]}
+    alone = Recipe(**fields)
+    with installed(tmp_path / "site", "materials", "odd", "1 / 0"):
+        assert "odd" in plugins.names("materials")
+        assert Recipe(**fields).digest == alone.digest
 
 
 def test_viewsphere_plugins_names_distributions_and_failures(tmp_path):
@@ -407,7 +422,7 @@ def test_viewsphere_plugins_names_distributions_and_failures(tmp_path):
     run = subprocess.run(command, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=DEADLINE)
     assert run.returncode == 0, run.stderr
     assert "    my_package 1.0: lines\n" in run.stdout
-    assert "    my_package 1.0: odd cannot be loaded: " in run.stdout and "ZeroDivisionError" in run.stdout
+    assert "    my_package 1.0: odd cannot be loaded:\n" in run.stdout and "ZeroDivisionError" in run.stdout
 
 
 TYPO = EXAMPLES["One row an object"]

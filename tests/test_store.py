@@ -47,7 +47,9 @@ def test_a_store_of_the_old_layout_is_one_line(tmp_path):
     store.open_for(plan_record())
     value = json.loads(store.plan_file.read_text())
     store.plan_file.write_text(json.dumps(value | {"store": 1}))
-    with pytest.raises(StoreError, match="version 1, where this viewsphere reads 3: render the recipe anew") as caught:
+    with pytest.raises(
+        StoreError, match=r"out: another viewsphere made this data set \(store version 1; this one reads 3\)\. Render its"
+    ) as caught:
         store.plan()
     assert "\n" not in str(caught.value)
     store.plan_file.write_text(plan_record().to_json().replace('"frames":1', '"frames":2', 1))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -33,6 +34,29 @@ def both(numbers):
 def test_inner_kernels_become_parts_of_those_that_call_them():
     assert both(np.arange(10.0)) == 1 + 2 * 45 + 6
     assert both(np.arange(10)) == 1 + 2 * 45 + 6  # another type of the same
+
+
+@njit
+def least_first(pair):
+    return pair.least - pair.most
+
+
+def test_tuples_whose_fields_change_places_have_entries_of_their_own(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    for fields in (("least", "most"), ("most", "least")):
+        pair = namedtuple("Pair", fields)(**{"least": 1, "most": 3})
+        assert least_first(pair) == -2
+    assert len(set(least_first._cache.names)) == 2
+    nested = namedtuple("Outer", ["pair", "number"])
+    for fields in (("least", "most"), ("most", "least")):
+        outer = nested(namedtuple("Pair", fields)(**{"least": 1, "most": 3}), 1.0)
+        assert of_outer(outer) == -2
+    assert len(set(of_outer._cache.names)) == 2
+
+
+@njit
+def of_outer(outer):
+    return outer.pair.least - outer.pair.most
 
 
 LOOK = """

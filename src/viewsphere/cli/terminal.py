@@ -192,7 +192,9 @@ def print_plugins(found: Sequence[Installed]) -> None:
             say(f"    {distribution}: {listed}")
         for one in found:
             if one.kind == kind and one.error is not None:
-                say(f"    {one.distribution}: {one.name} cannot be loaded: {one.error}")
+                say(f"    {one.distribution}: {one.name} cannot be loaded:")
+                for line in one.error.splitlines():
+                    say(f"        {line}")
 
 
 def print_status(found: Status) -> None:

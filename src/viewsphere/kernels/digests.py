@@ -57,9 +57,7 @@ def _named(source: Path) -> tuple[str, bytes]:
 
 
 def _sources(file: Path) -> frozenset[Path]:
-    """A kernel's file, the files of the kernels it can reach, those from which these import their constants, and the `records`
-    beside them: tuples that kernels are given, whose fields and names compiled code knows.
-    """
+    """A kernel's file, the files of the kernels it can reach, and those from which these import their constants."""
     reached, waiting = {file}, [file]
     while waiting:
         for name in _IMPORT.findall(read_text(waiting.pop())):
@@ -68,5 +66,4 @@ def _sources(file: Path) -> frozenset[Path]:
                 reached.add(Path(source))
                 if name.rpartition(".")[2].startswith("kernels"):
                     waiting.append(Path(source))
-    records = (source.with_name("records.py") for source in reached)
-    return frozenset(reached).union(file for file in records if file.is_file())
+    return frozenset(reached)

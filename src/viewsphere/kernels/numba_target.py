@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import hashlib
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numba
+from numba import types
 from numba.core.caching import _Cache
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompileResult
@@ -130,11 +131,20 @@ class _KernelCache(_Cache):
     def _name(self, sig: Any) -> str:
         code = self._function.__code__
         cells = dumps(tuple(cell.cell_contents for cell in self._function.__closure__ or ()))
-        about = repr((str(sig), self._options, code.co_firstlineno, code.co_code)).encode() + cells
+        about = repr((str(sig), tuple(_fields(sig)), self._options, code.co_firstlineno, code.co_code)).encode() + cells
         module = self._function.__module__.rpartition(".")[2]
         kernel = f"{module}.{self._function.__qualname__}".replace("<locals>", "locals")
         digest = hashlib.sha256(about).hexdigest()[:16]
         return f"{sources_digest(code.co_filename)}/{kernel}-{digest}{entries.SUFFIX}"
+
+
+def _fields(kinds: Any) -> Iterator[tuple[str, ...]]:
+    """The names of the fields of all named tuples among types: code depends on their order, which types do not print."""
+    for kind in kinds:
+        if isinstance(kind, types.BaseNamedTuple):
+            yield kind.fields
+        if isinstance(kind, types.BaseTuple):
+            yield from _fields(kind)
 
 
 def _slim(library: Any, *rest: Any) -> tuple[Any, ...]:

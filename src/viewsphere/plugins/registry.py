@@ -119,8 +119,6 @@ def _entered(entry: metadata.EntryPoint) -> Any:
         return entry.load()
     except PluginError as error:
         raise PluginError("\n".join(f"{_file(entry.module)}: {line}" for line in str(error).splitlines())) from error
-    except UserError:
-        raise
     except Exception as error:
         said = f"{type(error).__name__}: {error}".strip().replace("\n", " ")
         raise PluginError(f"{_file(entry.module)}: plug-in {entry.name} cannot be imported: {said}") from error

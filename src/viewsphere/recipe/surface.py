@@ -46,7 +46,8 @@ def _choice(value: Any) -> Any:
 
 
 def _each(names: Any) -> Any:
-    known = plugins.names("materials")
+    """The names with `any` replaced by the shipped materials: an installed package does not change what a recipe draws."""
+    known = tuple(name for name in plugins.names("materials") if not plugins.is_third_party("materials", name))
     if names == ANY:
         return known
     if not isinstance(names, (list, tuple)):

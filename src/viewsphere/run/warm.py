@@ -11,7 +11,7 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import JsonValue
@@ -45,9 +45,6 @@ from viewsphere.run.progress import Listener, Progress
 from viewsphere.run.stages import render_sample
 from viewsphere.store import encode
 from viewsphere.truth.shot_views import ShotViews
-
-if TYPE_CHECKING:
-    pass  # which takes a third of a worker's start
 
 SIZE = 16
 BESIDE: Matrix4 = ((1.0, 0.0, 0.0, 0.1), *IDENTITY[1:])

@@ -32,7 +32,7 @@ from viewsphere.store.shots.heartbeat import Heartbeat, Pulse
 from viewsphere.store.shots.manifest import MANIFEST, Manifest, refuse_another
 from viewsphere.store.shots.moving import move
 from viewsphere.store.shots.other_files import other_files
-from viewsphere.store.shots.records import ModelInfo, PlanRecord
+from viewsphere.store.shots.records import ModelInfo, OtherStoreError, PlanRecord
 from viewsphere.store.shots.sample_records import short_sample, whole_sample
 from viewsphere.store.shots.shot_files import ShotFiles
 from viewsphere.store.texts import parsed
@@ -85,6 +85,8 @@ class Store:
                     f"{self.root}: expected a folder that render wrote; found no such folder: check the path"
                 ) from None
             raise StoreError(f"{self.root}: expected a data set (store/plan.json), found none: render one first") from None
+        except OtherStoreError as error:
+            raise StoreError(f"{self.root}: {error}") from None
         except (KeyError, TypeError, ValueError, OSError) as error:
             raise StoreError(f"{self.plan_file}: expected a readable plan, found {type(error).__name__}: {error}") from None
 

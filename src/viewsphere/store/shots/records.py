@@ -59,6 +59,10 @@ Box3d = Annotated[NDArray[np.float64], PlainValidator(_box)]
 """Vertices (8, 3)."""
 
 
+class OtherStoreError(Exception):
+    """A store whose layout is of another version."""
+
+
 @dataclass(frozen=True)
 class Category:
     """A category of the data set; ids count from 1 in order of appearance in the recipe."""
@@ -387,10 +391,15 @@ class PlanRecord:
 
     @staticmethod
     def from_json(text: str) -> PlanRecord:
-        """The record in plan.json's text; raises KeyError, TypeError or ValueError for any other text."""
+        """The record in plan.json's text. Raises OtherStoreError for a store of another version; KeyError, TypeError or
+        ValueError for any other text.
+        """
         found = parsed(text)["store"]
         if found != STORE_VERSION:
-            raise ValueError(f"a store of version {found}, where this viewsphere reads {STORE_VERSION}: render the recipe anew")
+            raise OtherStoreError(
+                f"another viewsphere made this data set (store version {found}; this one reads {STORE_VERSION}). Render its "
+                "recipe into another folder, or delete this one"
+            )
         value = unsealed(text)
         del value["store"]
         value.pop("classes", None)  # for other readers: they follow from the categories
