@@ -2,12 +2,13 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 
 import pytest
 
-from deadline import DEADLINE
+from deadline import DEADLINE, until
 from small import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a script of bash")
@@ -82,6 +83,24 @@ def test_pip_where_there_is_no_uv(clone):
 def test_a_failure_keeps_its_status_and_words_and_is_tried_again(clone):
     assert "no such package" in installed(clone, "runtime", status=3, FAILS="1")[1]
     assert len(installed(clone, "runtime")[0]) == 2
+
+
+def test_a_signal_to_the_script_alone_ends_its_dots_and_its_command(clone):
+    (clone / "uv" / "uv").write_text(
+        '#!/bin/sh\necho $$ > "$HOME/pid.part"; mv "$HOME/pid.part" "$HOME/pid"; exec sleep 1000\n'
+    )
+    environment = {"PATH": f"{clone / 'uv'}{os.pathsep}/usr/bin{os.pathsep}/bin", "PYTHON": sys.executable, "HOME": str(clone)}
+    script = subprocess.Popen([clone / "scripts" / "setup"], env=environment | {"TMPDIR": str(clone)}, stderr=subprocess.PIPE)
+    try:
+        assert until((clone / "pid").exists)
+        script.terminate()
+        script.communicate(timeout=DEADLINE)  # returns when the dots, which hold its stderr, have ended too
+    finally:
+        script.kill()
+    assert script.returncode == 128 + signal.SIGTERM
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((clone / "pid").read_text()), 0)
+    assert not list(clone.glob("tmp.*"))
 
 
 def test_an_unknown_kind_is_named(clone):
