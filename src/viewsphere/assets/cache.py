@@ -4,7 +4,7 @@ readers change.
 An entry is two files: `<first>.arrays` lists the files that the model named when it was last read, and
 `<second>.arrays` holds the mesh. The first name is the digest of the model's bytes, its settings and the
 readers; the second adds the bytes of the files listed. So an entry is never stale, and two folders with equal
-files share it. What is not in the cache is read in a process of its own (`isolated`).
+files share it. Other models are read in a process of their own (`sandbox`).
 """
 
 from __future__ import annotations

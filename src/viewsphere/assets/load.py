@@ -66,7 +66,7 @@ def load_model(
     | pictures  | +z            | -y           | its height            | `picture`                           |
     | others    | +z            | -y           | metre                 | Blender turns and scales them       |
 
-    COLLADA: Y_UP has its front at +z, Z_UP at -y, X_UP at +z. Others are FBX, USD, Alembic and .blend (`via_blender`), of
+    COLLADA: Y_UP has its front at +z, Z_UP at -y, X_UP at +z. Others are FBX, USD, Alembic and .blend (`readers.blender`), of
     which `file.blend/Object/NAME` and `file.blend/Collection/NAME` are parts. With `confined`, files that the model names
     (textures, buffers, material libraries) are read only from its own folder and below; `shown` are objects of a .blend file
     that are read although renders do not show them; `node` names one of a glTF file below which is what is read. Raises

@@ -134,7 +134,7 @@ def png_unit(data: bytes) -> float | None:
 
 
 def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Type and content of every chunk; raises UserError where the file is damaged."""
+    """Type and content of every chunk; raises UserError if the file is damaged."""
     if not data.startswith(_SIGNATURE):
         raise UserError("PNG: expected a PNG file's first 8 bytes, found others: the file is damaged or no PNG")
     position = len(_SIGNATURE)

@@ -99,8 +99,8 @@ def projected_bounds(
     is_used: NDArray[np.bool_] | None = None,
 ) -> tuple[Bounds | None, bool]:
     """The 2D box (x0, y0, x1, y1) in pixels of triangles [faces) whose corners are world vertices [points), and whether the
-    camera sees all of the triangles. `is_used`, if known: of all vertices, whether a triangle has them. Of a scan the box goes
-    all around where triangles do, or cross its first and last column.
+    camera sees all of the triangles. `is_used`, if given: a mask of the vertices that triangles use. In a scan, the box spans
+    the full circle if the triangles do, or if they cross its first and last column.
 
     Triangles that cross the plane z = NEAR of the camera (or the limit of a distorted lens) are cut there.
     None if no part of them is in front of the camera. Under lens distortion straight edges bend; the box is

@@ -39,7 +39,7 @@ _ANNOTATION = 5  # its place among `CompileResult._reduce`'s values behind the l
 
 
 class ViewsphereCPU(CPU):
-    """The kind of target: whatever numba has for processors serves it, too."""
+    """The kind of target; all that numba offers for its own CPU target applies here, too."""
 
 
 class _Loaded(JITCodeLibrary):

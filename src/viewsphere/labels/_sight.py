@@ -94,7 +94,7 @@ EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 @dataclass(frozen=True, eq=False)
 class Alone:
     """An object as the camera would see it alone, on a canvas of three times the image's width and height: 1/s (h, w) float32
-    of `truth.visibility`, 0 where a pixel does not show it, from the pixel (left, top) on.
+    of `truth.raster.visibility`, 0 where a pixel does not show it, from the pixel (left, top) on.
     """
 
     left: int
@@ -138,7 +138,7 @@ class Sight:
     )
 
     def once(self, name: str, make: Callable[[], Made]) -> Made:
-        """Return a label's result for all objects together; `make` computes it when the first of them is labelled."""
+        """Return a label's result for all objects at once; `make` computes it for the first object."""
         if name not in self._made:
             self._made[name] = make()
         return self._made[name]
@@ -186,7 +186,7 @@ class Sight:
 
     @cached_property
     def corners(self) -> NDArray[np.float64]:
-        """The vertices of the scene before the perspective division, as `truth.visibility.homogeneous` gives them."""
+        """The vertices of the scene before the perspective division, as `truth.raster.visibility.homogeneous` gives them."""
         return homogeneous(self.geometry, self.camera) if self.visibility.corners is None else self.visibility.corners
 
     @cached_property

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def compute(sight: Sight) -> NDArray[np.float32]:
     """Distance from the camera's centre to the seen point, (H, W) metres, infinite where nothing is seen.
 
-    It is the length of the pixel's ray times 1/s of `truth.visibility`: never negative, behind a fisheye neither.
+    It is the length of the pixel's ray times 1/s of `truth.raster.visibility`: never negative, behind a fisheye neither.
     """
     length = np.linalg.norm(pixel_rays(sight.camera.intrinsics), axis=-1)
     out = np.full(length.shape, np.inf, np.float32)

@@ -23,7 +23,7 @@ STRIPES = 2
 def compute(sight: Sight) -> NDArray[np.float32]:
     """The seen point in the world's axes, (H, W, 3) metres: of objects, scenery and ground; NaN where nothing is seen.
 
-    It is the pixel's ray from the camera's centre, times 1/s of `truth.visibility`: it lies on that ray and at `depth`.
+    It is the pixel's ray from the camera's centre, times 1/s of `truth.raster.visibility`: it lies on that ray and at `depth`.
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 

@@ -149,8 +149,8 @@ def _state(sight: Sight, grid: Grid) -> NDArray[np.uint8]:
 
 
 def _slabs(camera: Camera, grid: Grid) -> Iterator[tuple[tuple[slice, slice], Float]]:
-    """Parts of the grid, `SLAB` cells at most: which steps ahead, and which cells of each; and where the cells' centres are in
-    the camera's axes, (N, 3).
+    """Parts of the grid, at most `SLAB` cells each: steps ahead, cells of each step, and the cells' centres in the camera's
+    axes, (N, 3).
     """
     ahead, up, right = grid.size
     step = transform(camera.R, grid.world_from_grid[:3, 0] * grid.cell)
@@ -165,7 +165,7 @@ def _slabs(camera: Camera, grid: Grid) -> Iterator[tuple[tuple[slice, slice], Fl
 
 
 def _along(camera: Camera, points: Float) -> Float:
-    """Return the lengths whose inverse is the 1/s of `truth.visibility`."""
+    """Return the lengths whose inverse is the 1/s of `truth.raster.visibility`."""
     x, y, z = points.T
     return np.sqrt(x * x + y * y + z * z) if has_unit_rays(camera.distortion) else np.ascontiguousarray(z)
 

@@ -110,7 +110,7 @@ class Thing(Frozen):
 
     @property
     def resting(self) -> Thing:
-        """The thing where it stands, with its model as it rests."""
+        """The thing at its place, with its model at rest."""
         return self if self.step is None else self.model_copy(update={"motion": Motion(poses=self.motion.poses)})
 
     def showing(self, step: TimeStep) -> Thing:

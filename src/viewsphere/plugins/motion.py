@@ -13,7 +13,7 @@ from viewsphere.plugins.spec import Spec, Takes
 
 
 class MotionSpec(Spec):
-    """One kind of motion, with the options that a recipe writes beside `kind`, `enter` and `leave`."""
+    """One kind of motion, with its options in recipes besides `kind`, `enter` and `leave`."""
 
     KIND: ClassVar[Kind] = "motions"
 

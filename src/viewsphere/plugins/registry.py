@@ -190,7 +190,7 @@ def _changed(path: str) -> int:
 
 
 def attribute(path: str) -> Any:
-    """A public object by its dotted path inside viewsphere: `model.recipe.Recipe`."""
+    """A public object by its dotted path inside viewsphere: `recipe.recipe.Recipe`."""
     module, _, name = path.rpartition(".")
     return getattr(importlib.import_module(f"viewsphere.{module}"), name)
 

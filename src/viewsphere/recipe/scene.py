@@ -322,9 +322,9 @@ class SceneEntry(Frozen):
             yield from ((f"blend.variants.{name}", variant) for name, variant in self.blend.variants.items())
 
     def over_time(self) -> SceneEntry:
-        """The same for sequences: what is drawn for every frame unless a recipe says otherwise is drawn once a sequence.
+        """The entry for sequences: values drawn per frame by default are drawn once a sequence.
 
-        Raises ValueError where a sequence's own scene would be drawn for every frame.
+        Raises ValueError if the recipe asks for a scene per frame.
         """
         parts: dict[str, Frozen] = {name: once_a_sequence(part) for name, part in self if isinstance(part, PerFrame)}
         if self.blend is not None:

@@ -34,8 +34,9 @@ class SmallMesh:
 
 
 def read_small(glb: Path, most: int, node: str | None = None) -> SmallMesh:
-    """A data set's exported model with at most `most` triangles and edges together, of one that deforms what a node shows;
-    ModelError as of any model file.
+    """An exported model, reduced to at most `most` triangles and edges together; of a deforming model, the shape of one node.
+
+    Raises ModelError like any reader of model files.
     """
     from viewsphere.assets.load import load_model
 

@@ -57,7 +57,7 @@ MOST_SKY = 0.8
 
 
 def model_files(key: str, frame: int | None = None) -> tuple[str, str]:
-    """Paths of a model's OBJ, at a frame of its file if it deforms, and GLB in a data set, relative to its root."""
+    """Paths of a model's OBJ and GLB, relative to the data set; a deforming model has an OBJ for each `frame` of its file."""
     return f"store/models/{key}/{step_key(key, frame)}.obj", f"store/models/{key}/{key}.glb"
 
 

@@ -79,12 +79,12 @@ class View:
 
     @cached_property
     def corners(self) -> Float:
-        """The vertices before the perspective division, from `truth.visibility.homogeneous`."""
+        """The vertices before the perspective division, from `truth.raster.visibility.homogeneous`."""
         return homogeneous(self.geometry, self.camera)
 
     @cached_property
     def boxes(self) -> NDArray[np.int32]:
-        """The pixel that each vertex is in, (n, 4), as `truth.visibility.pixels_of` says; of a pinhole."""
+        """The pixel that each vertex is in, (n, 4), as `truth.raster.visibility.pixels_of` says; of a pinhole."""
         return pixels_of(self.geometry, self.corners, (self.camera.width, self.camera.height))
 
     @cached_property
@@ -133,7 +133,7 @@ class View:
 
     @property
     def has_unit_rays(self) -> bool:
-        """Return whether s is measured along rays of length 1, see `truth.visibility.Visibility`."""
+        """Return whether s is measured along rays of length 1, see `truth.raster.visibility.Visibility`."""
         return has_unit_rays(self.camera.distortion)
 
     @property
@@ -155,9 +155,9 @@ class View:
         return tuple(replace(body, places=body.places.copy()) if body.thing.step else body for body in found)
 
     def change(self, i: int, other: View) -> Change:
-        """Return the change of thing i from this view to another: moved (or stood still), deformed, or gone.
+        """Return the change of thing i from this view to another: moved (or still), deformed, or gone.
 
-        A thing is also gone if it is not there, or is made of other triangles.
+        A thing with other triangles in the other view counts as gone.
         """
         if i >= len(other.things):
             return "gone"

@@ -131,9 +131,9 @@ class Query:
         return met
 
     def _sorted(self, table: FrameTable, objects: NDArray[np.bool_] | None) -> NDArray[np.float64]:
-        """Return the sort key of each frame, ascending; unknown keys come last.
+        """Return each frame's sort key, ascending; frames without one come last.
 
-        For a measure of objects, the key is the least value of the matching objects, or behind a minus the greatest.
+        For a measure of objects, the key is the least value of the matching objects; after a minus sign, the greatest.
         """
         measure = MEASURES[self.order.removeprefix("-")]
         sign = -1.0 if self.order.startswith("-") else 1.0

@@ -281,9 +281,7 @@ def _pillows(p: Bed, coats: _Coats, rng: np.random.Generator) -> list[Piece]:
 
 
 def surfaces(parameters: Bed) -> tuple[Surface, ...]:
-    """Return the even surfaces: the duvet between its turned-back band, or pillows, and the blanket or the foot end; and the
-    blanket's top.
-    """
+    """Return the even surfaces: the blanket's top, and the duvet from its band or pillows to the blanket or foot."""
     p, x, foot = parameters, parameters.width / 2 - 0.1, -parameters.length / 2
     low, high = foot + (0.82 if p.throw else 0.12), p.duvet_end - (p.folded or 0.08) - 0.06 - (0.15 if p.cushions else 0)
     clear = p.posts - p.top - 0.1 if p.posts else float("inf")

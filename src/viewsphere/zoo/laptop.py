@@ -77,7 +77,7 @@ class Laptop:
 
 
 def laptop(parameters: Laptop | None = None) -> Mesh:
-    """The laptop in metres: its user sits at -Y.
+    """The laptop in metres; its user sits at -Y.
 
     Parts: base, deck, keys, touchpad, port, feet, hinge, lid, bezel, screen, camera, and emblem if it has one.
     """

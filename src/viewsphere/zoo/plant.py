@@ -123,7 +123,7 @@ def _raised(solid: Solid, by: float) -> Solid:
 
 
 def _above(solid: Solid) -> Solid:
-    """The solid with what would hang below the table lying on it."""
+    """The solid, with all parts below the table raised onto it."""
     return Solid(np.maximum(solid.vertices, (-np.inf, -np.inf, 0.002)), solid.triangles)
 
 

@@ -62,8 +62,9 @@ PLASTIC = 1.32471795724474602596
 
 
 def looks_of(mesh: Mesh, color: str | None = None, material: str | None = None) -> Looks:
-    """Return the appearance of a mesh from around and above; `color` and `material` are the words that its spec or sidecar
-    gives.
+    """Return the appearance of a mesh, seen from all sides and above.
+
+    `color` and `material` are words from its spec or sidecar.
     """
     normals = face_normals(mesh.vertices.astype(np.float64), mesh.triangles)
     areas = np.sqrt((normals**2).sum(axis=1)) / 2

@@ -34,7 +34,7 @@ def is_replaceable(material: Material) -> bool:
 
 
 def made_of(material: Material, substance: Substance, first: int) -> Material:
-    """An opaque material made of a substance, whose pictures are the images from `first` on and repeat once a unit of uv."""
+    """An opaque material of this substance; its pictures are images `first` and later, one repeat per unit of uv."""
     color, rough, bumps = (Texture(first + i) for i in range(3))
     return Material(
         name=material.name,
@@ -49,7 +49,7 @@ def made_of(material: Material, substance: Substance, first: int) -> Material:
 
 
 def scaled(material: Material, metres: float) -> Material:
-    """The same material for uv in metres, of which its pictures take so many."""
+    """The same material for uv in metres; its pictures span `metres`."""
     names = ("base_color_texture", "metallic_roughness_texture", "normal_texture")
     return replace(material, **{name: replace(getattr(material, name), scale=(1 / metres, 1 / metres)) for name in names})
 

@@ -1,4 +1,4 @@
-"""The running program `reader`, which a process starts for its first model file and keeps for the files that follow."""
+"""The reader's process: started for the first model file, and kept for the files that follow."""
 
 from __future__ import annotations
 

@@ -257,9 +257,9 @@ def _lit(graph, told, look, is_traced):
 
 
 def _more_shine(graph, alpha):
-    """The share of its mirrored light that a blended surface adds beyond its opacity.
+    """The share of mirrored light that a blended surface adds beyond its opacity.
 
-    Only camera rays see the addition: between surfaces, more light would leave than arrives.
+    Only camera rays see the addition. Between surfaces, it would make more light leave than arrives.
     """
     shown = graph.math("MINIMUM", graph.product(8.0, alpha), 1.0)
     camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]

@@ -125,7 +125,7 @@ def _collection_of(one):
 
 
 def _set_output(render, is_transparent):
-    """Set rendered pictures to be saved beside the .blend file, and computed on all cores."""
+    """Save rendered pictures beside the .blend file, and render on all cores."""
     if hasattr(render.image_settings, "media_type"):  # Blender 5
         render.image_settings.media_type = "IMAGE"
     render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGBA" if is_transparent else "RGB"

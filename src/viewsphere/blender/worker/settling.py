@@ -25,15 +25,16 @@ KEPT = (
 
 
 def settle(scene, members):
-    """Prepare the open scene; `members` are the numbers of labelled objects by name, with all that they instance."""
+    """Prepare the open scene; `members` are the numbers of labelled objects by name, and those of their instances."""
     _take_over(scene)
     _hold_still()
     _number(scene, members)
 
 
 def number(told):
-    """Give the objects of a user's file that is staged the numbers of what they belong to, for a pass of indices, in which what
-    has less than `alpha` is not seen.
+    """Number the objects of a staged file by the object that they belong to, for the index pass.
+
+    The pass leaves out surfaces with less than `alpha`.
     """
     bpy.context.view_layer.pass_alpha_threshold = told["alpha"]
     _number(bpy.context.scene, told["members"])

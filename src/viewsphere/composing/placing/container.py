@@ -82,7 +82,7 @@ def _size(shapes: Sequence[Shape], rng: Draws, options: Options) -> tuple[float,
 
 
 def _check(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], size: tuple[float, float, float]) -> None:
-    """Raise RecipeError for a box that cannot hold the models, or that has no place."""
+    """Raise RecipeError if the box cannot hold the models, or has no place itself."""
     where, (width, height, length) = f"{room.field}.layout", size
     if room.taken:
         raise RecipeError(f"{where}: expected no container for company, as the model that it joins is not in it; set scenes")

@@ -143,7 +143,7 @@ def _in_bays(draws: np.random.Generator, bays: Sequence[Bay], shape: Shape) -> I
 def _along(
     draws: np.random.Generator, roads: _Roads, shape: Shape, options: Options, drives: bool, is_parked: bool
 ) -> Iterator[Matrix4]:
-    """Poses along lanes, or along pavements for all that does not drive."""
+    """Poses along lanes for vehicles, along pavements for everything else."""
     on_pavement = not drives and options.pavement is None and len(roads.pavements) > 0
     steps = roads.pavements if on_pavement else roads.lanes
     near, far = options.pavement or PAVEMENT

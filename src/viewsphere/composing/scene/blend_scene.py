@@ -1,4 +1,4 @@
-"""A .blend file around the targets: which of its objects are labelled, which are shown, and where the targets stand in it."""
+"""A .blend file around the targets: its labelled objects, its shown objects, and the place of the targets."""
 
 from __future__ import annotations
 

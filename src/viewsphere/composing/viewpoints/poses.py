@@ -398,11 +398,11 @@ class ListedPoses(Poses):
         return self._names[index]
 
     def view(self, index: int) -> Orbit:
-        """The values of the file, or those of a motion."""
+        """The orbit in the file, or the one computed from a motion."""
         return self._views[index][0]
 
     def target(self, index: int) -> Vector | None:
-        """The recipe's for orbits; of a motion, a point on the optical axis."""
+        """The recipe's target for orbits; for a motion, a point on the optical axis."""
         return self._views[index][1] or super().target(index)
 
     @cached_property
@@ -431,7 +431,7 @@ class ListedPoses(Poses):
 
 
 def _shot_name(shot: Arranged) -> str:
-    """The shot's name, and a digest of what it says: one that is changed is another."""
+    """The shot's name and a digest of its fields: a changed shot is another shot."""
     return f"shot {shot.name} {hashlib.sha256(shot.said.model_dump_json().encode()).hexdigest()[:16]}"
 
 

@@ -34,7 +34,7 @@ class SequencePoses(RepeatedPoses):
         return {**self.base.counts, "instants": self.instants}
 
     def taken(self, index: int) -> int:
-        """The pose of the sequence; its name is the sequence's among those of its subject."""
+        """The sequence's pose, named after the sequence among those of its subject."""
         return index // self.instants
 
     def name(self, index: int) -> str:

@@ -55,7 +55,7 @@ class Options(Common):
 
 @dataclass(frozen=True)
 class Eevee(Common):
-    """Options of EEVEE. raytracing: whether visible surfaces are reflected in others, and shade their neighbours."""
+    """Options of EEVEE. raytracing: adds reflections of visible surfaces in others, and shading by near ones."""
 
     renderer = "eevee"
     title = "EEVEE"

@@ -1,4 +1,4 @@
-"""Fog over pictures of Blender's renderers, in the closed form of `imaging.air`: no volume is rendered, which has noise.
+"""Fog over pictures of Blender's renderers, in the closed form of `weather.fog`: rendering a volume would add noise.
 
 At an outline a pixel is veiled by the mean of what its quarters let through, as it is not known which of its light came from
 where; the raster engine veils each of its samples.

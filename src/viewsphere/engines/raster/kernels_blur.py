@@ -22,7 +22,7 @@ ALIKE = 0.25  # squared share of its way by which the way of what moves along wi
 def carry(rays, inverse_depth, triangle, owner, moves, points):
     """Fill points (H, W, 3) float64: camera axes, up to a positive factor, of what each pixel shows at another moment.
 
-    rays (H, W, 3) and inverse_depth (H, W): as in `truth.visibility`; owner (T,) int32: which of moves (M, 3, 4), camera axes
+    rays (H, W, 3) and inverse_depth (H, W): as in `raster.visibility`; owner (T,) int32: which of moves (M, 3, 4), camera axes
     then from camera axes now, is that of each triangle; the last one is that of the sky.
     """
     for i in range(U(triangle.shape[0])):

@@ -109,7 +109,7 @@ class Bounces(NamedTuple):
     first probe's row; floor (n, n, 4): radiance of a white matt ground lit by
     things alone; floor_frame (4,): its cells per length, its corner's x and y, whether there is a map; lightmap: where it is
     known better than by probes; sent: what patches of things send; near (S, 4), or empty: of each sample, how much of the
-    probes' light arrives, and the light of what is nearer than they know (`gathering_near`).
+    probes' light arrives, and the light of what is nearer than they know (`near_field_gather`).
     """
 
     light: Float32

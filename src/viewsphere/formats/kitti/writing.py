@@ -94,7 +94,7 @@ class Kitti(Tree):
         return _Course(course.number, course.instants, None)
 
     def _found(self, name: str) -> _Course:
-        """An imported sequence, of which nothing is planned: as long as its last picture says; KITTI's keep their numbers."""
+        """An imported sequence, as long as its last picture's number; KITTI's own sequences keep their numbers."""
         samples, known = self.dataset.sequence(name), self.dataset.sequences
         are_numbers = all(re.fullmatch("[0-9]{4}", one) for one in known)
         return _Course(int(name) if are_numbers else known.index(name), samples[-1].instant + 1, samples[0].index)

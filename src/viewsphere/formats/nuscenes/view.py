@@ -149,7 +149,7 @@ def _hits(seen: Sequence[Sample]) -> Counter[int]:
 
 
 def _shares(seen: Sequence[Sample]) -> dict[int, float]:
-    """Return each object's largest visible share among the cameras, by its id; without cameras, among the LiDARs."""
+    """Return each object's largest visible share in any camera, by its id; without cameras, in any LiDAR."""
     cameras = [sample for sample in seen if LIDAR not in sample.channels] or seen
     found = dict[int, float]()
     for o in (o for sample in cameras for o in sample.objects):

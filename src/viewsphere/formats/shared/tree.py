@@ -110,7 +110,7 @@ class Tree(ABC):
 
 
 class Functions(NamedTuple):
-    """The functions that a format's module gets from a tree: see `viewsphere.formats.Format`."""
+    """The functions that a format's module gets from a tree: see `viewsphere.plugins.format.FormatSpec`."""
 
     preparer: Callable[..., Callable[[Sample], list[Piece]]]
     writer: Callable[..., Any]

@@ -60,14 +60,14 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
 
 
 def factors(stock: Stock) -> str:
-    """Models or scenes, viewpoints and instants."""
+    """The factors of the number of frames: models or scenes, sequences and instants."""
     subjects = quantity(len(stock.subjects), "model" if stock.recipe.scenes is None else "scene")
     views = sum(len(names) for names in _taken(stock).values())
     return f"{subjects}, {quantity(views, 'sequence')} x {quantity(time_of(stock).count, 'instant')}"
 
 
 def blocks(stock: Stock) -> tuple[Block, ...]:
-    """Viewpoint by viewpoint, all subjects that are taken from it, instant by instant."""
+    """Blocks of rows: for each viewpoint, its subjects and its instants."""
     if stock.recipe.scenes is not None:
         check_scene_models(stock)
     count = time_of(stock).count

@@ -64,7 +64,7 @@ def fall_in(scene: Scene, picture: Float32, camera: Camera, seconds: float, inve
 def fall(picture: Float32, falling: Falling, camera: Camera, seconds: float, inverse_depth: Float32) -> None:
     """Lay what falls over a picture (H, W, 4), scene-linear and premultiplied, in place, where nothing nearer is seen.
 
-    inverse_depth (H, W): as in `truth.Visibility`, of the picture.
+    inverse_depth (H, W): as in `truth.raster.visibility.Visibility`, of the picture.
     """
     ends, width, soft, level, inverse = (np.concatenate(rows) for rows in zip(*_classes(falling, camera, seconds), strict=True))
     order = np.argsort(inverse, kind="stable")  # the nearest last

@@ -27,7 +27,7 @@ OPAQUE = 80.0
 
 @dataclass(frozen=True, eq=False)
 class Air:
-    """The air along rays from one eye. stretch (N,): metres of range for a metre of their depth (see `truth.Visibility`); rise
+    """The air along rays from one eye. stretch (N,): metres of range for a metre of their depth (see `Visibility`); rise
     (N,): sine of their elevation. is_outdoors: it is beyond the windows of a room, and only ground and sky are seen through it.
     """
 

@@ -30,10 +30,9 @@ LEAVING_S = 5.0
 
 
 class LocalCrew:
-    """So many workers for a part of a data set, this process itself if none; workers that were started stay until the context
-    ends.
+    """Worker processes for a part of a data set; with 0 workers, this process itself.
 
-    A worker is started when there is a job for it, and takes a second.
+    A worker starts with its first job, which takes a second, and stays until the context ends.
     """
 
     nodes: int | None = None

@@ -101,7 +101,7 @@ def _films(seen: Iterable[Seen]) -> list[Film]:
 
 
 def _film(sequence: str, seen: dict[int, dict[str, tuple[int, float]]]) -> Film:
-    """Instants that lack a sensor, as where only some samples were chosen, are left out."""
+    """The film of a sequence, without instants that lack a sensor, such as those of a selection."""
     sensors = tuple(max(seen.values(), key=len))
     whole = {number: [own[name] for name in sensors] for number, own in sorted(seen.items()) if set(sensors) <= set(own)}
     return Film(

@@ -97,14 +97,12 @@ class Match:
 
     @cached_property
     def state(self) -> NDArray[np.uint8]:
-        """Return whether the points are seen there, (H, W) uint8, as `truth.point_raster` says; `states` does several at
-        once.
-        """
+        """The points' states in the other view, (H, W), see `surface_points.raster`; `states` computes several at once."""
         return states([self.placed])[0]
 
     @cached_property
     def placed(self) -> Placed:
-        """The points in the other view, as `truth.point_raster.states` takes them."""
+        """The points in the other view, as `surface_points.raster.states` takes them."""
         xy, near, rays = self._on_pinhole() if self.other.is_pinhole else self._as_rays()
         if self._deformed is not None:
             self._write_deformed(xy, near, rays)

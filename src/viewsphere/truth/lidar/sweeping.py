@@ -91,7 +91,7 @@ def swept_hits(geometry: Geometry, camera: Camera, turning: Turning) -> Hits:
 def _moved(geometry: Geometry, camera: Camera, turning: Turning, column: int) -> Float:
     """Return all vertices at their places at a column's moment, in the camera's axes at that moment.
 
-    See `truth.visibility.homogeneous`.
+    See `truth.raster.visibility.homogeneous`.
     """
     from viewsphere.truth.raster import kernels_draw as kernels
 

@@ -45,7 +45,7 @@ class Geometry:
     triangles (T, 3) int32; triangle_object (T,) int32: 0 for scenery and ground; single_sided (n,) int32: the triangles that a
     camera sees from their fronts alone, see `seen_from`; labels: further numbers of triangles, of the objects' alone, which
     come first, all others have 0, but for classes of things and stuff; triangle_cutout (T,) int32: -1 all surface, -2 never
-    seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
+    seen, -3 and -4 `alpha_masks.ENDLESS`, else a row of `Cutouts.corners`.
 
     is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
     the highest of its used vertices, infinite where it has none.
@@ -330,7 +330,7 @@ def without_ground(geometry: Geometry) -> Geometry:
 
 def seen_from(geometry: Geometry, q: NDArray[np.float64], base: int = 0) -> Geometry:
     """The same, but the single-sided triangles that turn their backs to the camera are never seen, and no others are looked at
-    again; q: vertices from `base` on as `truth.visibility.homogeneous` gives them for the camera.
+    again; q: vertices from `base` on as `truth.raster.visibility.homogeneous` gives them for the camera.
 
     By the sign that the rasteriser computes, so nothing changes where no triangle is single-sided.
     """

@@ -61,7 +61,7 @@ def cells(q, samples, x0, y0, width, height, cell):
 
 @inner
 def is_surface(cutouts, row, b0, b1, b2):
-    """Return whether the point with these barycentrics of cut-out triangle `row` is surface; `cutouts` is `Cutouts.arrays`."""
+    """Return whether the point with these barycentrics of cut-out triangle `row` is surface; see `alpha_masks.Cutouts`."""
     texels, layout, levels, material, corners = cutouts
     c = corners[row]
     m = layout[material[row]]

@@ -16,7 +16,7 @@ A, B, C = np.uintp(0), np.uintp(1), np.uintp(2)
 
 @njit
 def weights(triangles, chosen, q, rays, out):
-    """Barycentrics (N, 3) of the rays (N, 3) in the `chosen` triangles (N,); q as `truth.visibility.homogeneous` gives it."""
+    """Barycentrics (N, 3) of the rays (N, 3) in the `chosen` triangles (N,); q: see `raster.visibility.homogeneous`."""
     for i in range(chosen.shape[0]):
         ui, t = np.uintp(i), np.uintp(chosen[i])
         i0, i1, i2 = np.uintp(triangles[t, A]), np.uintp(triangles[t, B]), np.uintp(triangles[t, C])

@@ -161,12 +161,12 @@ class Tracked:
 
     @cached_property
     def state(self) -> NDArray[np.uint8]:
-        """Return whether they are seen, (N,) uint8, see `truth.point_raster`; `states` does several at once."""
+        """The points' states, (N,) uint8, see `surface_points.raster`; `states` computes several at once."""
         return states([self.placed])[0]
 
     @cached_property
     def placed(self) -> Placed:
-        """The points as `truth.point_raster.states` takes them."""
+        """The points as `surface_points.raster.states` takes them."""
         own = self._own
         ground = self.view.geometry.triangle_start[-1]
         on = np.where(self.points.body == GROUND, np.int32(ground), own) if self._has_ground else own

@@ -41,7 +41,7 @@ LARGEST_SIDE = 1024  # pixels of a side of the cube
 class Placed:
     """Points in a view, in arrays of any one shape.
 
-    xy (..., 2) float64 pixels, NaN where the lens has none; near (...) float64: 1/s, s as `truth.visibility.Visibility` has
+    xy (..., 2) float64 pixels, NaN where the lens has none; near (...) float64: 1/s, s as `raster.visibility.Visibility` has
     it, 0 of what is infinitely far and of what has no pixel, NaN of what is nowhere. rays (..., 3) in camera axes, so that the
     point is ray / near: None for a pinhole, which needs none. `own` gives (...) int32: the view's triangle that the point is
     on, -1 for none; the ground's are one.

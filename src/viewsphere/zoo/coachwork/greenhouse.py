@@ -104,7 +104,7 @@ class Greenhouse:
         return around, seal, grid(self._inset(u, v))
 
     def _inset(self, u: Float, v: Float) -> Float:
-        """Points behind the surface by the inset of the panes."""
+        """Points behind the surface, at the depth of the panes."""
         points = self.surface(u, v)
         points[..., :2] -= GLASS_DEPTH * self.base.normal(u)
         return points

@@ -151,7 +151,7 @@ def _spine(c: Canvas, x: float, t: float, h: float, title: str, author: str, col
 
 
 def _downwards(c: Canvas, text: str, x: float, y: float, size: float, color: Color) -> None:
-    """A word that reads from the top down: painted on the same pixels, seen with the head leant to the right."""
+    """Write a word from top to bottom, rotated by a quarter turn clockwise, on the same pixels."""
     turned = Canvas(c.rgb, -c.y, c.x, c.pixel)
     side = Canvas(turned.rgb.transpose(1, 0, 2), turned.x.T, turned.y.T, c.pixel)
     flipped = Canvas(side.rgb[::-1], side.x[::-1], side.y[::-1], c.pixel)

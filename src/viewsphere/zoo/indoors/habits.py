@@ -40,7 +40,7 @@ def _seat(*kinds: str) -> Fits:
 
 
 def _bedroom(f: Furnishing) -> None:
-    """The bed's head on a wall, small tables with lamps at its sides, a wardrobe, a chest of drawers, a chair."""
+    """A bed with its head at a wall, bedside tables with lamps, a wardrobe, a chest of drawers, a chair."""
     bed = f.against("bed", _style(width=0.55 * max(f.room.size)), middle=True)
     if bed is not None:
         f.under(bed.at(0.0, bed.size[1] * 0.3), bed.turn_deg, "rug", _style(width=2.6, depth=2.0))

@@ -300,7 +300,7 @@ class _Builder:
 
 
 def _options(words: list[str]) -> tuple[list[str], dict[str, list[str]]]:
-    """The words behind leading options, and these options with their values."""
+    """The words after the leading options, and the options with their values."""
     words, options = list(words), dict[str, list[str]]()
     while words and (words[0] in OPTION_ARGUMENTS or words[0] in VECTOR_OPTIONS or not words[0]):
         option = words.pop(0)

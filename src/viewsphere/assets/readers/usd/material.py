@@ -146,7 +146,7 @@ class _Surface:
         return opacity, "BLEND" if is_clear else "OPAQUE", 0.5
 
     def _specular(self, material: Material, packed: Texture | None) -> Material:
-        """The material; in the specular workflow with what its specular colour makes of it."""
+        """The material; in the specular workflow, converted by its specular colour."""
         if not self.number("useSpecularWorkflow", 0):
             return material
         if packed is not None or self.texture("specularColor") is not None:

@@ -10,7 +10,7 @@ from viewsphere.model.scene import Vector
 
 
 def curve_through(points: Sequence[Vector], closed: bool, field: str) -> Curve:
-    """The smooth curve through points, metres; RecipeError, which begins with the field, for too few or two at one place."""
+    """The smooth curve through points, metres; raises RecipeError, beginning with `field`, for too few or coinciding points."""
     try:
         return spline(points, closed)
     except ValueError as error:

@@ -73,7 +73,7 @@ def spread(pixels, count, limit, around):
 @njit
 def with_corners_before(q, triangles, runs, wanted, limit, near, others):
     """Mark in `others` (T,) unwanted triangles that have a vertex before the limit of its pixel; `near` (V,) is scratch. `runs`
-    are those of vertices and of triangles that are looked at: `truth.visibility.in_picture`.
+    are those of vertices and of triangles that are looked at: `truth.raster.visibility.in_picture`.
     """
     height, width = limit.shape
     a, b, c, d = U(0), U(1), U(2), U(3)

@@ -24,7 +24,7 @@ def sphere(count: int) -> Float32:
 
 
 def turned(directions: Float32) -> Float32:
-    """The same (K, 3) turned in `TURNS` ways, (TURNS, K, 3), which share all rotations about evenly (Shoemake 1992)."""
+    """Directions (K, 3) in `TURNS` nearly uniform rotations, (TURNS, K, 3) (Shoemake 1992)."""
     i = np.arange(1, TURNS + 1)
     u, v, w = ((i * step) % 1.0 for step in (0.8191725134, 0.6710436067, 0.5497004779))  # Roberts' sequence in three dimensions
     a, b = np.sqrt(1 - u), np.sqrt(u)

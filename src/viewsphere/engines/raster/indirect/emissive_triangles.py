@@ -19,7 +19,7 @@ LARGEST = 0.1
 
 
 class Lanterns(NamedTuple):
-    """points (J, POINT_COLUMNS): columns named in `kernels_lanterns`, none if nothing shines; froms (M,): of each patch, the
+    """points (J, POINT_COLUMNS): columns named in `kernels_emissive`, none if nothing shines; froms (M,): of each patch, the
     square of the distance from which on points stand for it, 0 if it is no lantern.
     """
 

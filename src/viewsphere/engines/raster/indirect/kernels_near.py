@@ -1,4 +1,4 @@
-"""Light of what is near the samples of a picture, from the patches that short rays hit: see `gathering_near`."""
+"""Light of what is near the samples of a picture, from the patches that short rays hit: see `near_field_gather`."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def patch(met, far, origins, directions, turn, normals, materials, box, cells, g
 
     met, far (K, N): triangle or -1, distance; directions, turn: see `kernels_trace.cast`; box (6,): lowest and highest x, y, z
     of the probes, from the first of which patches are counted, `cells` in a length; ground (6,): its height, the box (lowest
-    and highest x and y) within which it has patches, whether there is one; table: see `patches.Table`.
+    and highest x and y) within which it has patches, whether there is one; table: see `radiosity_patches.Table`.
     """
     m_ground = nb.int64(NO_MATERIAL)
     for k in range(U(directions.shape[1])):

@@ -1,7 +1,7 @@
-"""Light of still surfaces that are not flat, at points of their triangles: their vertices, and more on large ones.
+"""Light of still curved surfaces, at the vertices of their triangles and at more points on large ones.
 
-Mesh colours (Yuksel, Keyser and House 2010), with fewer rays: light is gathered at sites, of which there is one in each cell
-for each of six directions that its surfaces face, and points have the mean of the sites around them that face alike.
+Mesh colours (Yuksel, Keyser and House 2010), with fewer rays. Light is gathered at sites: each cell has one for each of six
+directions that its surfaces face. A point has the mean of the sites around it that face the same way.
 """
 
 from __future__ import annotations

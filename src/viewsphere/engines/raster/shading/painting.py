@@ -229,7 +229,7 @@ def _nearest_glass(baked: Baked, stack: list[Layer], count: int) -> NDArray[np.u
 
 
 def _lay_sky(view: PictureRays, surrounding: Surrounding, radiance: Float32, air: Air | None) -> None:
-    """Lay radiance (S, 4) over the sky as it is seen through the air."""
+    """Composite radiance (S, 4) over the sky, seen through fog."""
     before = None if air is None else radiance.copy()
     sky_behind(view, surrounding, radiance)
     if air is not None and before is not None:

@@ -25,12 +25,12 @@ GAP = 16  # unused texels between rows: without them the rows of a window would 
 STEEP = 15.0
 WIDE = 16  # texels of a row from which on it is worth to find out which of them a triangle covers
 ROUNDING = 1e-14
-# Columns of Views.form: four rows of the matrix, then what `kernels_arrive.look` needs: texels per length (at distance 1), the
-# bias in q of a distant light and in shares of q of a near one, the least q in the map, how far from the middle the map is
-# read, half its size, whether the light is round, how an ellipse grows with the squared texels from the middle; a rectangle's
-# half sides along the view's axes, or the radius and zeros: texels per q, the third per q alone; bounds of the light's half
-# width and height in texels per q, how these grow per texel from the middle, whether wide penumbrae are filtered finely; the
-# least half width of a filter in texels, and the factor for what such a filter hides.
+# Columns of Views.form: four rows of the matrix, then those that `kernels_direct_light.look` reads: texels per length (at
+# distance 1), the bias in q of a distant light and in shares of q of a near one, the least q in the map, how far from the
+# middle the map is read, half its size, whether the light is round, how an ellipse grows with the squared texels from the
+# middle; a rectangle's half sides along the view's axes, or the radius and zeros: texels per q, the third per q alone; bounds
+# of the light's half width and height in texels per q, how these grow per texel from the middle, whether wide penumbrae are
+# filtered finely; the least half width of a filter in texels, and the factor for what such a filter hides.
 TEXELS, BIAS_FAR, BIAS_NEAR, NEAREST, READ, MIDDLE, ROUND, TILT, SIDES = range(16, 25)
 SPAN_U, SPAN_V, MORE, FINE, SHARPEST, DARKER = range(SIDES + 6, SIDES + 12)
 FORM = SIDES + 12

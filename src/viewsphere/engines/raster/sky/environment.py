@@ -264,7 +264,7 @@ def _daylight_maps(turbidity: float, clouds: float, elevation_deg: float) -> _Ma
 
 
 def _key(file: str) -> tuple[str, int, int]:
-    """The file with its size and time of change, so that a changed file is read again."""
+    """A key of path, size and modification time, so that a changed file is read again."""
     try:
         facts = Path(file).stat()
     except OSError:
