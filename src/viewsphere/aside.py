@@ -30,10 +30,10 @@ LOCK = "lock"
 """Name of the file in such a folder."""
 
 HALF = "~"
-"""How names of folders end that somebody has begun to remove."""
+"""Suffix of folders whose removal has begun."""
 
 OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
-"""How it is opened."""
+"""Flags to open the lock file."""
 
 TRIES = 30
 """Folders that are made before it is said that none stays."""
@@ -80,7 +80,7 @@ class Aside:
 
 
 _held: set[Aside] = set()
-"""What this process has aside."""
+"""Scratch folders of this process."""
 
 
 def of_this_process() -> str:

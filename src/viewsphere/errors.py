@@ -66,7 +66,7 @@ class CheckFailedError(ViewsphereError):
 
 
 class WorkerDied(ViewsphereError):
-    """The process that did a job died, or its machine, as often as a job is tried; other jobs go on."""
+    """A job's process or machine died in every try; other jobs go on."""
 
 
 class BlenderError(ViewsphereError):

@@ -48,7 +48,7 @@ class FileError(UserError, OSError):
 def read_bytes(file: Path, limit: str = "MAX_FILE_BYTES") -> bytes:
     """Return all bytes of a regular file, or of one at a URL.
 
-    Raises FileError for another kind of file and for one beyond the named limit, OSError as opening does.
+    Raises FileError for other kinds of files and for files above the named limit, and OSError like `open`.
     """
     if not isinstance(file, Path):
         return _remote_bytes(file, limit)

@@ -105,7 +105,7 @@ class Limits:
 
 
 limits = Limits()
-"""What the limits are here: `limits.MAX_TRIANGLES`."""
+"""The limits of this process, such as `limits.MAX_TRIANGLES`."""
 
 
 def table() -> dict[str, Limit[int] | Limit[float]]:

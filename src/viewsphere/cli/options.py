@@ -15,7 +15,7 @@ UsageError = cast("type[Exception]", typer.BadParameter.__base__)
 
 
 def explain(error: Any) -> None:
-    """Print a mistake in options in one line, or the help where nothing was given; exits with status 2."""
+    """Print a mistake in options in one line, or the help if nothing was given; exits with status 2."""
     if type(error).__name__ == "NoArgsIsHelpError":
         error.show()
         sys.exit(2)

@@ -25,13 +25,13 @@ from viewsphere.zoo import build_zoo_model
 Float = NDArray[np.float64]
 
 CLOSE_ENOUGH = 1e-9
-"""How far the share that is filled may be from the one that is asked for, as a part of it."""
+"""Tolerance of the filled share, relative to the requested one."""
 
 MOST_STEPS = 100
 """Distances that are tried before a search is given up, as where a lens shows a model in part before it fills its share."""
 
 NEAREST = 1e9
-"""How many times nearer than its own length a model is looked for."""
+"""Least distance of the search, as a fraction of the model's length: one over this."""
 
 
 @dataclass(frozen=True, eq=False)

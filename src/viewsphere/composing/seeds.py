@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 Names = tuple[str, ...]
-"""What a draw is for: nothing, a model's key, or a model's key and a pose's name."""
+"""Subject of a draw: none, a model's key, or a model's key and a pose's name."""
 
 
 def _digest(names: tuple[str, ...], size: int) -> bytes:

@@ -20,7 +20,7 @@ LENS, WINDOW = "lens", "window"
 """Names of parts of scenery: what a lamp shines through, and what may be lit from inside."""
 
 GLOW = 9.0
-"""How much brighter what glows by day is made, but for screens."""
+"""Brightness by day of glowing surfaces except screens, as a factor."""
 
 SCREEN = "screen"
 """Name of the material of screens, which people do not turn up at night."""

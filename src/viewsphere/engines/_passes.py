@@ -11,7 +11,7 @@ Float32 = NDArray[np.float32]
 def shading_of(albedo: Float32, diffuse: Float32) -> Float32:
     """Diffuse light (H, W, 3) over albedo: the same light from a white surface.
 
-    Where the albedo has no red, green or blue, that of the shading is the mean of the others; where the albedo is 0, all are.
+    If a channel of the albedo is 0, the shading's channel is the mean of the others; if all are 0, the shading is 0.
     """
     has = albedo > 0
     shading = np.divide(diffuse, albedo, out=np.zeros(albedo.shape, np.float32), where=has)

@@ -46,7 +46,7 @@ from viewsphere.store import Dataset
 
 
 def check() -> None:
-    """Raise MissingExtraError where there is no scipy."""
+    """Raise MissingExtraError if scipy is missing."""
     scipy_io("objectnet3d")
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 Float = NDArray[np.float64]
 
 ROTATION_TOLERANCE = 1e-5
-"""How far scalar products of a rotation's rows may be from 0 and 1."""
+"""Tolerance for scalar products of a rotation's rows (0 or 1)."""
 
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> Float:

@@ -1,4 +1,4 @@
-"""A small map in a corner of a picture: cameras from above, as the picture's own camera has them, ahead at the top."""
+"""A small map in a corner of a picture: cameras from above, with the viewing direction of the picture's camera at the top."""
 
 from __future__ import annotations
 

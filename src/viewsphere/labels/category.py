@@ -1,4 +1,4 @@
-"""category: what kind of thing an object is."""
+"""category: the kind of an object."""
 
 from __future__ import annotations
 

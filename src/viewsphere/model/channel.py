@@ -63,10 +63,10 @@ PICTURES = ("rgb", "rgba")
 """The passes that are pictures, which every engine paints. The first that a data set keeps is its samples' picture."""
 
 LIGHT_PASSES = ("albedo", "shading", "residual", "emission")
-"""What a picture's light is made of, sampled as the picture is: albedo x shading + residual is the picture before exposure."""
+"""Parts of a picture's light, sampled like the picture: albedo x shading + residual is the picture before exposure."""
 
 MATERIAL_PASSES = ("roughness", "metallic")
-"""What the surface is made of that labels see, at the pixels' centres."""
+"""Material of the labelled surface, at the pixels' centres."""
 
 DEFAULT_CHANNELS = ("rgb", "depth", "instances", "normals")
 

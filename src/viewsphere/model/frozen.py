@@ -49,7 +49,7 @@ class Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     IS_CHOICE: ClassVar[bool] = False
-    """Whether pydantic tells it from others by one of its fields: it needs to see that field, and builds them all together."""
+    """True for members of a tagged union: pydantic reads the tag's field, and builds all members together."""
 
     @model_validator(mode="wrap")
     @classmethod

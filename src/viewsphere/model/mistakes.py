@@ -233,7 +233,7 @@ def _path_in(data: Any, location: Path) -> Path:
 
 
 _ABSENT = ("no", "off", "none", "false")
-"""What users write for a mapping that they do not want."""
+"""Values that users write to leave out a mapping."""
 
 
 def _words(error: ErrorDetails, fields: Sequence[str]) -> str:

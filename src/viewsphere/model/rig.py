@@ -83,7 +83,7 @@ class Rig(Frozen):
 
 
 STRAIGHT = 1e-9
-"""How far numbers of two axes that count as equal may differ, and a baseline's direction from the x axis."""
+"""Tolerance for the numbers of equal axes, and for a baseline's direction along the x axis."""
 
 
 def _baseline(left: Sensor, right: Sensor) -> float | None:

@@ -177,7 +177,7 @@ class Shot(Frozen):
 
     @property
     def stage_key(self) -> str:
-        """Equal for shots that can share a warm stage: all but their instants, where what moves is then, and what it shows."""
+        """A key that is equal for shots that can share a stage: all but instants and the states of moving things."""
         things = tuple(
             thing if thing.motion.is_still else thing.model_copy(update={"motion": Motion(poses=(None,))})
             for thing in self.things

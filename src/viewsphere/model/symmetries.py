@@ -20,7 +20,7 @@ MOST = 1000
 """Symmetries of one model."""
 
 RIGID = 1e-4
-"""How far scalar products of a motion's rows may be from 0 and 1, and the length of an axis from 1."""
+"""Tolerance for scalar products of a motion's rows (0 or 1), and for the length of an axis (1)."""
 
 
 def _rows(value: Any) -> Any:

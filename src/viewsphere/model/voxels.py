@@ -17,12 +17,12 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Metres, Positive
 
 OUTSIDE, FREE, SURFACE, OCCLUDED = range(4)
-"""How the camera sees a cell: its centre is in no pixel; it is before what its pixel shows; a point that a pixel shows lies in
-it; its centre is behind what its pixel shows.
+"""A cell's state for the camera: its centre is in no pixel; it is in front of the surface in its pixel; a visible point lies in
+it; its centre is behind the surface in its pixel.
 """
 
 EMPTY, TOUCHED, INSIDE = range(3)
-"""What a cell holds: nothing; a surface; the inside of an object, all around."""
+"""Content of a cell: nothing; a surface; the inside of an object, all around."""
 
 RUN = np.dtype(
     [
@@ -44,7 +44,7 @@ LEVEL = 1e-6
 
 
 ROOM = 1 + 1e-6
-"""How much larger than its longest side the cube around a model is, so that its farthest face is in a cell."""
+"""Size of the cube around a model, in its longest sides: the farthest face is inside a cell."""
 
 
 class Voxels(Frozen):

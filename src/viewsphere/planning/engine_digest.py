@@ -14,9 +14,7 @@ from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.recipe import Recipe
 
 SHARED = tuple(Path(__file__).parents[1] / name for name in ("materials", "rendering", "model/scene.py"))
-"""What every engine paints with: what finishes pictures, what is around the targets, materials, and what a scene is if nobody
-says.
-"""
+"""Sources that the pictures of every engine depend on: finish, surroundings, materials, and a scene's defaults."""
 
 
 @cache

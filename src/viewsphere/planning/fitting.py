@@ -29,10 +29,10 @@ LOOK = "the engine's program"
 
 
 OF = " of "
-"""What stands in names of settings between a model's field and its key, and in no other name."""
+"""Separator of a model's field and its key in names of settings; in no other name."""
 
 VARIED = "variations."
-"""What begins names of settings that are a variation's, and no other name: a recipe has those that it adds, or some."""
+"""Prefix of a variation's settings; in no other name."""
 
 MOVES = ("motion", "clip", "fps")
 """Fields of a model that say how it moves in sequences, and what an animated one plays of its file."""

@@ -26,7 +26,7 @@ from viewsphere.recipe.scene import CameraEntry
 Float = NDArray[np.float64]
 
 SKEWED = 1e-3
-"""How far a matrix that a user wrote may be from the rotation nearest to it."""
+"""Tolerance between a user's matrix and the nearest rotation."""
 
 
 def rig_of(recipe: Recipe, lens: Intrinsics) -> Rig | None:

@@ -1,4 +1,4 @@
-"""The split of a frame, which depends only on the seed and the names of the things that stay together."""
+"""The split of a frame, which depends only on the seed and the names of its group: frames of a group share a split."""
 
 from __future__ import annotations
 

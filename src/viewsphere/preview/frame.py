@@ -25,7 +25,7 @@ GAP = 4
 """Pixels between the sensors of an instant."""
 
 Extents = Mapping[str, Extent]
-"""What the pictures beside tell apart, by the names of drawings; of others that are not there, each its own."""
+"""Ranges shared with neighbouring pictures, by the names of drawings; other drawings use their own."""
 
 
 Before = Callable[[Sample], Sequence[Sample]]

@@ -26,7 +26,7 @@ Float32 = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 WIDER = {"box": 2.0, "gaussian": 0.6}
-"""How much wider than the mask's blur the blur is that continues both sides: it has to reach beyond the border pixels."""
+"""Size that the blur continuing both sides has in addition to the mask's blur: it must reach beyond the border pixels."""
 
 SIDE = 1.0
 """Sigma, in pixels, of the Gaussian that continues both sides for `poisson`."""

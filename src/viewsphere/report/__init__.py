@@ -117,7 +117,7 @@ def report_data(
 
 
 def conventions() -> dict[str, Any]:
-    """Return the page's constants for any data set, as plain data: colours of layers; vertices, edges and faces of boxes."""
+    """Return the page's constants, equal for all data sets: colours of layers; vertices, edges and faces of boxes."""
     return {
         "keys": {drawing.name: drawing.key for drawing in drawings() if drawing.key},
         "box": {"faces": FACES, "edges": EDGES, "signs": VERTEX_SIGNS},

@@ -19,7 +19,7 @@ from viewsphere.run.warm import compile_kernels
 from viewsphere.store import PlanRecord, Row, Store
 
 Errors = dict[str, ViewsphereError]
-"""What could not be made again, by its key, and why; it stays as it was."""
+"""Errors of results that could not be repaired, by key; their files stay unchanged."""
 
 
 @dataclass(frozen=True, eq=False)

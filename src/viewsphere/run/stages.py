@@ -90,7 +90,7 @@ class _Stand:
 
 
 NONE_KNOWN: Mapping[int, _Stand] = MappingProxyType({})
-"""Where nothing is known to stand."""
+"""No known places."""
 
 
 @dataclass(eq=False)

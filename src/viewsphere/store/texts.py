@@ -13,7 +13,7 @@ MOST_NESTED = 200
 """Lists and objects in one another: more would end what walks through them, and no data set has a tenth of it."""
 
 _HALF = re.compile(r"\\u[dD][89a-fA-F]")
-"""What begins half of a pair of UTF-16, which is no character by itself."""
+"""Start of the escape of an unpaired UTF-16 surrogate, which is not a character."""
 
 
 def parsed(text: str | bytes, parse_constant: Callable[[str], Any] | None = None) -> Any:

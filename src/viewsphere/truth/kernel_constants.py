@@ -12,4 +12,4 @@ plane into two, and of float32 depth.
 """
 
 STILL, RIGID, OTHER, GONE = 0, 1, 2, 3
-"""What a thing did between two views: pixels of OTHER things, which deform, are left as they are."""
+"""Changes of a thing between two views; kernels leave pixels of OTHER things, which deform, unchanged."""

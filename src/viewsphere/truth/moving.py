@@ -23,7 +23,7 @@ KEPT = (
     *("triangles", "triangle_material", "triangle_part", "triangle_body_part"),
     *("uv0", "uv1", "colors", "materials", "images"),
 )
-"""What a mesh and its deformed self have in common."""
+"""Attributes that a mesh shares with its deformed copies."""
 
 SLACK = 1e-6
 """By how much, in metres beside the height itself, a box that is turned may be higher than what is in it: rounding."""

@@ -27,7 +27,7 @@ from viewsphere.urls.remote_path import BLOCK
 from viewsphere.urls.remote_path import RemotePath as RemotePath
 
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.:-]+:/")
-"""How a URL begins, also where pathlib has made one slash of two; drives of Windows have but one letter."""
+"""Start of a URL, also if pathlib has merged its two slashes; drives of Windows have one letter."""
 
 
 def located(root: str | os.PathLike[str]) -> Path:

@@ -33,9 +33,7 @@ MISTAKES = (TypeError, AttributeError, NameError, NotImplementedError, MemoryErr
 """Exceptions that no further try mends, and no user."""
 
 OPTIONS: dict[str, dict[str, Any]] = {"s3": {"max_concurrency": 1, "config_kwargs": {"retries": {"max_attempts": 0}}}}
-"""What file systems are told of each kind of URL: s3fs asks neither for the size of what it reads, nor again by itself, where
-MAX_REMOTE_TRIES counts.
-"""
+"""Options of file systems by kind of URL. s3fs requests no sizes before it reads, and does not retry: MAX_REMOTE_TRIES does."""
 
 ANSWERS = (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError)
 """Exceptions that say what is there."""

@@ -53,7 +53,7 @@ CROWDED = 0.05
 """Seconds to wait where the system gives no more connections, so that the server does not spin."""
 
 TOKEN = re.compile(r"[A-Za-z0-9_-]{16,256}")
-"""What a token may be: it stands in an address and in a cookie."""
+"""Form of a token, which is used in an address and in a cookie."""
 
 WORD = re.compile(rb"[A-Za-z0-9_-]{16,}")
 """Parts of a request that may be a token."""
@@ -78,7 +78,7 @@ NOTHING = "default-src 'none'; frame-ancestors 'none'"
 """The policy of answers that are no page; a page says in its head what it may load."""
 
 OWN_SITES = ("same-origin", "none")
-"""What a browser says of requests that come from this server's page, or from nobody's."""
+"""Values of a browser's header for requests from this server's page, or from no page."""
 
 
 @dataclass(frozen=True)

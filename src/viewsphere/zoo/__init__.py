@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 ZOO = "zoo:"
 
 Home = Literal["table", "floor", "street", "garden", "water", "place"]
-"""Where a family is found; `place`: it is a place's ground or building, not a thing in it."""
+"""Usual surroundings of a family; `place`: the ground or building of a place, not a thing in it."""
 
 
 def home(family: str) -> Home:

@@ -35,7 +35,7 @@ Closure = Literal["foil", "cork", "crown", "screw", "flip", "lid", "none"]
 
 
 RIB = 0.002
-"""How deep the grooves of a thin bottle are, metres."""
+"""Depth of the grooves of a thin bottle, metres."""
 
 ROUND = 30
 """Sides of a turned body."""

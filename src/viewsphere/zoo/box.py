@@ -38,7 +38,7 @@ SKELETON = tuple(
 
 Style = Literal["taped", "open", "lidded"]
 SHEET = 0.004
-"""How thick cardboard is, metres."""
+"""Thickness of cardboard, metres."""
 
 
 @dataclass(frozen=True)

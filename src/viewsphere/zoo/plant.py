@@ -44,7 +44,7 @@ SPREAD = {
     **{"ficus": 1.05, "rubber": 0.8, "snake": 0.6, "fern": 2.25, "rosette": 2.55},
     **{"aloe": 1.4, "cactus": 0.85, "hearts": 2.05, "palm": 1.3},
 }
-"""How wide each habit grows, times its reach, at most."""
+"""Largest width of each habit, in multiples of its reach."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ _HABITS: dict[str, tuple[tuple[float, float], tuple[float, float], Greens]] = {
     "hearts": ((0.17, 0.3), (0.06, 0.09), _FRESH + _DEEP),
     "palm": ((0.42, 0.7), (0.07, 0.11), _FRESH + _DEEP),
 }
-"""How far above the soil, how large a pot, and which greens."""
+"""Height above the soil, size of the pot, and greens."""
 
 _CLAYS: tuple[tuple[Color, Color, Color], ...] = (
     ((0.72, 0.4, 0.26), (0.93, 0.88, 0.78), (0.4, 0.22, 0.14)),

@@ -46,7 +46,7 @@ Chaise = Literal["none", "left", "right"]
 
 
 REACH = 0.68
-"""How far a chaise reaches before the sofa's front, metres."""
+"""Length of a chaise beyond the sofa's front, metres."""
 
 
 @dataclass(frozen=True)

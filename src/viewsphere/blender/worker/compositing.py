@@ -7,7 +7,7 @@ import numpy as np
 
 
 def tree_of(scene):
-    """The nodes of a scene's compositor, None without any."""
+    """The nodes of a scene's compositor, or None."""
     if not scene.render.use_compositing:
         return None
     if hasattr(scene, "compositing_node_group"):  # Blender 5.0 and later

@@ -38,7 +38,7 @@ def expected_triangles(item, render):
 
 
 def _factor(modifier, render, corners):
-    """The number of faces that a modifier makes of one face with so many corners."""
+    """The number of faces that a modifier makes of one face with this number of corners."""
     if modifier.type in ("SUBSURF", "MULTIRES"):
         levels = modifier.render_levels
         if render.use_simplify:

@@ -234,7 +234,7 @@ def _cast(target: _Target | None, origins: Float, directions: Float) -> tuple[Fl
 
 
 def _read(file: Path, step: str | None, fronts_only: bool) -> _Soup:
-    """An exported GLB in the object's axes; of a model that deforms what is below a time step's node. fronts_only: whether
+    """An exported GLB in the object's axes; of a deforming model, the mesh below a time step's node. With `fronts_only`,
     cameras do not see the backs of single-sided materials.
     """
     import trimesh

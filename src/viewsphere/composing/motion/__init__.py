@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 Amplitude = Drawn[tuple[Drawn[Strength], Drawn[Strength], Drawn[Strength]]]
-"""How far to either side, along or about x, y and z; 0 or more."""
+"""Amplitudes to either side, along or about x, y and z; 0 or more."""
 
 Move = Callable[[float, Pose], Pose | None]
 """The pose at a time, seconds from the sequence's first instant, of a thing that is at a pose without this motion; None where

@@ -66,7 +66,7 @@ def _back_and_forth(seconds: float, length: float) -> float:
 
 
 LOOPS: dict[Loop, Callable[[float, float], float]] = {"once": _once, "loop": _loop, "back_and_forth": _back_and_forth}
-"""What of an animation that lasts `length` seconds is shown so many seconds after its beginning."""
+"""The time within an animation of `length` seconds, from the seconds since its beginning."""
 
 
 MOTION = MotionSpec(options=Options, moves=moves)

@@ -15,7 +15,7 @@ from viewsphere.errors import MissingExtraError
 Float = NDArray[np.float64]
 
 FLAT = 0.01
-"""How thick a flat model is taken to be, as a share of its length: a body without a volume cannot collide."""
+"""Thickness given to flat models, as a share of their length: a body without a volume cannot collide."""
 
 
 @dataclass(frozen=True)

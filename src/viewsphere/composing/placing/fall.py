@@ -21,7 +21,7 @@ from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 
 LOOSE = 2.0
-"""How many times as large as the things' boxes together the floor is over which they are let go."""
+"""Floor area over which things are dropped, in multiples of their boxes' total."""
 
 TOP = 0.03
 """Metres that a surface above the floor is thick."""

@@ -29,7 +29,7 @@ LOOSE = 8.0
 
 
 class Options(Gaps):
-    """Options of how closely models stand, and how far from the middle."""
+    """Options: gaps between models, and their distance from the middle."""
 
     reach: Drawn[Length] | None = Field(
         default=None,

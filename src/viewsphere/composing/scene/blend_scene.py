@@ -177,7 +177,7 @@ class BlendScenery(Sendable):
         return _rows(_inverse(np.eye(4) if self.entry.at is None else self.file.by_name[self.entry.at].file_from_object))
 
     def pieces(self, model: str, pose: str | None, category_id: Naming) -> tuple[SceneryPiece, ...]:
-        """The labelled objects that are shown, then all that is background as one piece."""
+        """The labelled objects that are shown, then the whole background as one piece."""
         return self._pieces(frozenset(self.hidden(model, pose)), category_id)
 
     @cached_property

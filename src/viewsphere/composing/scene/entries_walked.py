@@ -50,7 +50,7 @@ def _entries(folder: Path, depth: int | None) -> Iterator[str]:
 
 
 def named(path: Path, field: str) -> Path:
-    """The path; raises RecipeError, beginning with the recipe's field, where the path is not text that records can hold."""
+    """The path; raises RecipeError, beginning with the recipe's field, if records cannot hold the path as text."""
     if is_utf8(str(path)):
         return path
     raise RecipeError(f"{field}: the name {printable(str(path))} is not UTF-8. Rename the file or folder")

@@ -37,7 +37,7 @@ TRIES = 200
 """Spots that are tried for one plane."""
 
 SCENERY = "scenery-"
-"""What keys of scenery begin with."""
+"""Prefix of scenery's keys."""
 
 UPRIGHT: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
 

@@ -57,9 +57,8 @@ SPARE = 4.0
 """Factor by which the clipping range of cameras that draw exceeds the depths seen at the centres of pixels, at both ends."""
 
 COMPONENTS = {"picture": 4, "light": 12, "objects": 3, "materials": 2}
-"""What a render gives, and how many numbers of each pixel: radiance and alpha; albedo, diffuse light, all other light and
-emission; of a render that does not show the ground, the albedo; and, of one that sees the pixels' centres alone, roughness and
-metallic.
+"""Results of a render, with their numbers a pixel: radiance and alpha; albedo, diffuse light, all other light and emission;
+the albedo, from a render without the ground; roughness and metallic, from a render of the pixels' centres.
 """
 
 Float32 = NDArray[np.float32]

@@ -13,7 +13,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import one_of
 
 ANTIALIAS = (1, 4, 16, 64)
-"""How many samples an edge pixel may have; beyond four, every pixel has a quarter as many."""
+"""Allowed numbers of samples in an edge pixel; beyond four, every pixel has a quarter as many."""
 
 
 @dataclass(frozen=True)

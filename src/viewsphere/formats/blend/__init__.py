@@ -58,7 +58,7 @@ def check() -> None:
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Pictures of which none has a known camera and viewpoint."""
+    """Reasons to refuse: no picture has a known camera and viewpoint."""
     yield from any_view(scope)
 
 

@@ -46,7 +46,7 @@ def pointless(scope: Scope) -> Iterator[str]:
 
 
 def measured(sample: Sample) -> NDArray[np.void]:
-    """The points of a LiDAR's sample, rows of `viewsphere.model.lidar.POINT`; raises UserError where they are not kept."""
+    """The points of a LiDAR's sample, rows of `viewsphere.model.lidar.POINT`; raises UserError if the data set lacks them."""
     if LIDAR not in sample.channels:
         raise UserError(f"frame {sample.index}: expected channel {LIDAR} of a LiDAR, found none: render it with {LIDAR}")
     return sample.channels[LIDAR]

@@ -17,7 +17,7 @@ from viewsphere.store.paths import is_name
 
 
 def two_eyes(scope: Scope) -> Iterator[str]:
-    """Of a format of one camera, or of a rectified pair: all else of a rig, and rigs that nobody knows."""
+    """Reasons to refuse, for a format of one camera or a rectified pair: other rigs, and unknown ones."""
     yield from unknown_shots(scope)
     if scope.rig is not None:
         names = [sensor.name for sensor in scope.rig.sensors if sensor.lidar is None]

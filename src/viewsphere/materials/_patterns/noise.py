@@ -10,7 +10,7 @@ from viewsphere.materials._patterns.kernels_noise import add_noise, find_cells
 from viewsphere.materials._patterns.surface import Map
 
 Cells = int | tuple[int, int]
-"""How many a side, or across and down."""
+"""Number of cells along each side, or across and down."""
 
 
 def noise(size: int, cells: Cells, seed: int, octaves: int = 1, gain: float = 0.5) -> Map:

@@ -27,7 +27,7 @@ MOST_SUBJECTS = 1000
 """Subjects that are looked at beforehand, the first ones; the others are when their shots are made."""
 
 UNKNOWN = (np.nan, np.nan, np.nan)
-"""Where something is whose model was not read."""
+"""Position of a thing whose model was not read."""
 
 
 def check_sequences(planned: Plan) -> None:

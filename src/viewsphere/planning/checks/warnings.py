@@ -31,13 +31,13 @@ MOST_POSES = 1000
 """Poses that are looked at, evenly over all."""
 
 UNKNOWN = 30.0
-"""How much brighter or darker than its strength says a lamp may be, which may be near, or a photograph."""
+"""Uncertainty of a light's brightness, as a factor of its strength: a lamp may be near, and a photograph varies."""
 
 DARK, BRIGHT = 2.0**-10, 16.0
 """Radiance that every view transform shows as black, and as white."""
 
 DRAWS = 20
-"""How often random poses are drawn to tell what is so in their mean."""
+"""Number of random poses that are drawn for a mean."""
 
 MOSTLY = 2 / 3
 """Share of the picture; a camera that looks ahead has half of it below the horizon."""

@@ -17,10 +17,10 @@ from viewsphere.model.mistakes import told_of
 Float = NDArray[np.float64]
 
 CENTER = 0.5
-"""What is added to principal points that are counted from the centre of the first pixel."""
+"""Offset added to principal points that are counted from the centre of the first pixel."""
 
 RIGHT_ANGLES = 1e-3
-"""How far a file's rotation may be from one, as files of few digits are; it is then made one."""
+"""Tolerance for rotations in files, which may have few digits; the nearest rotation replaces them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from viewsphere.model.camera import Intrinsics
 Float32 = NDArray[np.float32]
 
 SPLIT = 0.01
-"""How much larger red is at strength 1, and how much smaller blue."""
+"""Enlargement of red at strength 1, and reduction of blue."""
 
 DARKEST = 0.1
 """Share of its light that the farthest corner keeps at strength 1."""

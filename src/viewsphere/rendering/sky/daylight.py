@@ -14,7 +14,7 @@ Float = NDArray[np.float64]
 _WHITE = 33.3
 """kcd/m2 that make a radiance of 1: so the sun's usual strength, 3, is 100 klx, what arrives through clear air (IES RP-21)."""
 _CLEAR = 1.8
-"""How much Preetham's sky is too bright: it sheds 29 klx on level ground at turbidity 3 and with the sun at 45 degrees, where
+"""Factor by which Preetham's sky is too bright. At turbidity 3 and with the sun at 45 degrees it sheds 29 klx on level ground;
 clear skies shed 14 klx (IES RP-21: 0.8 + 15.5 sine^0.5 klx). Zotti et al. 2007 find the same.
 """
 _BALANCED = np.array([0.92, 1.02, 1.09])

@@ -25,7 +25,7 @@ LAYER = 60.0
 """Metres of fog overhead, where nothing is said."""
 
 DARK = 0.3
-"""How much darker clouds are that rain or snow falls from, beside others, as a photographer exposes them."""
+"""Brightness of rain and snow clouds relative to others, at a photographer's exposure."""
 
 METERED = 0.85
 """Radiance of thick fog as a photographer exposes it: a light grey."""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from viewsphere.run.tasks import Worker
 
 LIVES = 2
-"""How often a task is tried when its process dies; the last time alone, as memory may have been what it lacked."""
+"""Tries of a task whose process dies; the last one runs alone, in case memory was too small."""
 
 MOST_DEATHS = 16
 """Deaths of workers, with no job ended in between, after which a run ends: what kills these kills the next ones, too."""

@@ -37,10 +37,10 @@ TICK = 1.0
 """Seconds between two looks at which machines there are, and how far workers are with their jobs."""
 
 STARTS = 3
-"""How often in a row workers may die while they start before their machine is left out."""
+"""Workers that may die in a row while starting before their machine is left out."""
 
 CALLS = 3
-"""How often a cluster is called where somebody listens: one whose machines are busy may be too slow to answer at once."""
+"""Calls to a cluster whose port is open: a busy one may be too slow to answer the first."""
 
 GRACE = 10.0
 """Seconds that a cluster has to answer when a run begins, and its workers to be gone when it ends."""

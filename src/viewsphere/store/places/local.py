@@ -17,16 +17,16 @@ from viewsphere.store.shots.manifest import MANIFEST
 from viewsphere.store.shots.moving import move, write_through
 
 NEW, OLD = "new", "old"
-"""What is being made, aside; and below the other, by its path in the data set, what it takes the place of."""
+"""Scratch folders: NEW for results in progress; OLD, by paths in the data set, for the folders that they replace."""
 
 LOCK_S = 600
 """Seconds that a run waits for others who change what runs have in common, which takes them moments."""
 
 NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
-"""What file systems say that have no locks."""
+"""Errors of file systems without locks."""
 
 TAKEN = {errno.ENOTEMPTY, errno.EEXIST}
-"""What POSIX systems say where another run was faster; Windows says it as it says all that it refuses."""
+"""Errors of POSIX systems if another run was faster; Windows has no error of its own for this."""
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ Seen = tuple[str, int, str, int, float]
 
 
 IsShown = Callable[[Container[str]], Any]
-"""Whether samples with these channels can be shown."""
+"""Test whether samples with these channels have a picture to show."""
 
 
 def films_of(samples: Sequence[Sample], is_shown: IsShown = picture_of) -> list[Film]:

@@ -204,7 +204,7 @@ class Store:
                 yield Gap(part, is_added, first, shots - len(there), lost, frames)
 
     def finished(self) -> Iterator[str]:
-        """Keys of all shots that are there, in no order."""
+        """Keys of all finished shots, in no order."""
         return self.place.finished()
 
     def wanted(self, plan: PlanRecord) -> Iterator[Row]:

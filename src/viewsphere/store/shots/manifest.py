@@ -40,7 +40,7 @@ Seal = tuple[int, str]
 """A file's size in bytes and its digest."""
 
 Span = tuple[int, int, str]
-"""Where a file begins in a shard, its size in bytes and its digest."""
+"""A file's offset in a shard, its size in bytes and its digest."""
 
 
 def digest(data: bytes | memoryview) -> str:
@@ -197,7 +197,7 @@ def _is_json(file: Path) -> bool:
 
 
 REPAIR = "mend it with viewsphere check --repair"
-"""What a user can do about damaged files."""
+"""The fix for damaged files, for messages."""
 
 
 def said(told: Seal | None) -> str:

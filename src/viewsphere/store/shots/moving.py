@@ -22,7 +22,7 @@ DURABILITY = "VIEWSPHERE_DURABILITY"
 """The variable that asks for it; processes that are started meanwhile have it, too."""
 
 DURABILITIES = ("none", "fsync")
-"""What it may be; the first is the default."""
+"""Values of the variable; the first is the default."""
 
 AT_ONCE = 8
 """Files that are written to the disk at once, which then does so together: a quarter of the time of one after another."""
@@ -32,8 +32,7 @@ WAITS_S = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8) if os.name == "nt" else ()
 open what was just written."""
 
 NOT_OURS = {errno.EACCES, errno.EPERM, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP}
-"""What systems say of folders that are not ours to write to the disk, or that their file system does not write so, as that of
-automatic mounts."""
+"""Errors for folders that we may not flush to the disk, or that their file system cannot flush, such as automatic mounts."""
 
 
 def durability() -> str:

@@ -38,14 +38,14 @@ PRODUCT = "product"
 """The sampler of models x poses."""
 
 IMPORT = "import"
-"""What stands for a sampler where somebody else made the pictures."""
+"""The sampler's name in data sets with imported pictures."""
 
 KEEP = "keep_annotations_above"
 """The field of recipes that says which annotations exports leave out."""
 
 
 _STRICTLY = ConfigDict(extra="forbid", allow_inf_nan=False)
-"""How what was read is compared with the types of a record's fields."""
+"""Strict validation of records: no unknown keys, no infinities, no NaN."""
 
 
 def _box(value: Any) -> NDArray[np.float64]:

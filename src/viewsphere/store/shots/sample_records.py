@@ -38,7 +38,7 @@ from viewsphere.store.shots.records import typed
 
 Channels = Mapping[str, NDArray[Any]]
 Facts = Callable[[str, int | None], ModelFacts]
-"""What is known of a model, by its key, and the frame of its file that it shows, None at rest."""
+"""Facts of a model, by its key and the frame of its file, None at rest."""
 
 
 def short_sample(sample: Sample) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""Correspondence: where the points that one view's pixels show are in another view, and whether they are seen there.
+"""Correspondence: positions in another view of the points that one view's pixels show, and their visibility there.
 
-A pixel's point is where its ray meets the first surface. It sticks to its thing; to its triangle where the thing deforms; the
-ground is a fixed plane, the sky a direction. All is computed in float64.
+A pixel's point is the place where its ray meets the first surface. It moves with its thing, or with its triangle if the thing
+deforms. The ground is a fixed plane, the sky a direction. All computation is in float64.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ Drawn = tuple[NDArray[np.int64], Float]
 """Triangles (n,) and barycentrics (n, 3) of points."""
 
 ROUNDS = 100
-"""How often as many points are drawn as are wanted, until enough of them are on surface, not in the gaps of cut-outs."""
+"""Most rounds of drawing points until enough lie on surface rather than in gaps of cut-outs."""
 
 
 def points_on(view: View, count: int, rng: np.random.Generator, things: Sequence[int] | None = None) -> SurfacePoints:

@@ -19,7 +19,7 @@ Float = NDArray[np.float64]
 Whole = NDArray[np.int32]
 
 GROUND, SKY, FREE, NOWHERE = -1, -2, -3, -4
-"""What a point lies on that lies on no thing: the ground, the sky, nothing that is there, a flat picture."""
+"""Places of points on no thing: the ground, the sky, empty space, a flat picture."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from viewsphere.truth.view import View
 Float = NDArray[np.float64]
 Whole = NDArray[np.int32]
 VISIBLE, OCCLUDED, OUTSIDE, BEHIND, INVALID = range(5)
-"""Whether a point is seen in a view, in the order in which this is decided from behind.
+"""States of a point in a view; later ones take precedence.
 
 INVALID: it is nowhere (its thing is not there or has other triangles, a flat picture). BEHIND: behind the camera, or the lens
 has no pixel for its direction. OUTSIDE: not in [0, W) x [0, H). OCCLUDED: the segment from the camera's centre to the point

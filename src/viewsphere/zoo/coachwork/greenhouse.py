@@ -13,7 +13,7 @@ from viewsphere.zoo.shapes.panels import frame, in_quad, rim
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, flipped, grid
 
 GLASS_DEPTH = 0.009
-"""How far panes lie behind their frames, metres."""
+"""Depth of panes behind their frames, metres."""
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ class Hub:
 
 
 def on_axle(solid: Solid) -> Solid:
-    """The solid turned from standing on z up to lying on the axle along x: z becomes x."""
+    """The solid, turned so that its z axis lies on the axle along x."""
     return turned(solid, 1, np.pi / 2)
 
 

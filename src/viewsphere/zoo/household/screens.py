@@ -228,4 +228,4 @@ def _player(c: Canvas, rng: np.random.Generator) -> None:
 SHOWS: dict[str, Show] = {
     "desktop": _desktop, "editor": _editor, "browser": _browser, "charts": _charts, "photo": _photo, "player": _player,
 }  # fmt: skip
-"""All that a screen can show, by name."""
+"""The contents of screens, by name."""

@@ -36,7 +36,7 @@ STEP = 0.05
 """Metres between spots that are tried along a wall."""
 
 SWING, DRAPE, SIGHT = 0.95, 0.2, 0.7
-"""How far into the room, metres, doors need the floor, curtains and radiators hang, and nothing tall stands before a window."""
+"""Depth into the room, metres, of the floor that doors need, of curtains and radiators, and of free space before windows."""
 
 Rectangle = tuple[float, float, float, float]
 """Lowest x and y, highest x and y."""

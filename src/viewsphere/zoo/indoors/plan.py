@@ -13,7 +13,7 @@ SIDES: tuple[Side, ...] = get_args(Side)
 """Walls in the order of the turns -0, -90, -180, -270 degrees that bring the rear one (+Y) there; right is +X."""
 
 RIGHT: dict[Side, tuple[int, int]] = {"rear": (1, 0), "right": (0, -1), "front": (-1, 0), "left": (0, 1)}
-"""Where a wall's right is as it is seen from the room, x and y."""
+"""Direction to a wall's right as seen from the room, x and y."""
 
 INNER, OUTER = 0.12, 0.32
 """Thickness of walls between two rooms, and of those to the outside."""

@@ -14,7 +14,7 @@ from viewsphere.zoo.townscape import masonry
 from viewsphere.zoo.townscape.surfaces import cuboid
 
 SKIRTING = (0.014, 0.085)
-"""How far skirting boards stand out, and how high they are."""
+"""Thickness and height of skirting boards, metres."""
 
 
 def on_side(solid: Solid, room: Room, side: Side, outwards: bool = False) -> Solid:

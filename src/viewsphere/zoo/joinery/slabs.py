@@ -16,7 +16,7 @@ Height = Callable[[Float, Float], Float]
 
 
 def polygon(corners: ArrayLike, radius: float, spacing: float = 0.03) -> Float:
-    """A closed counter-clockwise outline (N, 2) with rounded corners, its sides divided for bending."""
+    """A closed counter-clockwise outline (N, 2) with rounded corners and sides divided for bending."""
     return dense(bend(corners, radius, 6, closed=True), spacing, closed=True)
 
 

@@ -90,7 +90,7 @@ def _bar(p: Motorcycle, c: Coats) -> list[Piece]:
 
 
 def headlight(at: Float, radius: float, c: Coats) -> list[Piece]:
-    """A round lamp that looks ahead, and indicators beside it."""
+    """A round headlight, and indicators beside it."""
     shell = [
         (0, -0.11),
         (0.45 * radius, -0.1),

@@ -19,7 +19,7 @@ from viewsphere.zoo.townscape.blocks import CORNER, HALF, LANE, PAVED, Block
 from viewsphere.zoo.townscape.plan import STEP
 
 DESIGNS = {"car": 9, "person": 8, "tree": 6, "shop": 12, "house": 6, "bench": 2, "wheelie_bin": 2, "shrub": 3}
-"""How many members of a family a town has, of which it places many; of all others there is one."""
+"""Number of designs in a town, for families with many copies; other families have one."""
 
 KINDS: dict[str, Callable[[Any], bool]] = {
     "": lambda p: True,
@@ -29,7 +29,7 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "backed": lambda bench: bench.backrest,
     "walking": lambda person: person.walks,
 }
-"""Which members of a family are of a kind."""
+"""Tests for members of a kind."""
 
 ROADS = True
 

@@ -140,4 +140,4 @@ def flap(p: Backpack, bag: Bag, c: dict[str, Material]) -> list[Piece]:
 
 
 CLOSINGS = {"school": school, "hiking": hiking, "roll_top": roll_top, "flap": flap}
-"""What makes a style's closing, from the parameters, the main bag and the materials."""
+"""Maker of a style's closing, from the parameters, the main bag and the materials."""

@@ -40,7 +40,7 @@ BORDER = 14.0
 """Width of the green strip around the town."""
 
 ZEBRA = (1.6, 4.4)
-"""Where the zebra crossings of a junction begin and end, beyond the corners' curves."""
+"""Start and end of a junction's zebra crossings, beyond the corners' curves."""
 
 SPACE = 5.8
 """Length of a space to park in."""

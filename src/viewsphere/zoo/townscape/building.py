@@ -24,7 +24,7 @@ GARAGE = 3.4
 """Width of a garage's block, metres."""
 
 WING = 1.3
-"""How far a wing stands before the front, metres."""
+"""Distance by which a wing projects from the front, metres."""
 
 STOREY = 2.75
 FLOOR = 0.18

@@ -13,7 +13,7 @@ from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, moved, turne
 from viewsphere.zoo.townscape.surfaces import cuboid
 
 REVEAL = 0.13
-"""How far frames lie behind the wall, metres."""
+"""Depth of frames behind the wall, metres."""
 
 Bars = Literal["plain", "double", "cross", "sash", "georgian"]
 

@@ -16,7 +16,7 @@ DROPPED = 0.025
 """Height of the kerb where a driveway crosses it."""
 
 HALF_WIDTH, HALF_LENGTH = 30.0, 100.0
-"""Where a street's gardens end and the country begins."""
+"""Distance at which a street's gardens end and the country begins."""
 
 PLOT = 19.0
 """Width of one house's plot along the street."""

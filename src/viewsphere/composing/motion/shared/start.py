@@ -20,7 +20,7 @@ from viewsphere.zoo.places import Lane
 Float = NDArray[np.float64]
 
 Origin = Literal["placed", "world"]
-"""What positions count from: where the thing is placed, or the world's origin."""
+"""Origin of positions: the thing's place, or the world's origin."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,7 @@ at rest than one in which something trembles on and on.
 """
 
 ROUNDS = 2
-"""How often things that fell beside are let go again, for each of the cast."""
+"""Times that things which missed are dropped again, for each of the cast."""
 
 SPOTS = 12
 """Spots that are tried for each thing that is let go; the lowest is taken."""
@@ -47,7 +47,7 @@ CLEAR = 0.001
 """The same of things that are caught in flight, where some hit others."""
 
 FENCE, GAP = 50.0, 0.001
-"""How high fences are, in lengths of the longest thing, and how far from what is let go, metres."""
+"""Height of fences, in lengths of the longest thing, and their distance from dropped things, metres."""
 
 RECORDED = 5
 """Steps of the simulation between two states of a way."""

@@ -26,7 +26,7 @@ sooner."""
 
 Float = NDArray[np.float64]
 Cover = Callable[[Matrix4], Any]
-"""What a thing at a pose covers of the floor: a Footprint, or an Outline."""
+"""The floor that a thing at a pose covers: a Footprint, or an Outline."""
 
 
 @dataclass(frozen=True, eq=False)

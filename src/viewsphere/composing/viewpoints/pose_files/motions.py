@@ -15,7 +15,7 @@ from viewsphere.geometry.rotation import matrix_from_quaternion
 Float = NDArray[np.float64]
 
 RIGHT_ANGLES = 1e-3
-"""How far a file's rotation may be from one, as files of few digits are; it is then made one."""
+"""Tolerance for rotations in files, which may have few digits; the nearest rotation replaces them."""
 
 
 def from_quaternion(wxyz: Sequence[float], where: str) -> Float:

@@ -31,7 +31,7 @@ OFFSETS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
 
 MOST_LAYERS = 8
 POINTS_AT_ONCE = 1 << 20
-"""How many points are sorted by depth in one pass (100 MB of lists)."""
+"""Number of points that are sorted by depth in one pass (100 MB of lists)."""
 
 _CENTER = np.full((2, 4), 0.5)
 _ROTATED = np.array(OFFSETS).T.copy()

@@ -35,8 +35,8 @@ metres below to so many above.
 """
 
 WIDER, FADE, LAST = 6.0, 6.0, 2.0
-"""How much wider the cells of the volume around that part are; cells within which what the inner volume knows becomes what the
-outer one does, and within which what the outer one knows becomes light of the sky.
+"""Size of the outer volume's cells, in cells of the inner volume; cells over which the inner volume's light fades into the
+outer one's; cells over which the outer volume's light fades into skylight.
 """
 
 ABOVE = 0.25

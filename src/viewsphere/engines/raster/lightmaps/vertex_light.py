@@ -40,7 +40,7 @@ NEAR, NEAR_RAYS = 1.5, 16
 """Cells within which a point itself looks for what is in its way, and with how many rays."""
 
 THROWN_BACK = 0.3
-"""How much light comes from what is near, as a share of what it takes away."""
+"""Light that near surfaces reflect, as a share of the light that they block."""
 
 
 @dataclass(frozen=True, eq=False)

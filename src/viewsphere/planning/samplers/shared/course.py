@@ -29,7 +29,7 @@ from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.sequence import TimeEntry
 
 Way = Callable[[float], Matrix4]
-"""Where a thing was at a time, seconds, on the way to where it is placed."""
+"""The pose of a thing at a time, seconds, on the way to its place."""
 
 
 @dataclass(frozen=True, eq=False)
