@@ -40,8 +40,7 @@ def asked(monkeypatch):
         files[file.name] = SimpleNamespace(shot=shot, samples=samples, load=load, data=data)
         return ("lacks a thing",)
 
-    monkeypatch.setattr(cycles, "save", save)
-    monkeypatch.setattr(cycles, "check", lambda options: None)
+    monkeypatch.setattr(cycles, "ENGINE", cycles.ENGINE.model_copy(update={"save": save, "check": lambda options: None}))
     return files
 
 

@@ -18,6 +18,7 @@ from viewsphere.assets.srgb import linear
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
+from viewsphere.materials import brick as brick_module
 from viewsphere.materials import metres, surface
 from viewsphere.materials.brick import Brick
 from viewsphere.model.scene import Ground
@@ -223,7 +224,7 @@ def test_sentences_say_what_a_model_is_made_of(chair, monkeypatch):
     leaves = looks_of(replace(chair, materials=tuple(Material(m.name, alpha_mode="MASK") for m in chair.materials)))
     assert words(leaves, (Repaint(texture=WOOD),))[1] != "wooden"  # they stay what they are
     brick = Brick(colors=((0.3, 0.03, 0.02),) * 3, rows=16)  # whose joints come back every 8 texels
-    monkeypatch.setattr("viewsphere.materials.brick.draw", lambda rng: brick)
+    monkeypatch.setattr(brick_module, "MATERIAL", brick_module.MATERIAL.model_copy(update={"draw": lambda rng: brick}))
     assert words(looks, (Repaint(texture=Substance(name="brick", seed=77, size=128)),)) == ("red", "brick")
 
 

@@ -8,6 +8,7 @@ import pytest
 from command_line import viewsphere
 from small import ROOT, small_recipe
 from viewsphere import Dataset, Recipe, generate
+from viewsphere.formats import blend
 from viewsphere.recipe.formats import read_formats
 from viewsphere.run.unused import among
 
@@ -41,7 +42,7 @@ def test_a_format_that_cannot_be_written_here_is_no_error(tmp_path, monkeypatch)
     def refuse():
         raise AssertionError
 
-    monkeypatch.setattr("viewsphere.formats.blend.check", refuse)
+    monkeypatch.setattr(blend, "FORMAT", blend.FORMAT.model_copy(update={"check": refuse}))
     (tmp_path / "ds" / "blend").mkdir(parents=True)
     (tmp_path / "ds" / "store" / "writing").mkdir(parents=True)
     (note,) = notes_of(tmp_path / "ds", ["coco"])
