@@ -6,10 +6,11 @@
 A test file is chosen if it changed, or if it reaches a module that changed. It reaches what it imports, what its helpers
 and fixtures import, and what all of these import in turn, also inside functions (grimp reads the imports). Plug-ins, the
 command line and files are no imports. So a test also reaches what its strings name: a plug-in, a dotted path, the program,
-a file of `docs`, `recipes`, `examples`, `benchmarks` or `scripts` and what this file names in turn.
+a file of `docs`, `recipes`, `examples`, `benchmarks` or `scripts` and what this file names in turn. A test that reads all
+files of `src` is chosen for each of them.
 
-All tests are chosen where this cannot tell: without a revision to compare with, and for every other changed file. CI runs
-all tests on the default branch.
+All tests are chosen where this cannot tell: without a revision to compare with, for a module that no test reaches, and for
+every other changed file. CI runs all tests on the default branch.
 """
 
 from __future__ import annotations
@@ -52,6 +53,8 @@ LISTS = {
     "names": "viewsphere.",
 }
 """What lists plug-ins without naming them, a function or a command of the program, and those that it lists."""
+SCANS = {"rglob", "copytree"}
+"""Functions that go through all files of a folder."""
 BY_PATH = re.compile(r"attribute\(|[\"']viewsphere\.")
 PATH, PROGRAM = re.compile(r"viewsphere(?:\.\w+)+"), re.compile(r"\bviewsphere\b(?!\.)")
 WORD, FILE = re.compile(r"\w+"), re.compile(r"[\w./-]+")
@@ -77,6 +80,12 @@ class Text:
     def words(self) -> set[str]:
         """The words of all strings."""
         return {word for text in self.strings for word in WORD.findall(text)}
+
+    @property
+    def scans(self) -> bool:
+        """Whether it goes through the files of `src/viewsphere`, by that path or by the package's `__file__`."""
+        package = {"src", "viewsphere"} <= self.strings or {"viewsphere", "__file__"} <= self.names
+        return package and not SCANS.isdisjoint(self.names)
 
     @property
     def files(self) -> set[str]:
@@ -119,7 +128,8 @@ class Modules:
         graph = grimp.build_graph("viewsphere", exclude_type_checking_imports=True)
         self.all = frozenset(graph.modules)
         self.plugins = defaultdict[str, set[str]](set)
-        homes = {*(seam.package for seam in SEAMS.values()), "viewsphere.zoo", "viewsphere.zoo.places"}
+        homes = {seam.package for seam in SEAMS.values()}
+        homes |= {"viewsphere.composing.trajectories", "viewsphere.zoo", "viewsphere.zoo.places"}
         for module in self.all:
             package, _, name = module.rpartition(".")
             if package in homes and not name.startswith("_") and name != "shared":
@@ -127,14 +137,25 @@ class Modules:
         self.needs = {module: graph.find_modules_directly_imported_by(module) | self._named(module) for module in self.all}
         for loader, meant in self._implied().items():
             self.needs[loader] |= meant
+        self.needs["viewsphere"] = {"viewsphere.model.notebook"}  # all else is imported for a name that is used
+        for module in self.all - {"viewsphere"}:
+            self.needs[module].add(module.rpartition(".")[0])  # whose own file runs first
 
     def _implied(self) -> dict[str, set[str]]:
-        """By the module that loads them: the plug-ins that a recipe means without naming them."""
-        samplers = {module for module in self.all if module.startswith(f"{SEAMS['samplers'].package}.")}
+        """By the module that loads them: the plug-ins that a recipe means without naming them, and the program for Blender."""
+        samplers, worker = (
+            {module for module in self.all if module.startswith(f"{package}.")}
+            for package in (SEAMS["samplers"].package, "viewsphere.blender.worker")
+        )
         defaults = self.plugins[Shot.model_fields["engine"].default].union(
             *(self.plugins[name] for name in DEFAULT_CHANNELS if name not in PICTURES)
         )
-        return {"viewsphere.planning.plan": samplers, "viewsphere.run.stages": defaults}
+        return {
+            "viewsphere.planning.plan": samplers,
+            "viewsphere.planning.checks.models": defaults,
+            "viewsphere.run.stages": defaults,
+            "viewsphere.blender.process": worker,
+        }
 
     def _named(self, module: str) -> set[str]:
         """What a module's strings name: dotted paths, and in a plug-in the others of its kind and those it works with."""
@@ -169,13 +190,15 @@ class Modules:
             words |= {name.rpartition(".")[2] for name in text.imports}
             used |= {self.at(f"viewsphere.{home}") for name, home in _HOMES.items() if name in words}
         if programs:
-            used.add("viewsphere.cli")
+            used |= {"viewsphere.__main__", "viewsphere.cli"}
+        if "_repr_html_" in text.calls:
+            used.add("viewsphere.preview.notebook")  # which the package's own file names
         for name in self.plugins.keys() & text.words:
             used |= self.plugins[name]
         listed = text.calls & LISTS.keys()
         for kind in listed - {"names"} or listed:  # `names("labels")` lists labels alone
             used |= {module for modules in self.plugins.values() for module in modules if module.startswith(LISTS[kind])}
-        return used | ({"viewsphere.model.notebook"} if used else set())  # which the package's own file imports
+        return used
 
     def affected(self, changed: Iterable[str]) -> set[str]:
         """These modules and all that need them."""
@@ -293,14 +316,13 @@ def changed_since(revision: str | None) -> list[str]:
     return [*git("diff", "--name-only", "--no-renames", revision), *git("ls-files", "--others", "--exclude-standard")]
 
 
-def modules_of(file: str, modules: Modules) -> set[str]:
-    """The modules that a changed file of the package is; a package's own file is run for all modules in it."""
+def module_of(file: str, modules: Modules) -> str:
+    """The module that a changed file of the package is."""
     path = Path(file).relative_to("src")
     module = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
     if path.suffix != ".py" or module not in modules.all:
         raise CannotTell(f"{file} is gone, or no module")
-    inner = {name for name in modules.all if name.startswith(f"{module}.")} if path.name == "__init__.py" else set[str]()
-    return {module} | inner
+    return module
 
 
 def choose(changed: Iterable[str]) -> list[str]:
@@ -309,19 +331,26 @@ def choose(changed: Iterable[str]) -> list[str]:
         Modules(),
         Tests([file for file in git("ls-files", "-co", "--exclude-standard") if (ROOT / file).is_file()]),
     )
+    used = {node: modules.used_by(text) for node, text in tests.texts.items()}
+    reached = {file: tests.reached(file) for file in tests.files}
+    known = closure(set().union(*(used[node] for nodes in reached.values() for node in nodes)), modules.needs.__getitem__)
     chosen, read, code = set[str](), set[str](), set[str]()
     for file in changed:
         if is_test(file):
             chosen |= {file} & set(tests.files)  # one that is gone breaks none
         elif file.startswith("src/"):
-            code |= modules_of(file, modules)
+            code.add(module_of(file, modules))
         elif file.split("/")[0] in READ[:-1] or ("/" not in file and file.endswith(".md")):
             read.add(file if "/" in file else "docs/index.md")  # the tests of docs read those at the top as well
         else:
             raise CannotTell(f"any test may need {file}")
+    if unknown := code - known:
+        raise CannotTell(f"no test reaches {', '.join(sorted(unknown))}")
     affected = modules.affected(code)
-    touched = read | {node for node, text in tests.texts.items() if modules.used_by(text) & affected}
-    chosen |= {file for file in tests.files if tests.reached(file) & touched}
+    touched = read | {node for node in tests.texts if used[node] & affected}
+    if code:
+        touched |= {node for node, text in tests.texts.items() if node.startswith("tests/") and text.scans}
+    chosen |= {file for file, nodes in reached.items() if nodes & touched}
     return sorted(chosen)
 
 
