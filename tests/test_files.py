@@ -131,6 +131,7 @@ ALLOWED = {
     "files.py": "the opener",
     "formats/shared/archives.py": "writes",
     "formats/native/poses.py": "a database in memory",
+    "kernels/digests.py": "the package's own sources",
     "kernels/entries.py": "regular files of its own folder, none behind links",
     "recipe/starts": "the package's own recipes",
     "run/warm.py": "a lock",

@@ -7,6 +7,7 @@ import pytest
 
 from viewsphere import Dataset, generate
 from viewsphere.errors import StoreError, UserError
+from viewsphere.formats import yolo
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run import sights
 from viewsphere.run.completed import Completed, lacking
@@ -64,9 +65,9 @@ def test_what_cannot_be_computed_is_told(tmp_path):
         export(tmp_path / "out", "yolo")
     assert not (tmp_path / "out" / "yolo").exists()
     dataset = Dataset(tmp_path / "out")
-    module = type("module", (), {"CHANNELS": ("tracks",)})
+    needing = yolo.FORMAT.model_copy(update={"channels": ("tracks",), "needs": None})
     with pytest.raises(UserError, match="expected label tracks, found none: add it to the recipe, and render"):
-        lacking(dataset, module, FormatEntry(name="yolo"))
+        lacking(dataset, needing, FormatEntry(name="yolo"))
 
 
 @pytest.mark.slow

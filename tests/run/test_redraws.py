@@ -1,6 +1,5 @@
 """Draws that do not fit are drawn again, by one rule for the command line and for Python."""
 
-
 import numpy as np
 import pytest
 
