@@ -11,7 +11,6 @@ import pytest
 from viewsphere import Recipe, plan
 from viewsphere.assets.scene_file import SceneFile, SceneObject
 from viewsphere.assets.timeline import Blenders, Timeline
-from viewsphere.composing.scene import blend_scene
 from viewsphere.composing.scene.blend_scene import BlendScenery
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
@@ -119,7 +118,7 @@ def planes(tmp_path, monkeypatch):
     def told(*_):
         return replace(held, showing={frame: frozenset({"plane0", "plane1"}) for frame in range(1, 25)})
 
-    monkeypatch.setattr(blend_scene, "scene_file", told)
+    monkeypatch.setattr("viewsphere.assets.scene_file.scene_file", told)
 
     def recipe(azimuths, models=("zoo:chair",), blend=None, **fields):
         views = {"azimuth": list(range(azimuths)), "distance": 5}

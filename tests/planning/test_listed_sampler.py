@@ -184,7 +184,7 @@ UNFIT = {
         "time": {"frames": 2},
         "splits": {"by": "sequence", "train": 0.5, "test": 0.5},
     },
-    "scenes.count: expected no options": {"scenes": {"sampler": "listed", "count": 3}},
+    "scenes: expected no options, listed has none; found count": {"scenes": {"sampler": "listed", "count": 3}},
     "splits.by: expected frame, as shots say their splits; found scene": {"splits": {"by": "scene", "train": 0.5, "test": 0.5}},
     "splits.by: expected frame, as shots say their splits; found model": {"splits": {"train": 0.5, "test": 0.5}},
     "scene.company: expected none": {"scene": {"company": 1}},

@@ -23,7 +23,7 @@ CLASSES = [
 
 
 def test_all_of_them_are_looked_at():
-    assert set(Brief.__subclasses__()) == set(CLASSES)
+    assert {kind for kind in Brief.__subclasses__() if kind.__module__.startswith("viewsphere.")} == set(CLASSES)
 
 
 @pytest.mark.parametrize("kind", CLASSES)
