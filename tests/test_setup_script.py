@@ -52,6 +52,7 @@ def installed(clone, *words, programs="uv", status=0, **environment):
     return (log.read_text().splitlines() if log.exists() else []), run.stderr
 
 
+@pytest.mark.slow
 def test_runtime_then_dev_then_nothing(clone):
     lines, _ = installed(clone, "runtime")
     assert [line.split()[1] for line in lines] == ["venv", "pip"]
@@ -63,6 +64,7 @@ def test_runtime_then_dev_then_nothing(clone):
         assert installed(clone, kind)[0] == []
 
 
+@pytest.mark.slow
 def test_other_dependencies_are_installed_and_the_dev_group_stays(clone):
     installed(clone, "dev")
     (clone / "pyproject.toml").write_text("[project]\nname = 'other'\n")
@@ -71,6 +73,7 @@ def test_other_dependencies_are_installed_and_the_dev_group_stays(clone):
     assert installed(clone, "dev")[0] == []
 
 
+@pytest.mark.slow
 def test_pip_where_there_is_no_uv(clone):
     lines, said = installed(clone, "runtime", programs="pip")
     assert [line.split()[2] for line in lines] == ["venv", "pip"]
@@ -80,11 +83,13 @@ def test_pip_where_there_is_no_uv(clone):
     assert [line.rpartition(" ")[2] for line in lines] == ["pip>=25.1", "dev"]  # which knows groups
 
 
+@pytest.mark.slow
 def test_a_failure_keeps_its_status_and_words_and_is_tried_again(clone):
     assert "no such package" in installed(clone, "runtime", status=3, FAILS="1")[1]
     assert len(installed(clone, "runtime")[0]) == 2
 
 
+@pytest.mark.slow
 def test_a_signal_to_the_script_alone_ends_its_dots_and_its_command(clone):
     (clone / "uv" / "uv").write_text(
         '#!/bin/sh\necho $$ > "$HOME/pid.part"; mv "$HOME/pid.part" "$HOME/pid"; exec sleep 1000\n'

@@ -262,6 +262,7 @@ def texts():
                 yield node.value
 
 
+@pytest.mark.slow
 def test_reading_takes_too_long(said, monkeypatch, tmp_path):
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("VIEWSPHERE_READ_HERE")
@@ -269,6 +270,7 @@ def test_reading_takes_too_long(said, monkeypatch, tmp_path):
     assert_shown("limit MAX_READ_SECONDS", said("inspect here/ok.obj"))
 
 
+@pytest.mark.slow
 def test_reading_takes_too_much(said, monkeypatch, tmp_path):
     def flood(*_, **__):
         raise MemoryError

@@ -20,6 +20,7 @@ def doctor(*words):
     return run
 
 
+@pytest.mark.slow
 def test_a_machine_where_all_works(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(fake_blender(tmp_path)))
     said = doctor().stdout
@@ -44,6 +45,7 @@ def test_a_machine_where_all_works(tmp_path, monkeypatch):
     assert all((extra["install"] is None) == (None not in extra["packages"].values()) for extra in told["extras"])
 
 
+@pytest.mark.slow
 def test_a_machine_without_blender(tmp_path, monkeypatch):
     monkeypatch.delenv(VARIABLE, raising=False)
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
@@ -52,6 +54,7 @@ def test_a_machine_without_blender(tmp_path, monkeypatch):
     assert json.loads(doctor("--json").stdout)["blender"]["python"] is None
 
 
+@pytest.mark.slow
 def test_a_machine_that_cannot_draw(tmp_path, monkeypatch):
     """Blender dies of it, and all else is told."""
     monkeypatch.setenv(VARIABLE, str(blind_blender(tmp_path)))
@@ -61,11 +64,13 @@ def test_a_machine_that_cannot_draw(tmp_path, monkeypatch):
     assert "apt-get install libegl1 libgl1-mesa-dri" in line and "its log" not in line
 
 
+@pytest.mark.slow
 def test_an_interpreter_that_lacks_bpy(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(without_blender(tmp_path)))
     assert f"does not work, {tmp_path / 'python'}: it has no bpy: pip install" in doctor().stdout
 
 
+@pytest.mark.slow
 def test_a_system_that_lacks_a_library(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(with_modules(tmp_path, {"bpy": LACKING})))
     said = doctor().stdout

@@ -109,6 +109,7 @@ def test_a_hang_is_ended(fake):
         assert not is_alive(process.pid)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="children are found in /proc")
 def test_a_script_that_starts_an_interpreter_ends_with_it(fake):
     fake.write_text(fake.read_text().replace("exec ", "") + "\nexit $?")
@@ -130,6 +131,7 @@ def test_one_that_does_not_even_listen_is_ended(fake):
         assert not is_alive(process.pid)
 
 
+@pytest.mark.slow
 def test_one_that_is_stopped_is_closed(fake):
     process = BlenderProcess(fake)
     process.ask("hello")
@@ -171,6 +173,7 @@ def test_closed_and_forgotten_ones_end(fake):
     assert not any(is_alive(pid) or folder.exists() for pid, folder in ends)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("state", ["starting", "idle", "busy"])
 def test_it_does_not_outlive_the_one_who_started_it(fake, state):
     with subprocess.Popen([sys.executable, "-c", HOLDER, fake, state], stdin=-1, stdout=-1, text=True) as holder:

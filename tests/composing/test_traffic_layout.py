@@ -58,6 +58,7 @@ def test_a_place_without_lanes_is_refused():
         shots_of(None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["zoo:neighbourhood", "zoo:town"])
 def test_vehicles_park_in_the_places_bays_and_walkers_are_on_its_pavements(place):
     planned, shots, box_of = planned_shots(

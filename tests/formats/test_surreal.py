@@ -128,6 +128,7 @@ def read(clip, kind):
     return io.loadmat(f"{clip}_{kind}.mat")
 
 
+@pytest.mark.slow
 def test_five_files_of_matlab_and_a_video_a_clip(people, written, clips):
     kinds = (".mp4", "_depth.mat", "_segm.mat", "_gtflow.mat", "_normal.mat", "_info.mat")
     assert len(people) == 4 * FRAMES and len(clips) == 8
@@ -139,6 +140,7 @@ def test_five_files_of_matlab_and_a_video_a_clip(people, written, clips):
             assert names == {f"{kind}_{k}" for k in range(1, len(samples) + 1)}
 
 
+@pytest.mark.slow
 def test_maps_are_the_channels(clips):
     seen, moved = set(), 0
     for clip, samples in clips.items():
@@ -159,6 +161,7 @@ def test_maps_are_the_channels(clips):
     assert moved == 4 * (FRAMES - 1) and seen == set(range(25))
 
 
+@pytest.mark.slow
 def test_what_flow_says_is_where_the_body_was(clips):
     """A joint's own motion between two pictures is that of the pixels around it."""
     seen = 0
@@ -173,6 +176,7 @@ def test_what_flow_says_is_where_the_body_was(clips):
     assert seen > 100
 
 
+@pytest.mark.slow
 def test_joints_are_projected_as_the_authors_script_does(clips):
     """Exactly, after rounding, from the file alone; and near to the keypoints before."""
     K = np.array([[600, 0, 160], [0, 600, 120], [0, 0, 1]])
@@ -194,6 +198,7 @@ def test_joints_are_projected_as_the_authors_script_does(clips):
             close("surreal", "scipy: joints3D", away, real, "m", atol=2e-6)
 
 
+@pytest.mark.slow
 def test_the_world_is_upright_where_the_camera_is_level(clips):
     """-y is up and the ground y = 0, as in the authors' file; else the axis of the camera is still the world's x."""
     level = 0
@@ -211,6 +216,7 @@ def test_the_world_is_upright_where_the_camera_is_level(clips):
     assert level == 4
 
 
+@pytest.mark.slow
 def test_zrot_is_how_far_the_person_turns_from_the_camera(clips):
     """The camera is azimuth degrees counter-clockwise of the front, so that the front is as much clockwise of the camera."""
     for clip, samples in clips.items():
@@ -220,6 +226,7 @@ def test_zrot_is_how_far_the_person_turns_from_the_camera(clips):
         close("surreal", "scipy: zrot", found, -azimuth, "rad", atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_rest_of_info(people, clips):
     for clip in clips:
         found = {name: value for name, value in read(clip, "info").items() if not name.startswith("__")}
@@ -346,6 +353,7 @@ def test_joints_that_lack_are_told():
 # what is refused
 
 
+@pytest.mark.slow
 def test_what_a_scope_tells(people, videos, stills):
     scope = scope_of(people)
 
@@ -380,6 +388,7 @@ def with_object(sample, **changes):
     return replace(sample, objects=(replace(o, more={**o.more, **changes}),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -409,6 +418,7 @@ def test_a_moving_camera_leaves_nothing_written(people, tmp_path):
     assert not (tmp_path / "there" / "surreal").exists()
 
 
+@pytest.mark.slow
 def test_parts_that_have_no_number_are_told_where_they_are_seen(people):
     tree = surreal.Surreal(people)
     tree._models = {key: replace(info, body_parts=("tail", *info.body_parts[1:])) for key, info in tree._models.items()}

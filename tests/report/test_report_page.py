@@ -31,6 +31,7 @@ def test_every_toggle_changes_the_picture_and_back(page, settle):
     assert equals(picture, drawn, 0.002)
 
 
+@pytest.mark.slow
 def test_3d_models_are_drawn_at_two_pixels_for_one(page):
     """Their edges are smooth where the browser does not multisample."""
     page.locator("#models").scroll_into_view_if_needed()

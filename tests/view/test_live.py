@@ -31,6 +31,7 @@ def read(live, frames):
     return until(lambda: live.state()["read"] >= frames) and live.state()["read"] == frames
 
 
+@pytest.mark.slow
 def test_frames_are_known_as_they_are_finished(tmp_path):
     from viewsphere import generate
 
