@@ -1,4 +1,4 @@
-"""What light between surfaces costs: a furnished room of boxes, and the reference car, with and without bounces.
+"""The cost of light between surfaces: a furnished room of boxes, and the reference car, with and without bounces.
 
 CPU milliseconds over all threads, kernels warm; frames at 640 x 480 with 4x edge anti-aliasing, the median of alternating
 turns. The first stage bakes all; another light casts no new probes' rays; frames of either differ in a look-up a pixel.

@@ -1,4 +1,4 @@
-"""What all formats of trainers, poses and 3D vision cost in one pass over frames of five objects, and what they encode of it.
+"""The cost of all formats of trainers, poses and 3D vision in one pass over frames of five objects, and the encoders' share.
 
 CPU milliseconds a frame in one process. *Reading* is what every export needs once: records, and pixels of all channels. The
 formats' own rows are what they make of a frame: JSON, polygons, PNG, HDF5, points; an encoding that several share counts once.

@@ -1,4 +1,4 @@
-"""What each label costs: CPU milliseconds at 640x480 with 1 and with 20 objects, in the order in which frames compute them.
+"""The cost of each label: CPU milliseconds at 640x480 with 1 and with 20 objects, in the order in which frames compute them.
 
 Frames show zoo cars on a floor; each label is timed alone, on a view whose triangles are drawn already, and against one ray of
 Embree a pixel in the same run. The triangles themselves, and the channels depth, instances and normals, stand first: a label

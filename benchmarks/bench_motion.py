@@ -1,4 +1,4 @@
-"""What motion costs, as ratios inside one run: CPU time over all threads, the least of several turns, kernels warm.
+"""The cost of motion, as ratios inside one run: CPU time over all threads, the least of several turns, kernels warm.
 
 Car: the reference scene's, driven in a curve while the camera orbits. Town: the zoo's neighbourhood with 20 moving zoo cars,
 seen by a stereo pair that drives above the road. Turns of what is compared alternate, so that a load that slows the machine

@@ -1,4 +1,4 @@
-"""How much CPU time the parts of a run take, measured around its functions from outside."""
+"""The CPU time of a run's parts, measured around its functions from outside."""
 
 from __future__ import annotations
 

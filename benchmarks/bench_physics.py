@@ -1,4 +1,4 @@
-"""What physics costs: CPU seconds of one process until 20 zoo models lie still, three draws each; and how well they lie.
+"""The cost of physics: CPU seconds of one process until 20 zoo models lie still, three draws each; and how well they lie.
 
     benchmarks/bench --physics
 

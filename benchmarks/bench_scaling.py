@@ -1,4 +1,4 @@
-"""How a frame's cost grows with triangles, pixels, objects and textures: CPU time of truth and colour, drawn as a chart."""
+"""The growth of a frame's cost with triangles, pixels, objects and textures: CPU time of truth and colour, drawn as a chart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a frame of a drive through the town costs: recipes/town.yaml with 20 things that move, stage by stage, and its memory.
+"""The cost of a frame of a drive through the town: recipes/town.yaml with 20 things that move, stage by stage, and its memory.
 
 CPU milliseconds over all threads of one process, the median over frames but for the first two, which bake what is kept. Files
 are not written. The floor is one ray a pixel by Embree, cast at the same instants from the same cameras, its tree built before.

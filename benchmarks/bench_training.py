@@ -1,4 +1,4 @@
-"""How fast frames reach a training loop, beside the least that they can cost: PyTorch loaders with two workers.
+"""The rate at which frames reach a training loop, beside their least cost: PyTorch loaders with two workers.
 
 Reading: pictures, depth and boxes of the reference scene by `vs.open(...).select`, in order and shuffled, beside two processes
 that only decode the same files, and a loader that does nothing else: it copies batches into memory that processes share, which

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 LOOKED_AHEAD = 65_536
-"""How many random numbers are drawn at a time."""
+"""The number of random numbers drawn at a time."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """What there is to do: so many shots, of `frames` each, whose `seconds` on one core are drawn from those measured. Each
+    """The work: so many shots, of `frames` each, whose `seconds` on one core are drawn from those measured. Each
     is stored as so many `objects` of together so many `bytes`.
     """
 
@@ -32,7 +32,7 @@ class Load:
 
     @property
     def core_hours(self) -> float:
-        """What the shots take on one core that never fails, in hours."""
+        """The hours that the shots take on one core that never fails."""
         return self.shots * sum(self.seconds) / len(self.seconds) / 3600
 
 
@@ -59,8 +59,8 @@ class Cluster:
 
 @dataclass(frozen=True)
 class Course:
-    """How a run went: its makespan in seconds; shots finished and lost (made again); the seconds for which workers made shots
-    that were finished; the core seconds there were.
+    """The outcome of a run: its makespan in seconds; shots finished and lost (made again); the seconds for which workers made
+    shots that were finished; the core seconds there were.
     """
 
     makespan: float
@@ -81,7 +81,7 @@ def simulate(load: Load, cluster: Cluster, seed: int = 0) -> Course:
 
 
 IDLE, MADE, STORED, FAILED = range(4)
-"""What may happen: a worker asks for a shot, has made it, has it stored; a node fails."""
+"""The events: a worker asks for a shot, has made it, has it stored; a node fails."""
 
 
 class _Run:

@@ -46,7 +46,7 @@ TIMES = {
     ("SIGSTOP, SIGCONT", "render"): 5,
     ("workers SIGSTOPped, Ctrl-C", "render"): 5,
 }
-"""How often each fault hits each work."""
+"""The number of times that each fault hits each work."""
 
 
 def campaign(share: float, seed: int) -> bool:

@@ -1,4 +1,4 @@
-"""What tests note by tests/proven.py, gathered: the largest difference of each thing from each that it is compared with."""
+"""The notes of tests by tests/proven.py, gathered: the largest difference of each thing from each that it is compared with."""
 
 from __future__ import annotations
 

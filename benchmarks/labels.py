@@ -178,7 +178,7 @@ def plain(value: Any) -> Any:
 
 @dataclasses.dataclass
 class Tally:
-    """How many values of a field there are, how many differ, and the largest difference of those that are finite numbers."""
+    """The number of a field's values, the number that differ, and the largest difference of those that are finite numbers."""
 
     count: int = 0
     differing: int = 0

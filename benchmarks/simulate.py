@@ -1,4 +1,4 @@
-"""What 1, 10 and 100 million images cost, and how long they take on 10 to 10,000 nodes.
+"""The cost of 1, 10 and 100 million images, and their time on 10 to 10,000 nodes.
 
     benchmarks/simulate                    the tables of docs/scale.md, from what was measured last
     benchmarks/simulate --measure          measure again: shots of the reference scene, and how fast Ray hands out work
@@ -181,7 +181,7 @@ def nodes(count: int) -> Generator[str]:
 
 
 def stored() -> Measured:
-    """What was measured last."""
+    """The last measurements."""
     return Measured(**json.loads(MEASURED.read_text("utf-8")))
 
 
@@ -192,7 +192,7 @@ def rows(table: Sequence[Sequence[str]]) -> str:
 
 
 def costs(measured: Measured) -> str:
-    """What images cost, whoever makes them."""
+    """The cost of images, whatever makes them."""
     table = [["Images", "Core hours", "Stored", "Files (requests)", "with `shots: tar`", "Shots"]]
     for images in IMAGES:
         load = measured.load(images)
@@ -209,7 +209,7 @@ def duration(seconds: float) -> str:
 
 
 def courses(measured: Measured) -> str:
-    """How long SIMULATED images take, and how well nodes are used, by how shots are stored."""
+    """The time of SIMULATED images and the use of nodes, for each way to store shots."""
     load = measured.load(SIMULATED)
     table = [["Nodes", "A file a channel and frame", "`shots: tar`", "A store without limits", "Shots made twice"]]
     for count in NODES:
@@ -226,7 +226,7 @@ def told(course: Course) -> str:
 
 
 def page(measured: Measured) -> str:
-    """What images cost, of the generated part of docs/scale.md."""
+    """The cost of images, for the generated part of docs/scale.md."""
     seconds, size = statistics.mean(measured.seconds) / measured.frames, measured.bytes / measured.frames / 1e6
     intro = (
         f"Measured on one core of a {measured.machine}, with another core at work: {seconds:.3f} s and {size:.2f} MB a frame, "

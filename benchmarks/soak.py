@@ -112,7 +112,7 @@ class Watch:
 
 
 class Mallinfo2(ctypes.Structure):
-    """What glibc says of its heap: mallinfo2(3)."""
+    """The state of glibc's heap: mallinfo2(3)."""
 
     _fields_ = [(name, ctypes.c_size_t) for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks")]
     _fields_ += [(name, ctypes.c_size_t) for name in ("uordblks", "fordblks", "keepcost")]
@@ -138,7 +138,7 @@ def memory(process: int) -> float:
 
 
 def open_files(process: int) -> int:
-    """How many files, pipes and the like a process has open; 0 where it has ended."""
+    """Return the number of files, pipes and the like that a process has open; 0 where it has ended."""
     try:
         return len(os.listdir(f"/proc/{process}/fd"))  # noqa: PTH208, which is quicker
     except OSError:
@@ -146,7 +146,7 @@ def open_files(process: int) -> int:
 
 
 def growth(values: Sequence[float]) -> float:
-    """How much larger the last of some values are than the first, as a share of these: what is never given back.
+    """Return the growth from the first to the last of some values, as a share of the first: what is never given back.
 
     Scenes differ, and what they need comes and goes, but a leak lifts the floor: of 16 spans, each with its least value, the
     more of what the medians of the first and the last quarter say, and the median slope between any two (Theil and Sen).
@@ -165,7 +165,7 @@ def after_warm_up(moments: Sequence[Moment], name: str) -> list[float]:
 
 
 def problems(kind: str, moments: Sequence[Moment], most: float = MOST_GROWTH) -> Iterator[str]:
-    """What grows by more than this in a run."""
+    """Yield a message for each value that grows by more than this in a run."""
     for name, (what, _) in CURVES.items():
         values = after_warm_up(moments, name)
         if (found := growth(values)) > most:

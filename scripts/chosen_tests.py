@@ -52,7 +52,7 @@ LISTS = {
     "plugins": "viewsphere.",
     "names": "viewsphere.",
 }
-"""What lists plug-ins without naming them, a function or a command of the program, and those that it lists."""
+"""Functions and commands that list plug-ins without naming them, with the package that each lists."""
 SCANS = {"rglob", "copytree"}
 """Functions that go through all files of a folder."""
 BY_PATH = re.compile(r"attribute\(|[\"']viewsphere\.")
@@ -66,7 +66,7 @@ class CannotTell(Exception):
 
 @dataclass(frozen=True)
 class Text:
-    """What some source text refers to: imports, identifiers, strings, and what it calls, with the first argument."""
+    """The references of a source text: imports, identifiers, strings, and calls with their first argument."""
 
     imports: frozenset[str] = frozenset()
     names: frozenset[str] = frozenset()
@@ -83,7 +83,7 @@ class Text:
 
     @property
     def scans(self) -> bool:
-        """Whether it goes through the files of `src/viewsphere`, by that path or by the package's `__file__`."""
+        """Return whether it goes through the files of `src/viewsphere`, by that path or by the package's `__file__`."""
         package = {"src", "viewsphere"} <= self.strings or {"viewsphere", "__file__"} <= self.names
         return package and not SCANS.isdisjoint(self.names)
 
@@ -95,7 +95,7 @@ class Text:
 
 
 def text_of(tree: ast.AST) -> Text:
-    """What a syntax tree refers to; its docstrings are left out."""
+    """Return the references of a syntax tree, without its docstrings."""
     imports, names, strings, calls = set[str](), set[str](), set[str](), set[str]()
     docs = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     for node in ast.walk(tree):
@@ -158,7 +158,7 @@ class Modules:
         }
 
     def _named(self, module: str) -> set[str]:
-        """What a module's strings name: dotted paths, and in a plug-in the others of its kind and those it works with."""
+        """Return the modules that a module's strings name: dotted paths, and in a plug-in the plug-ins it works with."""
         if not module.startswith(NAMING) and not BY_PATH.search(self.file(module).read_text(encoding="utf-8")):
             return set()
         strings = text_of(parsed(self.file(module))).strings
@@ -294,7 +294,7 @@ def closure(starts: Iterable[str], follow: Callable[[str], Iterable[str]]) -> se
 
 
 def is_test(file: str) -> bool:
-    """Whether pytest collects this file."""
+    """Return whether pytest collects this file."""
     return file.startswith("tests/") and Path(file).name.startswith("test_") and file.endswith(".py")
 
 

@@ -365,7 +365,7 @@ def evidence(found: list[dict[str, Any]]) -> str:
 
 
 def reader_of(proof: dict[str, Any]) -> tuple[str, str]:
-    """What read an export in a test, and what of it was compared."""
+    """The reader of an export in a test, and the values that the test compares."""
     reader, is_named, what = proof["against"].partition(": ")
     return (reader, what) if is_named else ("tests", reader)
 

@@ -57,7 +57,7 @@ def picture(source: str) -> Picture:
 
 
 def _drawn(known: Sequence[Sample], i: int, source: str) -> tuple[int, float, Picture]:
-    """How many different values a frame's objects have, how much the drawing shows, and the picture."""
+    """Return the number of different values of a frame's objects, the share that the drawing shows, and the picture."""
     drawing, sample = drawable()[source], known[i]
     earlier = [one for one in known[:i] if (one.sequence, one.sensor) == (sample.sequence, sample.sensor) and one.sequence]
     plain, found = (draw_sample(sample, draw, SIZE[0], lambda _: earlier) for draw in ((), (drawing.name,)))

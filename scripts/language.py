@@ -109,7 +109,7 @@ def reference() -> Iterator[Text]:
 
 def docstrings() -> Iterator[Text]:
     """The first lines of the docstrings of each module."""
-    for path in sorted((ROOT / "src").rglob("*.py")):
+    for path in sorted(path for folder in ("src", "scripts", "benchmarks") for path in (ROOT / folder).rglob("*.py")):
         nodes = [node for node in ast.walk(ast.parse(path.read_bytes())) if isinstance(node, DOCUMENTED)]
         first = tuple(text.splitlines()[0] for node in nodes if (text := ast.get_docstring(node)))
         yield Text(str(path.relative_to(ROOT)), first)

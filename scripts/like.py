@@ -21,7 +21,7 @@ RECIPES = sorted((ROOT / "recipes" / "like").glob("*.yaml"))
 
 @dataclass(frozen=True)
 class Shown:
-    """Which frame of a recipe is shown, as the names of the labels drawn: one picture each, after the plain one."""
+    """The frame of a recipe to show, and the labels to draw: one picture each, after the plain one."""
 
     frame: int
     drawn: tuple[str, ...]

@@ -65,7 +65,7 @@ def measured(cache: Path, build: tuple[str, bool]) -> dict[str, Any]:
 
 
 def tested(cache: Path, release: str) -> subprocess.CompletedProcess[str]:
-    """What pytest says of truth and kernels with this release, without the quicker compiler."""
+    """Run the tests of truth and kernels with this release, without the quicker compiler."""
     tests = [sys.executable, "-m", "pytest", "-m", "not slow", "tests/truth", "tests/kernels"]
     tests += [f"--ignore={file}" for file in OF_THE_QUICKER]
     return subprocess.run(tests, cwd=ROOT, env=environment(cache, release, True), capture_output=True, text=True)

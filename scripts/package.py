@@ -138,7 +138,7 @@ def try_on(python: str, wheels: Mapping[str, Path], pure: Path) -> bool:
 
 
 def commands() -> Iterator[list[str]]:
-    """What a new user types first."""
+    """The first commands of a new user."""
     yield ["doctor"]
     yield ["new", "first"]
     changes = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]

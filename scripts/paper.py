@@ -572,7 +572,7 @@ PICTURES: dict[str, Callable[[], None]] = {
     "zoo_room": partial(place, "room", "zoo:chair", (1.3, 2.2), 14.0, 85.0, 3.5),
     "zoo_table_top": partial(place, "table_top", "zoo:mug", (0.5, 0.6), 28.0, 65.0, 3.8),
 }
-"""What makes each picture; the pictures on the chairs' billboards are made first."""
+"""The function that makes each picture; the pictures on the chairs' billboards come first."""
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from urllib.parse import unquote, urlsplit
 
 @dataclass
 class Page(HTMLParser):
-    """What a page links to, and where it can be linked to."""
+    """The links of a page and its anchors."""
 
     links: list[str] = field(default_factory=list)
     anchors: set[str] = field(default_factory=set)

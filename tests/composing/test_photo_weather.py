@@ -24,5 +24,4 @@ def test_fog_and_night_are_refused_beside_a_photograph(tmp_path, weather):
 
 
 def test_rain_and_snow_fall_before_it(tmp_path):
-    planned(tmp_path, rain=40)
-    planned(tmp_path, snow=10)
+    assert planned(tmp_path, rain=40).frames == planned(tmp_path, snow=10).frames == 1
