@@ -26,8 +26,8 @@ from viewsphere.labels import (
     sample_labels,
     sight_of,
 )
-from viewsphere.labels._label import later
-from viewsphere.labels._sight import Sight
+from viewsphere.labels.shared.context import Sight
+from viewsphere.labels.shared.spec import later
 from viewsphere.run.stages import Stages
 from viewsphere.truth.raster.visibility import Visibility, rasterize
 from viewsphere.truth.shot_views import ShotViews

@@ -26,17 +26,7 @@ from typer.models import ArgumentInfo
 
 from viewsphere import plugins
 from viewsphere.cli.commands import app
-from viewsphere.labels import (
-    ChannelLabel,
-    Field,
-    Label,
-    ObjectLabel,
-    SampleLabel,
-    channels,
-    labels,
-    object_labels,
-    on_request,
-)
+from viewsphere.labels import ChannelLabel, Field, Label, ObjectLabel, SampleLabel, channels, labels, object_labels, on_request
 from viewsphere.limits import table
 from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.plugins.engine import EngineSpec

@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 from viewsphere import Recipe, plugins, render
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.box import EDGES, FACES
-from viewsphere.labels._paint import PALETTE
+from viewsphere.labels.shared.drawing.colors import PALETTE
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.rig import Rig

@@ -20,7 +20,7 @@ from viewsphere.errors import MissingExtraError
 from viewsphere.formats import native
 from viewsphere.geometry.mask import decode_rle, encode_rle
 from viewsphere.labels import Needs, channel_labels, channels, labels, labels_of, object_labels, on_request
-from viewsphere.labels._label import nothing
+from viewsphere.labels.shared.spec import nothing
 from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
 from viewsphere.run.exporting import export

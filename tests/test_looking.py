@@ -15,8 +15,8 @@ from small import small_recipe
 from viewsphere.check import check
 from viewsphere.errors import MissingExtraError, StoreError, UserError
 from viewsphere.labels import TAIL, drawings
-from viewsphere.labels._wheel import picture as wheel_picture
 from viewsphere.labels.motion_boundaries import COLOR
+from viewsphere.labels.shared.drawing.flow_colors import picture as wheel_picture
 from viewsphere.labels.tracks import colors_of, positions
 from viewsphere.preview import (
     Earlier,

@@ -7,8 +7,8 @@ import pytest
 
 from small import small_recipe
 from viewsphere.geometry.box import EDGES
-from viewsphere.labels._nearness import picture as depth_picture
-from viewsphere.labels._paint import PALETTE
+from viewsphere.labels.shared.drawing.colors import PALETTE
+from viewsphere.labels.shared.drawing.depth_colors import picture as depth_picture
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.preview import contact_sheet, draw_sample, four_sides, preview_samples
 

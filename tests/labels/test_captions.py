@@ -11,9 +11,9 @@ from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.labels import labels
-from viewsphere.labels._described import Company, of_one, phrases, place_of, side_of
-from viewsphere.labels._words import listed, number, plural, with_article
 from viewsphere.labels.referring import Scene
+from viewsphere.labels.shared.captions.english import listed, number, plural, with_article
+from viewsphere.labels.shared.captions.statements import Company, of_one, phrases, place_of, side_of
 from viewsphere.run.merging import merge
 from viewsphere.store import Dataset
 

@@ -14,8 +14,8 @@ from viewsphere.codecs.npz import decode_npz, encode_npz
 from viewsphere.errors import RecipeError
 from viewsphere.formats.blend import is_camera_view
 from viewsphere.labels import is_shown
-from viewsphere.labels._paint import color_of
 from viewsphere.labels.lidar import LABEL
+from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.preview.frame import draw_sample
 from viewsphere.preview.tiles import contact_sheet
 from viewsphere.store import Dataset

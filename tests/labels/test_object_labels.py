@@ -13,7 +13,7 @@ from viewsphere.geometry.box import FACES, box_vertices, clip_to_image
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
 from viewsphere.labels import annotated, sight_of
-from viewsphere.labels._placement import view_of
+from viewsphere.labels.shared.placement import view_of
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec

@@ -10,7 +10,7 @@ from PIL import Image
 import viewsphere as vs
 from deadline import until
 from seen import pixels
-from viewsphere.labels._from_above import from_above
+from viewsphere.labels.shared.drawing.scan_map import from_above
 from viewsphere.report import write_report
 from viewsphere.report.frames import frame_data
 from viewsphere.report.pictures import NO_RETURN, Scale, layers, scan_picture, scan_size

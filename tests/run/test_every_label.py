@@ -13,7 +13,7 @@ from viewsphere import Dataset, Recipe, generate
 from viewsphere.check import check
 from viewsphere.errors import PluginError
 from viewsphere.labels import ChannelLabel, Field, ObjectLabel, by_table, channel_labels, in_attributes, labels, on_request
-from viewsphere.labels._ids import has_whole_numbers
+from viewsphere.labels.shared.ids import has_whole_numbers
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.merging import merge
 

@@ -13,7 +13,7 @@ from quick import quick
 from truth_scenes import FISHEYE, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere.geometry.rotation import rigid
 from viewsphere.labels import Needs, Sight, channel_labels
-from viewsphere.labels._wheel import picture, wheel
+from viewsphere.labels.shared.drawing.flow_colors import picture, wheel
 from viewsphere.model.camera import Camera
 from viewsphere.model.files import Files
 from viewsphere.model.rig import Rig, Sensor

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 
 from viewsphere import plugins
 from viewsphere.homes import names_of
-from viewsphere.labels._field import Field
-from viewsphere.labels._ids import IdKind, by_number, by_table, in_attributes, in_column, renumbered
-from viewsphere.labels._label import (
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.ids import IdKind, by_number, by_table, in_attributes, in_column, renumbered
+from viewsphere.labels.shared.placement import Placement, view_of
+from viewsphere.labels.shared.record import Makers, finite, from_short_record, from_whole_record, short_record, whole_record
+from viewsphere.labels.shared.spec import (
     TAIL,
     ChannelLabel,
     Color,
@@ -28,14 +30,12 @@ from viewsphere.labels._label import (
     Picture,
     SampleLabel,
 )
-from viewsphere.labels._placement import Placement, view_of
-from viewsphere.labels._record import Makers, finite, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel, picture_of
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._computing import annotated, observe, sample_values, sight_of
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.computing import annotated, observe, sample_values, sight_of
+    from viewsphere.labels.shared.context import Sight
 
 __all__ = [
     "TAIL",
@@ -86,11 +86,11 @@ __all__ = [
     "whole_record",
 ]
 
-_COMPUTING = "viewsphere.labels._computing"
+_COMPUTING = "viewsphere.labels.shared.computing"
 __getattr__ = names_of(
     __name__,
     {
-        "Sight": "viewsphere.labels._sight",
+        "Sight": "viewsphere.labels.shared.context",
         "annotated": _COMPUTING,
         "observe": _COMPUTING,
         "sample_values": _COMPUTING,
@@ -169,7 +169,7 @@ def channels() -> dict[str, Channel]:
 @cache
 def drawable() -> dict[str, Drawing]:
     """The drawings of all labels and passes that have one, by the name of the label or pass, in alphabetical order."""
-    from viewsphere.labels._passes import DRAWINGS  # which loads what develops pictures
+    from viewsphere.labels.shared.drawing.passes import DRAWINGS  # which loads what develops pictures
 
     found = {name: label.drawing for name, label in labels().items() if label.drawing}
     return dict(sorted((found | DRAWINGS).items()))

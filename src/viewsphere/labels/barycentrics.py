@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Picture, channel_of
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 TOLERANCE = 1e-5
 """The largest distance of the sum of weights from 1, as a share of the largest weight. Weights of a ground that reaches to the

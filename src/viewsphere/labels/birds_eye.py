@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels._field import Field
-from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import in_space
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.drawing.lines import in_space
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:

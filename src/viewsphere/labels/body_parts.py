@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from viewsphere.labels._ids import by_table
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of, mixed, rendered
-from viewsphere.labels._paint import by_number
+from viewsphere.labels.shared.drawing.colors import by_number
+from viewsphere.labels.shared.ids import by_table
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of, mixed, rendered
 from viewsphere.model.sample import Sample
 
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 from viewsphere.geometry.box import Bounds, clip_to_image
 from viewsphere.geometry.mask import mask_box
-from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:

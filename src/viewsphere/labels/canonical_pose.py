@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import compose, product, rigid
-from viewsphere.labels._field import Field
-from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import axes
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.lines import axes
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.symmetries import Continuous, Symmetries

@@ -10,26 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import Field as Limits
 
-from viewsphere.labels._chance import generator
-from viewsphere.labels._described import (
-    MIN_VISIBILITY,
-    ONE,
-    RELATIONS,
-    Company,
-    Words,
-    has_front,
-    is_told,
-    of_one,
-    phrases,
-    side_of,
-    size_of,
-    words_of,
-)
-from viewsphere.labels._field import Field
-from viewsphere.labels._ids import in_attributes
-from viewsphere.labels._label import Drawing, Models, Needs, Picture, SampleLabel
-from viewsphere.labels._lines import written
-from viewsphere.labels._sentences import (
+from viewsphere.labels.shared.captions.english import capital, listed, noun_of, number, plural, with_article
+from viewsphere.labels.shared.captions.sentences import (
     NOTHING,
     AnyPlural,
     AnyTemplate,
@@ -43,14 +25,32 @@ from viewsphere.labels._sentences import (
     wrong,
     wrong_count,
 )
-from viewsphere.labels._words import capital, listed, noun_of, number, plural, with_article
+from viewsphere.labels.shared.captions.statements import (
+    MIN_VISIBILITY,
+    ONE,
+    RELATIONS,
+    Company,
+    Words,
+    has_front,
+    is_told,
+    of_one,
+    phrases,
+    side_of,
+    size_of,
+    words_of,
+)
+from viewsphere.labels.shared.drawing.lines import written
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.ids import in_attributes
+from viewsphere.labels.shared.randomness import generator
+from viewsphere.labels.shared.spec import Drawing, Models, Needs, Picture, SampleLabel
 from viewsphere.model.classes import SKY, STUFF_IDS
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Natural, Portion
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Around, Sight
+    from viewsphere.labels.shared.context import Around, Sight
 
 MOST = 100
 """Sentences about one picture."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from viewsphere.labels._ids import by_number
-from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import notes
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.lines import notes
+from viewsphere.labels.shared.ids import by_number
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.model.sample import Sample
 
 

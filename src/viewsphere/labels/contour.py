@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewsphere.geometry.hull import convex_hull, mask_outline
-from viewsphere.labels._field import Field
-from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Picture, channel_of, rendered
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture, channel_of, rendered
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 TOLERANCE = 1e-5
 """Share of an object's size by which float32 coordinates may lie outside of its box."""

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
-from viewsphere.labels._nearness import extent, picture
+from viewsphere.labels.shared.drawing.depth_colors import extent, picture
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
-from viewsphere.labels._nearness import extent, picture
+from viewsphere.labels.shared.drawing.depth_colors import extent, picture
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

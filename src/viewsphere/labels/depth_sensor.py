@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from pydantic import Field as Limits
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.labels._chance import generator
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
+from viewsphere.labels.shared.randomness import generator
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Natural, Number
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 Float = NDArray[np.float64]
 Draw = Callable[[str], Float]

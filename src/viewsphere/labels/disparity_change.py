@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.surface_points.raster import in_lens
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

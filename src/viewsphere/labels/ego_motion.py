@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewsphere.geometry.rotation import compose, rigid, rotation_vector
-from viewsphere.labels._field import Field
-from viewsphere.labels._inset import NEXT, OWN, PREVIOUS, inset
-from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
+from viewsphere.labels.shared.drawing.inset_map import NEXT, OWN, PREVIOUS, inset
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.spec import Drawing, Models, Needs, SampleLabel
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 TOLERANCE = 1e-9
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels import _flow
-from viewsphere.labels._label import ChannelLabel, Needs
-from viewsphere.labels._wheel import drawing
+from viewsphere.labels.shared import flow as _flow
+from viewsphere.labels.shared.drawing.flow_colors import drawing
+from viewsphere.labels.shared.spec import ChannelLabel, Needs
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels import _state
-from viewsphere.labels._label import ChannelLabel, Needs
+from viewsphere.labels.shared import states as _state
+from viewsphere.labels.shared.spec import ChannelLabel, Needs
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.uint8]:

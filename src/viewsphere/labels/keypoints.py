@@ -11,10 +11,10 @@ from pydantic import Field as Limits
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels._field import Field
-from viewsphere.labels._label import Drawing, Models, Needs, ObjectLabel, rendered
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Models, Needs, ObjectLabel, rendered
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Number
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -24,7 +24,7 @@ from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VI
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 Float = NDArray[np.float64]
 

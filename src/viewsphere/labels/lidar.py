@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.labels._albedo import albedo
-from viewsphere.labels._chance import generator
-from viewsphere.labels._from_above import from_above
-from viewsphere.labels._ids import in_column
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
+from viewsphere.labels.shared.drawing.scan_map import from_above
+from viewsphere.labels.shared.ids import in_column
+from viewsphere.labels.shared.randomness import generator
+from viewsphere.labels.shared.reflectance import albedo
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Needs, channel_of
 from viewsphere.model.lidar import POINT, Lidar
 from viewsphere.model.sample import Sample
 from viewsphere.truth.lidar.sweeping import Hits, still_hits, swept_hits
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Around, Sight
+    from viewsphere.labels.shared.context import Around, Sight
 
 Float = NDArray[np.float64]
 Rays = tuple[NDArray[np.intp], NDArray[np.intp]]

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewsphere.geometry.mask import mask_polygons, rle_area, rle_of_part, rle_runs
-from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, Picture, channel_of
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, Picture, channel_of
 from viewsphere.model.sample import ObjectAnnotation, Rle, Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:

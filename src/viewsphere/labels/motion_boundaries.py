@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.correspondences.correspondence import pixel_centers
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 APART = 1.5
 """Pixels by which flows differ at a boundary (Mayer et al. 2016, "A Large Dataset to Train Convolutional Networks for

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
-from viewsphere.labels._lifting import ROUNDING, largest, misplaced
+from viewsphere.labels.shared.point_checks import ROUNDING, largest, misplaced
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 TOLERANCE = 1e-6
 """By how much float32 may lie outside of 0 to 1."""

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._directions import drawing, unit_proof
-from viewsphere.labels._label import ChannelLabel
+from viewsphere.labels.shared.directions import drawing, unit_proof
+from viewsphere.labels.shared.spec import ChannelLabel
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:

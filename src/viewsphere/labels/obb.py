@@ -10,16 +10,16 @@ import numpy as np
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.hull import convex_hull, mask_outline, smallest_rectangle
 from viewsphere.geometry.rotation import rigid, transform
-from viewsphere.labels._field import Field
-from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 TOLERANCE = 1e-6
 """Pixels by which rounding may push a corner."""

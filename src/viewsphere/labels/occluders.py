@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewsphere.labels._field import Field
-from viewsphere.labels._ids import in_attributes
-from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import arrow, middle, note
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.drawing.lines import arrow, middle, note
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.ids import in_attributes
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from viewsphere.labels._field import Field
-from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import note
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.drawing.lines import note
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.labels._classes import KEY, colored, with_classes, wrong_classes
-from viewsphere.labels._ids import by_table
-from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Picture, channel_of
-from viewsphere.labels._paint import color_of
+from viewsphere.labels.shared.class_maps import KEY, colored, with_classes, wrong_classes
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.ids import by_table
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Picture, channel_of
 from viewsphere.model.classes import SKY
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 BITS = 16
 """Of an object's id; the class is above them."""

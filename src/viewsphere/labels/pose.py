@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, rigid
-from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import axes
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.lines import axes
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:

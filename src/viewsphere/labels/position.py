@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import inverse, product, transform
-from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
-from viewsphere.labels._lifting import ROUNDING, Float, exact_depth, largest, misplaced
+from viewsphere.labels.shared.point_checks import ROUNDING, Float, exact_depth, largest, misplaced
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 STRIPES = 2
 """Colours of a picture begin anew so often in a metre, divided by two."""

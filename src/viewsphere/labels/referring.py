@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import Field as Limits
 
-from viewsphere.labels._described import (
+from viewsphere.labels.shared.captions.english import noun_of, noun_phrase
+from viewsphere.labels.shared.captions.statements import (
     MIN_VISIBILITY,
     NEARER,
     RELATIONS,
@@ -23,12 +24,11 @@ from viewsphere.labels._described import (
     place_of,
     words_of,
 )
-from viewsphere.labels._field import Field
-from viewsphere.labels._ids import in_attributes
-from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
-from viewsphere.labels._lines import note
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._words import noun_of, noun_phrase
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.drawing.lines import note
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.ids import in_attributes
+from viewsphere.labels.shared.spec import Drawing, Models, Needs, SampleLabel
 from viewsphere.model.camera import Scan
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Portion
@@ -37,7 +37,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 APART = 0.02
 """Share of the picture's width by which the leftmost and the rightmost are apart from the next."""

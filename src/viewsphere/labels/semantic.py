@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from viewsphere.labels._classes import KEY, class_names, colored, with_classes, wrong_classes
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
+from viewsphere.labels.shared.class_maps import KEY, class_names, colored, with_classes, wrong_classes
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.model.classes import SKY, class_colors
 from viewsphere.model.sample import Sample
 

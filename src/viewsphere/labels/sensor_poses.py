@@ -9,17 +9,17 @@ import numpy as np
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import compose, rigid
-from viewsphere.labels._field import Field
-from viewsphere.labels._inset import OWN, inset
-from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
-from viewsphere.labels._lines import axes
-from viewsphere.labels._paint import color_of
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.drawing.inset_map import OWN, inset
+from viewsphere.labels.shared.drawing.lines import axes
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.spec import Drawing, Models, Needs, SampleLabel
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 TOLERANCE = 1e-9
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from viewsphere.geometry.box import box_size
-from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import notes
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.lines import notes
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.model.sample import Sample
 
 TOLERANCE = 1e-9

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels._ids import in_column
-from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Needs, channel_of, rendered
-from viewsphere.labels._paint import color_of
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.ids import in_column
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Needs, channel_of, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.surface_samples import SURFACE_SAMPLE, SurfaceSamples
 from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE, VISIBLE
@@ -20,7 +20,7 @@ from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE, VISIBLE
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 Float = NDArray[np.float64]
 

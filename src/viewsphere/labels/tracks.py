@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels._ids import in_column
-from viewsphere.labels._label import ChannelLabel, Color, Drawing, Models, Needs, channel_of
+from viewsphere.labels.shared.ids import in_column
+from viewsphere.labels.shared.spec import ChannelLabel, Color, Drawing, Models, Needs, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.tracks import TRACK
 from viewsphere.truth.surface_points.points import SKY
@@ -21,7 +21,7 @@ from viewsphere.truth.surface_points.raster import OCCLUDED, VISIBLE
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 RADIUS = 3.0
 """Pixels of a point's radius in a picture that is 640 pixels wide."""

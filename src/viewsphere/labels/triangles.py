@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._ids import by_table
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
-from viewsphere.labels._paint import by_number
+from viewsphere.labels.shared.drawing.colors import by_number
+from viewsphere.labels.shared.ids import by_table
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight) -> NDArray[np.int32]:

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import product, rotation_vector, transform
-from viewsphere.labels._field import Field
-from viewsphere.labels._label import Drawing, Models, Needs, ObjectLabel, rendered
-from viewsphere.labels._lines import in_space
-from viewsphere.labels._paint import color_of
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.drawing.colors import color_of
+from viewsphere.labels.shared.drawing.lines import in_space
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import Drawing, Models, Needs, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 Float = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewsphere.geometry.camera import orbit_center
-from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import notes
+from viewsphere.labels.shared.drawing.lines import notes
+from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectView, Sample
 
 TOLERANCE = 1e-6

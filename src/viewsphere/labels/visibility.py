@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewsphere.geometry.box import overlap
-from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import notes
-from viewsphere.labels._sight import EVERYWHERE
+from viewsphere.labels.shared.context import EVERYWHERE
+from viewsphere.labels.shared.drawing.lines import notes
+from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:

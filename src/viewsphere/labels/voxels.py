@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from viewsphere.geometry import voxels
 from viewsphere.geometry.camera import has_unit_rays, pixel_rays, project
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels._cells import drawn
-from viewsphere.labels._classes import KEY, with_classes
-from viewsphere.labels._ids import in_column
-from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, channel_of, rendered
-from viewsphere.labels._lifting import ROUNDING, exact_depth, largest
+from viewsphere.labels.shared.class_maps import KEY, with_classes
+from viewsphere.labels.shared.drawing.voxel_view import drawn
+from viewsphere.labels.shared.ids import in_column
+from viewsphere.labels.shared.point_checks import ROUNDING, exact_depth, largest
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, channel_of, rendered
 from viewsphere.model.camera import Camera
 from viewsphere.model.classes import FIRST_THING, SKY, thing_class
 from viewsphere.model.sample import Sample
@@ -26,7 +26,7 @@ from viewsphere.model.voxels import EMPTY, FREE, INSIDE, OCCLUDED, OUTSIDE, RUN,
 from viewsphere.truth.raster.alpha_masks import NEVER
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 Float = NDArray[np.float64]
 Rows = NDArray[np.int64]

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels import channel_labels, labels_of, makers, sample_labels
-from viewsphere.labels._label import later
-from viewsphere.labels._placement import Placement
-from viewsphere.labels._record import Makers, computed
-from viewsphere.labels._sight import Around, Sight
+from viewsphere.labels.shared.context import Around, Sight
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.record import Makers, computed
+from viewsphere.labels.shared.spec import later
 from viewsphere.model.camera import Camera
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.looks import Looks

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import Array, Models, Proof, channel_of
+from viewsphere.labels.shared.spec import Array, Models, Proof, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.correspondences.correspondence import pixel_centers
 from viewsphere.truth.surface_points.raster import BEHIND, INVALID, OUTSIDE
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 EDGE = 1e-3
 """Pixels from the picture's border within which the rounding of stored flow decides whether it leads outside."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._paint import color_of
+from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.model.classes import class_colors
 from viewsphere.model.sample import Sample
 from viewsphere.model.voxels import OCCLUDED, OUTSIDE

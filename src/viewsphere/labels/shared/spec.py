@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, InstanceOf, SkipValidation, model_validator
 
 from viewsphere.errors import PluginError, ViewsphereError
-from viewsphere.labels._field import Field
-from viewsphere.labels._ids import Ids, check_ids, has_whole_numbers
-from viewsphere.labels._placement import ModelFacts, Placement
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.ids import Ids, check_ids, has_whole_numbers
+from viewsphere.labels.shared.placement import ModelFacts, Placement
 from viewsphere.model.channel import Channel
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -23,7 +23,7 @@ from viewsphere.plugins.spec import Spec
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 else:
     ImageDraw = Sight = Any  # these load Pillow and the rasterizer; the fields' types are evaluated when the classes are made
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels._label import Picture
-from viewsphere.labels._paint import Color, color_of
+from viewsphere.labels.shared.drawing.colors import Color, color_of
+from viewsphere.labels.shared.spec import Picture
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.box import Bounds, is_behind, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.placement import Placement
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import Sensor

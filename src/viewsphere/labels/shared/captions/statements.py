@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.appearance.looks import words
 from viewsphere.geometry.box import Bounds
-from viewsphere.labels._placement import ModelFacts
-from viewsphere.labels._words import noun_of, noun_phrase
+from viewsphere.labels.shared.captions.english import noun_of, noun_phrase
+from viewsphere.labels.shared.placement import ModelFacts
 from viewsphere.model.sample import ObjectAnnotation
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 SEEN = 16
 """Visible pixels from which on an object is told of, if enough of it is visible."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import Extent, Picture
+from viewsphere.labels.shared.spec import Extent, Picture
 
 NEAREST = 0.01
 """Metres that a picture of depth tells apart from less."""

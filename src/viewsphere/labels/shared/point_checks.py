@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.labels._label import Array, channel_of
+from viewsphere.labels.shared.spec import Array, channel_of
 from viewsphere.model.sample import Sample
 
 Float = NDArray[np.float64]

@@ -25,36 +25,67 @@ Float = NDArray[np.float64]
 
 
 class ModelFacts(Protocol):
-    """Facts about a normalised model: its OBJ file (relative to the data set's root), its box (8, 3) in its own axes, its
-    true size if known (metres), its category, names of its materials and of the parts of its body, and of a time step the key
-    of the animated model; and as `Traits` has them, its diameter (None in data sets of older versions), symmetries, named
-    points and what it looks like (None where no label needs that).
-    """
+    """Facts about a normalised model, at the time step that an object shows."""
 
     @property
-    def obj(self) -> str: ...
+    def obj(self) -> str:
+        """Its OBJ file, relative to the data set's root."""
+        ...
+
     @property
-    def box3d_object(self) -> NDArray[np.float64]: ...
+    def box3d_object(self) -> NDArray[np.float64]:
+        """Its box (8, 3) in its own axes, metres."""
+        ...
+
     @property
-    def real_size(self) -> Size | None: ...
+    def real_size(self) -> Size | None:
+        """Its true size in metres; None if it is not known."""
+        ...
+
     @property
-    def category(self) -> str: ...
+    def category(self) -> str:
+        """The name of its category."""
+        ...
+
     @property
-    def category_id(self) -> int: ...
+    def category_id(self) -> int:
+        """The number of its category."""
+        ...
+
     @property
-    def materials(self) -> tuple[str, ...]: ...
+    def materials(self) -> tuple[str, ...]:
+        """The names of its materials."""
+        ...
+
     @property
-    def body_parts(self) -> tuple[str, ...]: ...
+    def body_parts(self) -> tuple[str, ...]:
+        """The names of the parts of its body."""
+        ...
+
     @property
-    def track(self) -> str: ...
+    def track(self) -> str:
+        """The key of the animated model, for a time step; else empty."""
+        ...
+
     @property
-    def diameter(self) -> float | None: ...
+    def diameter(self) -> float | None:
+        """The largest distance between two vertices, metres; None in data sets of older versions."""
+        ...
+
     @property
-    def symmetries(self) -> Symmetries | None: ...
+    def symmetries(self) -> Symmetries | None:
+        """Motions that leave it as it is."""
+        ...
+
     @property
-    def keypoints(self) -> Keypoints | None: ...
+    def keypoints(self) -> Keypoints | None:
+        """Named points."""
+        ...
+
     @property
-    def looks(self) -> Looks | None: ...
+    def looks(self) -> Looks | None:
+        """Its colours and materials; None where no requested label needs them."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import Drawing, Picture
+from viewsphere.labels.shared.spec import Drawing, Picture
 from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.model.scene import ViewTransform
 from viewsphere.rendering.view import develop, to_bytes

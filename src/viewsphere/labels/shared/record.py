@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import Any
 
 from viewsphere.errors import StoreError
-from viewsphere.labels._field import Field
-from viewsphere.labels._label import ObjectLabel, later, nothing
-from viewsphere.labels._placement import Placement
+from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.placement import Placement
+from viewsphere.labels.shared.spec import ObjectLabel, later, nothing
 from viewsphere.model.sample import ObjectAnnotation
 
 _OWN = frozenset(f.name for f in fields(ObjectAnnotation))

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import Drawing, Models, Picture, Proof, channel_of
+from viewsphere.labels.shared.spec import Drawing, Models, Picture, Proof, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.surface_points.raster import INVALID
 
 if TYPE_CHECKING:
-    from viewsphere.labels._sight import Sight
+    from viewsphere.labels.shared.context import Sight
 
 MEANING = "0 visible, 1 occluded, 2 outside the picture, 3 behind the camera, 4 invalid"
 COLORS = np.array([(235, 235, 235), (200, 60, 50), (60, 110, 200), (120, 70, 160), (0, 0, 0)], np.uint8)

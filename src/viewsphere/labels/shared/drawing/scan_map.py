@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from viewsphere.labels._paint import color_of
+from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.model.sample import Sample
 
 Picture = NDArray[np.uint8]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._from_above import SKY, round_length
-from viewsphere.labels._paint import Color
+from viewsphere.labels.shared.drawing.colors import Color
+from viewsphere.labels.shared.drawing.scan_map import SKY, round_length
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:

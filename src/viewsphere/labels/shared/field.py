@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.labels._ids import Ids, check_ids, is_of_numbers
+from viewsphere.labels.shared.ids import Ids, check_ids, is_of_numbers
 
 
 @dataclass(frozen=True)

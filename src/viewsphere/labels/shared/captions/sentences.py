@@ -10,8 +10,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from viewsphere.labels._described import RELATIONS, Company, Words, of_one, phrases
-from viewsphere.labels._words import capital, listed, noun_of, number, plural, with_article
+from viewsphere.labels.shared.captions.english import capital, listed, noun_of, number, plural, with_article
+from viewsphere.labels.shared.captions.statements import RELATIONS, Company, Words, of_one, phrases
 from viewsphere.model.mistakes import one_of, shown
 from viewsphere.model.sample import ObjectAnnotation, Sample
 

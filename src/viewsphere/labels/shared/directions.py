@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from viewsphere.labels._label import Array, Drawing, Models, Picture, channel_of
+from viewsphere.labels.shared.spec import Array, Drawing, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
 
 TOLERANCE = 1e-5

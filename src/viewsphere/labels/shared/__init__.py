@@ -1,0 +1,1 @@
+"""The code that several labels share: specs, contexts, records, proofs."""

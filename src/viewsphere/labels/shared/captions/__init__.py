@@ -1,0 +1,1 @@
+"""English for labels that describe pictures: words, statements and sentences."""

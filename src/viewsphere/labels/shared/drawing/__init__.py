@@ -1,0 +1,1 @@
+"""Colours, lines and small maps with which labels are drawn."""
