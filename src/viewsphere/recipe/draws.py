@@ -29,6 +29,7 @@ from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, nearest, shown
 from viewsphere.model.numbers import Count, Metres, Natural, Number
+from viewsphere.recipe.seed_names import seed_name
 from viewsphere.recipe.values import OrShort
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ NEARLY_ALWAYS = 3.0
 
 Steps = tuple[str, ...]
 RngOf = Callable[[Steps], "Generator"]
-"""A generator for the path of a value: every distribution has its own generator, so that no draw depends on another."""
+"""The generator for a path of seed names: every distribution has its own generator, so that no draw depends on another."""
 
 Of = Literal["number", "whole number", "vector", "word", "entry"]
 T = TypeVar("T")
@@ -342,7 +343,7 @@ def drawn(value: T, rng_of: RngOf, path: Steps = ()) -> T:
         return cast(T, tuple(drawn(part, rng_of, (*path, str(i))) for i, part in parts))
     if isinstance(value, Frozen):
         random = {name: part for name, part in value if is_random(part)}
-        return value.model_copy(update={name: drawn(part, rng_of, (*path, name)) for name, part in random.items()})
+        return value.model_copy(update={name: drawn(part, rng_of, (*path, seed_name(name))) for name, part in random.items()})
     return value
 
 

@@ -46,6 +46,7 @@ from viewsphere.recipe.entries import concrete, pictures_of
 from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame, ViewEntry
 from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, NightEntry, NightSky, SunEntry
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.seed_names import seed_name
 from viewsphere.recipe.surface import GroundEntry, MaterialEntry
 
 PARTS = tuple(Finish.model_fields)
@@ -139,7 +140,8 @@ class Scenes:
     def _rng_of(self, names: Names) -> RngOf:
         shared = scene_generators(self.recipe.seed, names)
         alone = scene_generators(self.recipe.seed, self._alone(names))
-        return lambda path: (alone if path[0] in self.drawn_alone else shared)(path)
+        seeds = frozenset(map(seed_name, self.drawn_alone))
+        return lambda path: (alone if path[0] in seeds else shared)(path)
 
     def _alone(self, names: Names) -> Names:
         """The names that draws of this variation alone are keyed by."""
@@ -236,7 +238,7 @@ class Scenes:
 
         @lru_cache(maxsize=256)
         def part(field: str, names: Names) -> Frozen:
-            entry = drawn(getattr(self.recipe.scene, field), self._rng_of(names), (field,))
+            entry = drawn(getattr(self.recipe.scene, field), self._rng_of(names), (seed_name(field),))
             if isinstance(entry, BackgroundEntry):
                 return self._background(entry, names)
             if isinstance(entry, ViewEntry) and entry.exposure == "auto":

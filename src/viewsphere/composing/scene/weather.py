@@ -15,6 +15,7 @@ from viewsphere.recipe.draws import RngOf, drawn
 from viewsphere.recipe.entries import concrete
 from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.scene import SceneEntry
+from viewsphere.recipe.seed_names import seed_name
 from viewsphere.recipe.weather import FogEntry, LampsEntry, RainEntry, SnowEntry, WetEntry
 from viewsphere.rendering.weather.conditions import clouded, floor_light, in_fog
 from viewsphere.rendering.weather.precipitation import extinction
@@ -28,7 +29,7 @@ SeedOf = Callable[[str], int]
 def weathered(scene: Scene, entry: SceneEntry, rng_of: RngOf, seed_of: SeedOf) -> Scene:
     """The scene with the weather of its entry, drawn. `seed_of`: a number for a purpose, on which nothing else depends."""
     scene = scene.model_copy(update=_lamps(entry, rng_of))
-    fog, rain, snow, wet = (drawn(getattr(entry, name), rng_of, (name,)) for name in ("fog", "rain", "snow", "wet"))
+    fog, rain, snow, wet = (drawn(getattr(entry, name), rng_of, (seed_name(name),)) for name in ("fog", "rain", "snow", "wet"))
     falling = [one for one in (rain, snow) if isinstance(one, (RainEntry, SnowEntry))]
     if not falling and not isinstance(fog, FogEntry):
         return scene.model_copy(update=_wet(scene, wet, None, seed_of))

@@ -1,0 +1,31 @@
+"""The frozen names that seed the draws of a recipe's fields.
+
+The draw of a field is seeded by the names on its path, for example `sun` and `azimuth_deg`. These names are constants: you may
+rename a field, a class or a module, but its draws, and so its pictures, stay what they were. To rename a field, move
+its name from `_UNCHANGED` to `_RENAMED`, with the old name on the right.
+"""
+
+from __future__ import annotations
+
+_UNCHANGED = """
+    amount angle_deg aside at azimuth_deg background bay begin below blend blur brightness chromatic_aberration clouds
+    color company contrast count date daylight density depth_of_field distance distractors drop edge_highlight effects
+    elevation_deg enter exposure fit flip focal_mm focal_px focus fog fov_deg friction glow ground hdri height high
+    highest_hz horizon hue image jitter jpeg kerb keys kind lamps lane latitude leave length lights longitude mass
+    material materials metallic moon most motion motion_angle_deg motion_blur night normal_image objects off_center offset
+    parked pattern pavement period phase_deg place planes points position principal_point puddles radius rain rate reach
+    read_noise restitution rotation_deg roughness roughness_image saturation scale shot_noise side size sky smoother snow
+    speed spin_deg spread strength sun target temperature_k texture tile tilt_deg time tint toward transform turbidity
+    turn velocity view vignetting visibility walkers wet wind windows zenith zoom
+"""
+"""Fields that are still called what seeds them."""
+
+_RENAMED: dict[str, str] = {}
+"""Fields with another name than the name that seeds them."""
+
+SEED_NAMES = {**{name: name for name in _UNCHANGED.split()}, **_RENAMED}
+
+
+def seed_name(field: str) -> str:
+    """The name that seeds the draws of a field. A third-party plug-in's field is seeded by its own name."""
+    return SEED_NAMES.get(field, field)
