@@ -1,29 +1,29 @@
-"""A recording of AirSim: a log of poses and picture files, depth as PFM, and the settings that such cameras would have.
+"""A recording of AirSim: a log of poses and picture files, depth as PFM, and the settings of the cameras.
 
     <sequence>/airsim_rec.txt                          the log: VehicleName TimeStamp POS_X ... Q_Z ImageFile, tabs between
     <sequence>/images/img_<sensor>_0_0_<time>.png      type 0, Scene
     <sequence>/images/img_<sensor>_0_1_<time>.pfm      type 1, DepthPlanar: metres along z
     <sequence>/images/img_<sensor>_0_2_<time>.pfm      type 2, DepthPerspective: metres along the pixel's ray
-    <sequence>/images/img_<sensor>_0_4_<time>.pfm      type 4, DisparityNormalized: disparity in widths of the picture
+    <sequence>/images/img_<sensor>_0_4_<time>.pfm      type 4, DisparityNormalized: disparity / picture width
     <sequence>/images/img_<sensor>_0_5_<time>.png      type 5, Segmentation: a colour for each object
-    <sequence>/images/img_<sensor>_0_7_<time>.png      type 7, Infrared: ids of objects, in red, green and blue alike
+    <sequence>/images/img_<sensor>_0_7_<time>.png      type 7, Infrared: object ids, equal in red, green and blue
     <sequence>/settings.json                           every sensor's picture size and angle of view
     seg_rgbs.txt                                       the colours of Segmentation: id, tab, [r, g, b]
 
-Every sensor is a vehicle of its own, with camera 0, as in AirSim's mode ComputerVision, so that a line's pose is that of the
-camera. Image files of a line are joined by `;`. TimeStamp is milliseconds, times in names are nanoseconds, from the sequence's
-beginning. Still pictures are in a folder for each split, their number in the data set as milliseconds.
+Each sensor is a vehicle with camera 0, as in AirSim's mode ComputerVision, so the pose in a line is the camera's pose. `;`
+joins the image files of a line. TimeStamp counts milliseconds and file names count nanoseconds from the start of the sequence.
+Still pictures have a folder for each split; their number in the data set replaces the milliseconds.
 
-Places are metres, NED: x north, y east, z down; north is our y, east our x. The quaternion, w x y z, turns the axes of a body
-(x ahead, y right, z down) to those: the camera looks along its x. PFM has its highest row first, as AirSim writes it, against
-PFM's own rule; most readers of PFM show it upside down. Depth is 65504 where nothing is; disparity is 0 where it is not known.
-`FOV_Degrees` is horizontal, the principal point in the picture's middle.
+Positions are in metres, NED: x north, y east, z down. North is viewsphere's y, east its x. The quaternion (w, x, y, z) rotates
+body axes (x ahead, y right, z down) into NED; the camera looks along x. AirSim stores the highest row of a PFM first, against
+the format's rule, and so does this export; most readers of PFM show it upside down. Depth of the background is 65504. Unknown
+disparity is 0. `FOV_Degrees` is the horizontal angle; the principal point is the centre of the picture.
 
-Segmentation's colours are PASCAL VOC's by ids of objects, 0 for all else, and not those of AirSim's own table. Lost:
-categories, boxes, names of splits of sequences, and all that a vehicle's motors measure. Not verified: 65504, which is the
-largest number of 16-bit floats; the settings, which were tried with no AirSim. AirSim has flow of unknown units, which is left
-out. Source: Shah et al. 2017, "AirSim: High-Fidelity Visual and Physical Simulation for Autonomous Vehicles",
-https://microsoft.github.io/AirSim/.
+Segmentation uses the colours of PASCAL VOC by object id, with 0 for the background, instead of AirSim's own table.
+
+Not stored: categories, boxes, the split of a sequence, motor measurements, and flow, because AirSim does not document its
+units. Not verified: the depth 65504, the largest 16-bit float; and the settings, which no AirSim has loaded. Source: Shah et
+al. 2017, "AirSim: High-Fidelity Visual and Physical Simulation for Autonomous Vehicles", https://microsoft.github.io/AirSim/.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Files of CARLA's cameras: pictures, depth in 24 bits, semantic tags and instances, cameras and boxes in CARLA's terms.
+"""Files of CARLA's cameras: pictures, depth in 24 bits, semantic tags, instances, cameras and boxes in CARLA's terms.
 
     <sequence>/<sensor>/rgb/000000.png                      pictures, by the number of the instant
     <sequence>/<sensor>/depth/000000.png                    metres along z: (R + 256 G + 65536 B) / (256^3 - 1) * 1000
@@ -7,22 +7,23 @@
     <sequence>/<sensor>/bounding_boxes/000000.json          every object: id, type, tag, transform, extent
     <sequence>/<sensor>/transforms.json                     every frame: frame, timestamp, transform, fov, image size
 
-Still pictures lie in `<split>/<sensor>/rgb/00000000.png`, by their numbers, in numbered folders where there are many. CARLA has
-no format for data sets: folders are called as its blueprints of sensors (sensor.camera.depth), and the two kinds of JSON are
-this tool's, with the names of CARLA's Python classes.
+Still pictures are `<split>/<sensor>/rgb/00000000.png`, by number, in numbered folders for large data sets. CARLA defines no
+data set format. Folders have the names of its sensor blueprints (sensor.camera.depth). The two kinds of JSON are viewsphere's
+own and use the names of CARLA's Python classes.
 
-Tags are those since version 0.9.14. Of stuff: sky Sky, ground Ground, road Roads, road marking RoadLine, pavement SideWalks,
-grass Terrain, vegetation Vegetation, building Building, fence Fence, pole Pole, traffic sign TrafficSign, street furniture
-Static, vehicle Car, person Pedestrian, wall Wall, scenery and what is indoors Other. Categories that are called like a
-tag have it (person is Pedestrian); all others are Dynamic. Where nothing is, depth is 1000 m, as is what is farther.
+Tags follow CARLA 0.9.14. Background classes map as follows: sky Sky, ground Ground, road Roads, road marking RoadLine, pavement
+SideWalks, grass Terrain, vegetation Vegetation, building Building, fence Fence, pole Pole, traffic sign TrafficSign, street
+furniture Static, vehicle Car, person Pedestrian, wall Wall; scenery and indoor surfaces Other. A category with a tag's name has
+that tag (person is Pedestrian); all other categories are Dynamic. Depth is 1000 m for the background and beyond 1000 m.
 
-The world is Unreal's, left-handed, x ahead, y to the right, z up: (x, -y, z) of ours, metres. A transform is a location and a
-rotation, pitch, yaw and roll in degrees, as `carla.Transform` has them; a camera looks along its x, and so does an object; its
-location is the middle of its box, and `extent` is half of its length (x), width (y) and height (z). `fov` is horizontal,
-degrees: f = width / (2 tan(fov / 2)), and the principal point is (width / 2, height / 2) from the picture's corner.
+The world is Unreal's, left-handed, in metres: x ahead, y right, z up, which is viewsphere's (x, -y, z). A transform is a
+location and a rotation (pitch, yaw, roll in degrees), as in `carla.Transform`. Cameras and objects look along x. An object's
+location is the centre of its box, and `extent` is half its length (x), width (y) and height (z). `fov` is the horizontal angle
+in degrees: f = width / (2 tan(fov / 2)). The principal point is (width / 2, height / 2) from the picture's corner.
 
-Lost: optical flow, whose scale and direction in CARLA could not be verified, LiDAR, and names of splits of sequences. Not
-verified with CARLA itself: that depth is planar. Source: Dosovitskiy et al. 2017, "CARLA: An Open Urban Driving Simulator", https://carla.readthedocs.io/en/latest/ref_sensors/.
+Not stored: LiDAR, the split of a sequence, and flow, whose scale and direction in CARLA are not verified. Not verified with
+CARLA itself: planar depth. Source: Dosovitskiy et al. 2017, "CARLA: An Open Urban Driving Simulator",
+https://carla.readthedocs.io/en/latest/ref_sensors/.
 """
 
 from __future__ import annotations

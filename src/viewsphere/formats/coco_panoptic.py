@@ -1,18 +1,18 @@
-"""COCO panoptic segmentation: every pixel is of one segment, a thing or stuff; read by panopticapi, datumaro and trainers.
+"""COCO panoptic segmentation: every pixel belongs to one segment, a thing or stuff. panopticapi, datumaro and trainers read it.
 
     annotations/panoptic_<split>.json            images, annotations with `segments_info`, categories
-    annotations/panoptic_<split>/<image id>.png  segments' ids as colours: id = R + 256 G + 65536 B
+    annotations/panoptic_<split>/<image id>.png  segment ids as colours: id = R + 256 G + 65536 B
     images/<split>/<image id>.png                the pictures, or .jpg
 
-The channel panoptic says what there is. A thing's segment id is the object's, which is stable over a sequence; a stuff's is
-65536 times its class. 0 is of no class and has no segment. Ids are unique in a picture only, as COCO's. Categories are things
-first, 1, 2, ... in the data set's order, as the format coco numbers them by default, then stuff; `isthing` tells them apart,
-and `color` is the one that semantic maps are drawn in. All classes of stuff are listed, seen or not. `bbox` is x, y, width,
-height in pixels from the corner of the first one, tight around the segment; `area` counts pixels; `iscrowd` is 0. Image ids
-count from 1 and come from the plan, as the format coco's do. Large data sets have numbered sub-folders.
+The segments come from the channel panoptic. A thing's segment id is its object id, which is stable over a sequence. A stuff
+segment's id is 65536 times its class. 0 has no class and no segment. As in COCO, ids are unique only within a picture.
+Categories list things first, numbered 1, 2, ... in the data set's order, as in the format coco by default, then stuff.
+`isthing` separates the two, and `color` is the colour of semantic maps. All stuff classes are listed, visible or not. `bbox` is
+x, y, width and height in pixels from the corner of the first pixel, tight around the segment; `area` counts pixels; `iscrowd`
+is 0. Image ids count from 1 and follow the plan, as in the format coco. Large data sets have numbered sub-folders.
 
-Objects that annotations leave out are segments all the same. Lost: sequences, sensors, cameras and poses, which the format coco
-has. Source: A. Kirillov et al., Panoptic Segmentation, CVPR 2019; https://cocodataset.org/#format-data and
+Objects without annotations still have segments. Not stored: sequences, sensors, cameras and poses; the format coco has them.
+Source: A. Kirillov et al., Panoptic Segmentation, CVPR 2019; https://cocodataset.org/#format-data and
 https://github.com/cocodataset/panopticapi.
 """
 

@@ -1,9 +1,9 @@
-"""A table for spreadsheets and data frames: one row an object, all of it plain numbers and words.
+r"""A table for spreadsheets and data frames: one row for each object, with plain numbers and words.
 
-    objects.csv                  a head, then a row an object; UTF-8, commas, RFC 4180 but for line ends, which are \n
+    objects.csv                  a header, then a row for each object; UTF-8, commas, RFC 4180 with line ends \n
     <split>/<index>.png, ...     the pictures that the rows name
 
-Empty cells say that nothing is known, or that there is none. Frames without objects have a row with their picture alone.
+Empty cells mean unknown or none. Frames without objects have a row with their picture alone.
 
 Spreadsheets run texts that begin with =, +, -, @, a tab or a carriage return as formulas: such texts have a ' in front. `safe:
 false` writes them as they are.

@@ -1,19 +1,19 @@
-"""Driving in the Matrix's tree: PASCAL VOC's annotations beside pictures that are PNG in a folder for JPEG; supervision
-and the data set's own training code read it; torchvision takes no PNG.
+"""The tree of Driving in the Matrix: PASCAL VOC's annotations, with PNG pictures in the folder JPEGImages.
 
     VOC2012/JPEGImages/00000000.png         the pictures
-    VOC2012/Annotations/00000000.xml        size, and of each object name, pose, truncated, difficult, bndbox
-    VOC2012/ImageSets/Main/<split>.txt      names of the pictures; trainval.txt, too, of train and val together
+    VOC2012/Annotations/00000000.xml        size; for each object name, pose, truncated, difficult, bndbox
+    VOC2012/ImageSets/Main/<split>.txt      names of the pictures; trainval.txt joins train and val
 
-Boxes are of the visible pixels, and count them from 1: xmin = floor(x) + 1, xmax = ceil(x + width). The data set's own code
-takes 1 from all four numbers, and reads no object of which `difficult` is not 0; with `smallest` those are objects that show
-fewer pixels. Names of categories are in small letters, as its `car` is. pose is Unspecified; truncated is 1 where more than
-15 % of the object is outside of the picture. Objects of which nothing is seen are left out. Pictures of sequences, of all
-sensors, count as any others.
+supervision and the data set's own training code read it; torchvision reads no PNG there.
 
-Lost: distances, masks, 3D boxes, cameras, which the original has in the database that its pictures came from, but not in the
-published files. The original's lists are called trainval10k, trainval50k and trainval200k: tell its code the name of another
-list. Not verified: other fields of its XML than PASCAL VOC's. Source: Johnson-Roberson et al. 2017, "Driving in the Matrix",
+Boxes enclose the visible pixels, counted from 1: xmin = floor(x) + 1, xmax = ceil(x + width). The data set's code subtracts 1
+from all four numbers and skips objects whose `difficult` is not 0; the option `smallest` marks objects with fewer visible
+pixels. Category names are in lower case, like its `car`. pose is Unspecified; truncated is 1 if more than 15 % of the object is
+outside the picture. Invisible objects are left out. Pictures of sequences and of all sensors are ordinary pictures here.
+
+Not stored: distances, masks, 3D boxes and cameras. The original has them in its database, but not in the published files. The
+original's lists are trainval10k, trainval50k and trainval200k: give its code the name of your list. Not verified: XML fields
+beyond PASCAL VOC's. Source: Johnson-Roberson et al. 2017, "Driving in the Matrix",
 https://github.com/umautobots/driving-in-the-matrix.
 """
 

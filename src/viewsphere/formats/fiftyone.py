@@ -1,25 +1,25 @@
-"""FiftyOne's own data sets on disk, which its app shows: boxes, masks, keypoints, 3D boxes and maps in one view.
+"""FiftyOne's own data sets on disk, for its app: boxes, masks, keypoints, 3D boxes and maps in one view.
 
-    metadata.json, samples.json                                    what there is, and an entry for each picture
+    metadata.json, samples.json                                    the content, and an entry for each picture
     data/<split>/<index>.png                                       the pictures
     fields/ground_truth.detections/<split>/<index>_<object>.png    an object's mask within its box, black and white
-    fields/segmentation/<split>/<index>.png                        numbers of classes, where the data set keeps `semantic`
-    fields/depth/<split>/<index>.png                               millimetres to 65535, 0 for none, where it keeps `depth`
+    fields/segmentation/<split>/<index>.png                        class numbers, if the data set keeps `semantic`
+    fields/depth/<split>/<index>.png                               millimetres to 65535, 0 for none, if it keeps `depth`
 
     fiftyone.Dataset.from_dir(dataset_dir="...", dataset_type=fiftyone.types.FiftyOneDataset)
 
-A picture has its split as tag, `sequence`, `sensor`, `instant`, `time`, and, where its camera is known, `K` (pixels from the
-picture's corner) and `world_from_camera` (x right, y down, z ahead; metres). `ground_truth` are the objects of which something
-is seen: label, bounding_box (x, y, width, height of the visible pixels' box, as shares of the picture), mask, index (the
-object's id, the same throughout a sequence), supercategory, model, visibility, truncation; `location`, `dimensions` and
-`rotation` are the 3D box in the world (z up): its centre, its size along the object's x, y and z (front -y), metres, and the
-angles of x, y and z by which it is turned, radians, R = Rx Ry Rz. `keypoints` are objects' named points, where the data set
-keeps these: all models' names together, NaN for those that an object has not, or that are not in the picture; `occluded`
-tells of each whether something hides it. Names of classes and of points stand in the data set's mask_targets and skeleton.
+A picture has its split as a tag, and `sequence`, `sensor`, `instant` and `time`. If its camera is known, it has `K` (pixels
+from the picture's corner) and `world_from_camera` (x right, y down, z ahead; metres). `ground_truth` lists the visible objects:
+label, bounding_box (x, y, width and height of the visible pixels, as shares of the picture), mask, index (the object id,
+constant over a sequence), supercategory, model, visibility and truncation. `location`, `dimensions` and `rotation` are the 3D
+box in the world (z up): its centre, its size along the object's x, y and z (front -y) in metres, and its angles around x, y and
+z in radians, R = Rx Ry Rz. `keypoints` are the objects' named points, if the data set keeps them. Their list joins the names of
+all models; a point that an object lacks, or that is outside the picture, is NaN. `occluded` marks hidden points. The data set's
+mask_targets and skeleton hold the names of classes and points.
 
-The files are of the format's first version, which has no list of fields and which today's importer takes as such: fields follow
-from the entries. Lost: passes and other channels. Not verified: how the app turns 3D boxes. Source: FiftyOne's documentation,
-https://docs.voxel51.com/user_guide/import_datasets.html, and version 1.22.1 of the package.
+The files use the format's first version, which has no list of fields; today's importer accepts it and derives the fields from
+the entries. Not stored: passes and other channels. Not verified: how the app rotates 3D boxes. Source: FiftyOne's
+documentation, https://docs.voxel51.com/user_guide/import_datasets.html, and version 1.22.1 of the package.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""FlyingThings3D, Monkaa and Driving (the Scene Flow sets), which torchvision, ptlflow and stereo trainers read.
+"""FlyingThings3D, Monkaa and Driving (the Scene Flow sets), for torchvision, ptlflow and stereo trainers.
 
     frames_cleanpass/<scene>/{left,right}/0000.png
     optical_flow/<scene>/{into_future,into_past}/{left,right}/OpticalFlowInto{Future,Past}_0000_{L,R}.pfm
@@ -6,7 +6,7 @@
     object_index/<scene>/{left,right}/0000.pfm
     camera_data/<scene>/camera_data.txt, intrinsics.txt
 
-and, where the data set keeps the channels,
+and, if the data set keeps the channels,
 
     disparity_change/<scene>/into_future/{left,right}/0000.pfm             disparity_change
     material_index/<scene>/{left,right}/0000.pfm                           materials
@@ -14,23 +14,23 @@ and, where the data set keeps the channels,
     occlusions/<scene>/{into_future,into_past}/{left,right}/0000.png       flow_state, flow_backward_state: 255 where the
                                                                            other picture does not show the point
 
-A scene is, by `set`, flyingthings3d: `TRAIN/A/<sequence>`, or `TEST/A/<sequence>` in splits `val` and `test`; monkaa:
-`<sequence>`; driving: `<mm>mm_focallength/scene_forwards/<sequence>`, the millimetres those of a sensor 32 mm wide. Monkaa and
-Driving have no splits. Frames count from 0. torchvision wants the export's folder as FlyingThings3D for flow, and as
-SceneFlow/FlyingThings3D, SceneFlow/Monkaa or SceneFlow/Driving for stereo: link it.
+The option `set` decides the name of a scene. flyingthings3d: `TRAIN/A/<sequence>`, or `TEST/A/<sequence>` in splits `val` and
+`test`. monkaa: `<sequence>`. driving: `<mm>mm_focallength/scene_forwards/<sequence>`, in millimetres of a sensor 32 mm wide.
+Monkaa and Driving have no splits. Frames count from 0. For flow, torchvision expects the export's folder as FlyingThings3D; for
+stereo, as SceneFlow/FlyingThings3D, SceneFlow/Monkaa or SceneFlow/Driving. Link it there.
 
-PFM: little-endian float32, the lowest row first. Flow: pixels, right and down, and a third number, 0; 1e10 where it is unknown,
-so at all pixels of the last picture into the future and of the first into the past: readers want all files. Disparity: pixels,
-positive in both pictures, 0 of what is infinitely far. Its change to the next picture: 1e10 where unknown. Index maps: ids of
-objects, and of materials, 0 for none. `occlusions` is none of the original's folders, but ptlflow's.
+PFM: little-endian float32, the lowest row first. Flow: pixels right, pixels down, and 0; unknown flow is 1e10. The last picture
+into the future and the first into the past are unknown throughout, because readers require all files. Disparity: pixels,
+positive in both pictures, 0 at infinity. Its change to the next picture is 1e10 where unknown. Index maps: ids of objects and
+materials, 0 for none. The original has no folder `occlusions`; ptlflow reads it.
 
-camera_data.txt: a block a frame, `Frame N`, `L` and 16 numbers, `R` and 16 numbers: 4 x 4 matrices, row by row, from camera to
-world; cameras look along -z, x right, y up; metres, world z up. intrinsics.txt is an addition, because readers take a lens for
-granted: frame, fx, fy, cx, cy (pixels; the pixel (0, 0) a centre), baseline (metres).
+camera_data.txt has a block for each frame: `Frame N`, `L` and 16 numbers, `R` and 16 numbers. They are 4 x 4 matrices, row by
+row, from camera to world; cameras look along -z, x right, y up; metres, world z up. intrinsics.txt is an addition, because
+readers assume a lens: frame, fx, fy, cx, cy (pixels; the pixel (0, 0) is a centre), baseline (metres).
 
-Lost: poses, boxes and categories of objects, a final pass, motion into the past but flow. Not verified with the originals: axes
-of the camera matrices, the kind of file of motion boundaries and of material indices. Source: Mayer et al. 2016, "A Large
-Dataset to Train Convolutional Networks for Disparity, Optical Flow, and Scene Flow Estimation",
+Not stored: poses, boxes and categories of objects, a final pass, backward motion other than flow. Not verified with the
+originals: axes of the camera matrices, the file type of motion boundaries and of material indices. Source: Mayer et al. 2016,
+"A Large Dataset to Train Convolutional Networks for Disparity, Optical Flow, and Scene Flow Estimation",
 https://lmb.informatik.uni-freiburg.de/resources/datasets/SceneFlowDatasets.en.html.
 """
 

@@ -1,17 +1,17 @@
-"""Scenes as meshes: a GLB file (glTF 2.0, y up) for each arrangement of objects, with what each object is, and the cameras.
+"""Scenes as meshes: a GLB file (glTF 2.0, y up) for each arrangement of objects, with their annotations and cameras.
 
     <index of its first frame>.glb   a node for each object, `extras`: id, category, category_id, supercategory, class, model;
                                      and one for each picture's camera, `extras`: frame, sensor, split, time, width, height,
                                      K, distortion
     frames.csv                       the scene of each frame
 
-Frames of one arrangement share a file; of a sequence it is that of the first frame, with the cameras of all. What is no object,
-scenery and ground, is left out, and so are objects whose place or model is not known, which imported data sets may have.
+Frames of one arrangement share a file. A sequence's file shows its first frame and holds the cameras of all frames. Scenery and
+ground are left out, and so are objects without a known place or model, which imported data sets may have.
 
-Metres. A camera looks along -z of its node, y up, as glTF has it, and is called `<frame> <sensor>`; the angle from top to
-bottom is that of fy. A principal point off the middle, skew and distortion, which glTF's cameras do not have, are in `extras`
-alone: K in pixels from the image's corner, distortion in OpenCV's order. LiDARs have no cameras.
-Source: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.
+Lengths are metres. A camera looks along -z of its node, y up, as in glTF, and is called `<frame> <sensor>`; its vertical angle
+follows from fy. glTF's cameras have no offset principal point, skew or distortion. These are in `extras` alone: K in pixels
+from the image's corner, distortion in OpenCV's order. LiDARs have no cameras. Source:
+https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.
 """
 
 from __future__ import annotations

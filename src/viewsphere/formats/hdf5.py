@@ -1,27 +1,27 @@
-"""HDF5 files as BlenderProc writes them: all that is known of a picture in one container, read by h5py.
+"""HDF5 files as BlenderProc writes them: all data of a picture in one container, for h5py.
 
     <split>/<index>.hdf5
 
-Each file has, gzipped, those of these arrays that `keys` names:
+Each file holds the gzipped arrays that `keys` names:
 
-    colors                               uint8 (H, W, 3); (H, W, 4) where only the picture without its background is kept
-    depth, distance                      float32 (H, W), metres along the z axis and along the ray; 1e10 where nothing is
+    colors                               uint8 (H, W, 3); (H, W, 4) if only the picture without its background is stored
+    depth, distance                      float32 (H, W), metres along the z axis and along the ray; 1e10 for the background
     normals                              float32 (H, W, 3), (n + 1) / 2 of camera axes x right, y up, z backwards; else 0.5
-    nocs                                 float32 (H, W, 4), the place in the object's box; 1 where an object is, else all 0
+    nocs                                 float32 (H, W, 4), the place in the object's box; 1 on an object, else all 0
     forward_flow, backward_flow          float32 (H, W, 2), pixels right and down, to the next and the previous frame; else 0
     forward_flow_state, ...              uint8 (H, W): 0 visible there, 1 occluded, 2 outside, 3 behind the camera, 4 unknown
-    class_segmaps, instance_segmaps      the category and the object that is seen, both from 1; 0 is background
+    class_segmaps, instance_segmaps      the visible category and object, both from 1; 0 is background
 
-and as JSON, in byte strings: `instance_attribute_maps`, a list of idx, category_id, name (the model) and category of what is
-seen, background first; `camera_pose` with cam_K, cam_R_w2c and cam_t_w2c, world to camera (OpenCV axes, metres, world Z up),
-with the centre of the first pixel at (0, 0), and the lens where it is distorted; `object_states`, a list of the poses of all
-objects (matrix_world, location); `frame` with index, split, sequence, sensor, instant and time.
+JSON, in byte strings: `instance_attribute_maps` lists idx, category_id, name (the model) and category of the visible objects,
+background first. `camera_pose` holds cam_K, cam_R_w2c and cam_t_w2c, world to camera (OpenCV axes, metres, world Z up), with
+the centre of the first pixel at (0, 0), and the lens if it has distortion. `object_states` lists the poses of all objects
+(matrix_world, location). `frame` holds index, split, sequence, sensor, instant and time.
 
-BlenderProc numbers the files of one run from 0, and those of a stereo pair share arrays; here a picture is a file, by its
-number in the data set. Its NOCS are halves of the model's own coordinates, here the box's diagonal is 1, as Wang et al. 2019
-have it. The value of empty depth, and what the JSON has besides the camera, are not verified against its output. There is no
-`blender_proc_version`, and what nobody knows of imported pictures is left out. One release of h5py writes the same bytes at
-any time. Writing needs the extra `hdf5`. Source: https://github.com/DLR-RM/BlenderProc.
+BlenderProc numbers the files of one run from 0, and stereo pairs share arrays. Here each picture is a file, by its number in
+the data set. BlenderProc's NOCS are halves of the model's own coordinates; here the box's diagonal is 1, as in Wang et al.
+2019. Not verified against its output: the value of empty depth, and the JSON besides the camera. There is no
+`blender_proc_version`, and unknown values of imported pictures are left out. One release of h5py always writes the same bytes.
+Writing needs the extra `hdf5`. Source: https://github.com/DLR-RM/BlenderProc.
 """
 
 from __future__ import annotations

@@ -1,20 +1,20 @@
-"""Pictures in a folder of their class, as torchvision's `ImageFolder` and Hugging Face's `imagefolder` read them.
+r"""Pictures in a folder of their class, for torchvision's `ImageFolder` and Hugging Face's `imagefolder`.
 
-    README.md                          for `datasets`: which folder is which split
+    README.md                          for `datasets`: the folder of each split
     <split>/<class>/<index>.png        the pictures
-    <split>/metadata.jsonl             for `datasets`: a line a picture: file_name, label, and more of the object
+    <split>/metadata.jsonl             for `datasets`: a line for each picture: file_name, label, and more of the object
 
-The class is the category, or the pose category (which side is seen), of the object that has the most visible pixels: of several
-with equally many, that of the lowest id. A picture of no object has no class, and is left out. `metadata.jsonl` has of this
-object: `label` (the class), `category`, `pose_category`, `model`, `azimuth`, `elevation`, `tilt` (degrees) and `distance`
-(metres) of the camera as it sees the object, `visibility` (0 to 1) and `box` (visible pixels, half-open corners x0, y0, x1,
-y1); `index` and `objects`, how many are seen, are of the picture. What nobody knows is null.
+The class is the category, or the pose category (the visible side), of the object with the most visible pixels; the lowest id
+wins a tie. Pictures without an object are left out. `metadata.jsonl` describes this object: `label` (the class), `category`,
+`pose_category`, `model`; `azimuth`, `elevation`, `tilt` (degrees) and `distance` (metres) of the camera relative to it;
+`visibility` (0 to 1) and `box` (visible pixels, half-open corners x0, y0, x1, y1). `index` and `objects`, the number of visible
+objects, describe the picture. Unknown values are null.
 
-Folders are named as classes are, but that a character of `<>:"/\\|?*[]%`, a control character, and a dot, space or underscore
-at either end stands as `%` and its code, as in URLs: readers would miss such folders. torchvision counts classes from 0 in the
-sorted order of the folders of one split: where a split lacks a class, its numbers differ from those of other splits. `datasets`
-gives the columns of `metadata.jsonl`, in which names are as they are. Large data sets have numbered folders in those of the
-classes. Sources: torchvision's documentation of `ImageFolder`; https://huggingface.co/docs/datasets/image_dataset.
+A folder has the name of its class. Readers would miss some names, so `%` and a code, as in URLs, replace each of
+`<>:"/\|?*[]%`, control characters, and a dot, space or underscore at either end. torchvision numbers the sorted folders of one
+split from 0: a split that lacks a class has other numbers. `datasets` returns the columns of `metadata.jsonl`, with the
+unchanged names. Large data sets have numbered folders inside the class folders. Sources: torchvision's documentation of
+`ImageFolder`; https://huggingface.co/docs/datasets/image_dataset.
 """
 
 from __future__ import annotations

@@ -1,17 +1,17 @@
-"""KITTI's benchmark of depth prediction and completion, pictures beside, in folders as those of its drives.
+"""KITTI's benchmark of depth prediction and completion, with pictures, in the folders of KITTI's drives.
 
     {train,val,test}/<sequence>/image_0{2,3}/data/0000000000.png
     {train,val,test}/<sequence>/proj_depth/groundtruth/image_0{2,3}/0000000000.png
     {train,val,test}/<sequence>/calib_cam_to_cam.txt     S_rect_02, P_rect_02, and 03 of a pair; of its first pictures
 
-02 is the left camera, or the only one, 03 the right one of a rectified pair. Splits of other names than `val` and `test` lie in
-`train`. Frames count from 0.
+02 is the left or only camera, 03 the right camera of a rectified pair. Splits other than `val` and `test` go to `train`. Frames
+count from 0.
 
-Depth: 16 bits, 256 times the metres along z, 0 where there is nothing, or what is farther than 256 metres; rounded, so errors
-are at most 2 mm. It is dense, unlike the original. Projections are of the left camera's axes (x right, y down, z ahead),
-metres; the pixel (0, 0) is a centre. Lost: poses, all labels of objects, a lens that zooms. Not verified with the originals:
-which lines their calib_cam_to_cam.txt have besides. Source: Uhrig et al. 2017, "Sparsity Invariant CNNs", and the development
-kit's readme, https://www.cvlibs.net/datasets/kitti/eval_depth.php?benchmark=depth_prediction.
+Depth has 16 bits: 256 times the metres along z, 0 for the background and beyond 256 metres. Rounding causes errors of at most 2
+mm. The depth is dense, unlike the original. Projections use the left camera's axes (x right, y down, z ahead) in metres; the
+pixel (0, 0) is a centre. Not stored: poses, object labels, a zooming lens. Not verified with the originals: further lines of
+their calib_cam_to_cam.txt. Source: Uhrig et al. 2017, "Sparsity Invariant CNNs", and the development kit's readme,
+https://www.cvlibs.net/datasets/kitti/eval_depth.php?benchmark=depth_prediction.
 """
 
 from __future__ import annotations

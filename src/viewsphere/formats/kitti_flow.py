@@ -1,31 +1,32 @@
-"""KITTI's benchmarks of stereo, optical flow and scene flow, which torchvision, ptlflow and many trainers read.
+"""KITTI's benchmarks of stereo, optical flow and scene flow, for torchvision, ptlflow and many trainers.
 
 `set: scene_flow_2015`, a number for each pair of successive instants:
 
     training/{image_2,image_3}/000000_{10,11}.png     left and right, first and second picture
     training/{flow_occ,flow_noc}/000000_10.png        flow to the second picture
     training/{disp_occ_0,disp_noc_0}/000000_10.png    disparity of the first pictures
-    training/{disp_occ_1,disp_noc_1}/000000_10.png    disparity at the second instant, of what the first picture shows
+    training/{disp_occ_1,disp_noc_1}/000000_10.png    disparity at the second instant, for the points of the first picture
     training/obj_map/000000_10.png                    ids of objects, 0 for none, 8 bits
     training/calib_cam_to_cam/000000.txt              S_rect_02, P_rect_02, S_rect_03, P_rect_03
 
 `set: stereo_flow_2012`: `colored_0`, `colored_1`, `flow_occ`, `flow_noc`, `disp_occ`, `disp_noc`, and `calib/000000.txt` with
 P0 to P3.
 
-A sequence of n instants has n - 1 pairs; a pair's number is that of its first picture in the data set, so there are gaps. The
-split `test` lies in `testing`, with all labels, all others in `training`. torchvision wants the export's folder as KittiFlow,
-Kitti2015 or Kitti2012: link it. Its Kitti2015Stereo expects disparity of all pictures of image_2 and image_3: give it folders
-with those that end with _10.
+A sequence of n instants has n - 1 pairs. A pair has the number of its first picture in the data set, so there are gaps. The
+split `test` goes to `testing`, with all labels; other splits go to `training`. torchvision expects the export's folder as
+KittiFlow, Kitti2015 or Kitti2012: link it there. Its Kitti2015Stereo expects disparity for all pictures of image_2 and image_3:
+link folders with only the pictures that end with _10.
 
-Flow: 16-bit RGB, 32768 + 64 times the pixels right and down, and 1 where it is valid, else 0, 0, 0; beyond 512 pixels there is
-no number. Disparity: 16 bits, 256 times the pixels, 0 where there is none: where nothing is, at the sky, beyond 256 pixels.
-Steps are rounded, so errors are at most half of one. `noc` holds what has its match inside the other picture, hidden there or
-not; `occ` also what has it outside. Projections are of the left camera's axes (x right, y down, z ahead), metres; the pixel
-(0, 0) is a centre.
+Flow is 16-bit RGB: 32768 + 64 times the pixels right and down, and 1 if valid, else 0, 0, 0. Flow beyond 512 pixels is invalid.
+Disparity has 16 bits: 256 times the pixels; 0 for the background, the sky and beyond 256 pixels. Rounding causes errors of at
+most half a step. `noc` holds the points whose match is inside the other picture, hidden there or not; `occ` adds the points
+whose match is outside. Projections use the left camera's axes (x right, y down, z ahead) in metres; the pixel (0, 0) is a
+centre.
 
-Lost: poses, categories, flow of the right picture, what is hidden, pairs' sequences. Not verified with the originals: which
-lines their calib_cam_to_cam have besides. Source: Menze and Geiger 2015, "Object Scene Flow for Autonomous Vehicles", Geiger et
-al. 2012, "Are we ready for Autonomous Driving?", and the development kits' readme files, https://www.cvlibs.net/datasets/kitti/.
+Not stored: poses, categories, flow of the right picture, occlusion, the sequence of a pair. Not verified with the originals:
+further lines of their calib_cam_to_cam. Source: Menze and Geiger 2015, "Object Scene Flow for Autonomous Vehicles", Geiger et
+al. 2012, "Are we ready for Autonomous Driving?", and the development kits' readme files,
+https://www.cvlibs.net/datasets/kitti/.
 """
 
 from __future__ import annotations

@@ -1,23 +1,23 @@
-"""KITTI's odometry benchmark: sequences of one camera or a rectified pair, their poses and a LiDAR's points; pykitti and code
-for odometry and SLAM read it.
+"""KITTI's odometry benchmark: sequences of one camera or a rectified pair, their poses and a LiDAR's points.
 
-    sequences/<NN>/image_2/<frame>.png     the pictures of the left or only camera; image_3: those of the right one
-    sequences/<NN>/velodyne/<frame>.bin    where there is a LiDAR: its points, float32 x (ahead) y (left) z (up) intensity
+    sequences/<NN>/image_2/<frame>.png     pictures of the left or only camera; image_3: of the right camera
+    sequences/<NN>/velodyne/<frame>.bin    with a LiDAR: its points, float32 x (ahead) y (left) z (up) intensity
     sequences/<NN>/calib.txt               P0: to P3: (pixels), Tr: from the LiDAR's axes to the left camera's
-    sequences/<NN>/times.txt               seconds from the sequence's first instant, a line a frame
-    poses/<NN>.txt                         a line a frame, 3 x 4 row by row: from the left camera's axes to those it had first
+    sequences/<NN>/times.txt               seconds from the sequence's first instant, a line for each frame
+    poses/<NN>.txt                         a line for each frame, 3 x 4 row by row: left camera's axes to its first ones
     ImageSets/<split>.txt                  the frames of each split, as <NN>/<frame>
 
-Sequences count from 00 in the data set's order, frames are the instants, six digits. Metres; camera axes x right, y down, z
-ahead. Pixel (0, 0) is the centre of the first one, so K's principal point is half a pixel less than the data set's. The first
-pose of a whole sequence is the identity; that of a part of one is where the camera is then, seen from where it was at first.
+pykitti and code for odometry and SLAM read it. Sequences count from 00 in the data set's order; frames are the instants, six
+digits. Lengths are metres, camera axes x right, y down, z ahead. Pixel (0, 0) is the centre of the first pixel, so K's
+principal point is half a pixel less than the data set's. The first pose of a whole sequence is the identity. The first pose of
+a part is relative to the sequence's first camera.
 
-What is lost: where the first camera stands in the world, and all objects. The grey cameras, 0 and 1, have no pictures, and are
-calibrated as those in colour; the right one is the left one where there is none, and a LiDAR that is not there stands where the
-left camera does. Code that asks for image_0 needs a link.
+Not stored: the first camera's position in the world, and all objects. The grey cameras, 0 and 1, have no pictures; their
+calibrations copy the colour cameras. Without a right camera or a LiDAR, the left camera takes its place. Code that reads
+image_0 needs a link.
 
-Not checked against KITTI's own files: that a pixel's number is its centre. Source: A. Geiger, P. Lenz, R. Urtasun, Are we ready
-for autonomous driving? The KITTI vision benchmark suite, CVPR 2012; https://www.cvlibs.net/datasets/kitti/eval_odometry.php.
+Not verified with KITTI's own files: the pixel number as its centre. Source: A. Geiger, P. Lenz, R. Urtasun, Are we ready for
+autonomous driving? The KITTI vision benchmark suite, CVPR 2012; https://www.cvlibs.net/datasets/kitti/eval_odometry.php.
 """
 
 from __future__ import annotations

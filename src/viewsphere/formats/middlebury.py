@@ -1,10 +1,10 @@
-"""Middlebury's stereo scenes of 2014, or ETH3D's of two views, which torchvision and most stereo matchers read.
+"""Middlebury's stereo scenes of 2014, or ETH3D's two-view scenes, for torchvision and most stereo matchers.
 
 `set: middlebury`:
 
     <split>/<scene>-perfect/im0.png, im1.png              left and right
     <split>/<scene>-perfect/disp0.pfm, disp1.pfm          their disparities
-    <split>/<scene>-perfect/mask0nocc.png                 255 where the right picture shows the left one's point, too, else 0
+    <split>/<scene>-perfect/mask0nocc.png                 255 if the right picture also shows the left one's point, else 0
     <split>/<scene>-perfect/calib.txt                     cam0, cam1, doffs, baseline, width, height, ndisp, ...
 
 `set: eth3d`:
@@ -12,20 +12,20 @@
     two_view_training/<scene>/im0.png, im1.png, calib.txt, cameras.txt, images.txt
     two_view_training_gt/<scene>/disp0GT.pfm, mask0nocc.png
 
-A scene is a pair: `<sequence>_<instant>`, or the number of a still picture's frame. ETH3D's split `test` lies in two_view_test,
-all others in two_view_training. torchvision wants the export's folder as Middlebury2014 or ETH3D: link it; of Middlebury it
-reads the splits train, test and additional, and wants one folder at least with a name of the original's beside, such as an
-empty `Adirondack`.
+A scene is a pair: `<sequence>_<instant>`, or the frame number of a still picture. ETH3D's split `test` goes to two_view_test,
+other splits to two_view_training. torchvision expects the export's folder as Middlebury2014 or ETH3D: link it there. For
+Middlebury it reads the splits train, test and additional. It also requires a folder with one of the original's names, such as
+an empty `Adirondack`.
 
-Disparity: pixels, positive in both pictures, float32 (PFM: little-endian, the lowest row first); inf where it is unknown, at
-flat backgrounds; 0 of what is infinitely far. calib.txt: pixels, (0, 0) a centre, and the baseline in mm, so that depth is
-baseline f / (d + doffs); doffs is 0, ndisp, vmin and vmax are bounds of disp0's finite disparities. cameras.txt and images.txt
-are COLMAP's: the pixel (0, 0) is a corner, motions are from the world to the camera (x right, y down, z ahead), metres.
+Disparity: pixels, positive in both pictures, float32 (PFM: little-endian, the lowest row first); inf is unknown, as for flat
+backgrounds; 0 is infinitely far. calib.txt: pixels, (0, 0) a centre, and the baseline in mm, so depth is baseline f / (d +
+doffs). doffs is 0; ndisp, vmin and vmax bound disp0's finite disparities. cameras.txt and images.txt follow COLMAP: the pixel
+(0, 0) is a corner, motions go from the world to the camera (x right, y down, z ahead), in metres.
 
-Lost: objects, other exposures and lights (im1E, im1L), disp1 of ETH3D. Not verified with the originals: that pixels of
-calib.txt are centres, that inf is unknown. Sources: Scharstein et al. 2014, "High-Resolution Stereo Datasets with
-Subpixel-Accurate Ground Truth", https://vision.middlebury.edu/stereo/data/scenes2014/; Schoeps et al. 2017, "A Multi-View
-Stereo Benchmark with High-Resolution Images and Multi-Camera Videos", https://www.eth3d.net.
+Not stored: objects, other exposures and lights (im1E, im1L), disp1 of ETH3D. Not verified with the originals: pixel centres in
+calib.txt, and inf as unknown. Sources: Scharstein et al. 2014, "High-Resolution Stereo Datasets with Subpixel-Accurate Ground
+Truth", https://vision.middlebury.edu/stereo/data/scenes2014/; Schoeps et al. 2017, "A Multi-View Stereo Benchmark with
+High-Resolution Images and Multi-Camera Videos", https://www.eth3d.net.
 """
 
 from __future__ import annotations

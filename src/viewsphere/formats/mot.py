@@ -1,21 +1,20 @@
-"""MOTChallenge's sequences, as MOT17 and MOT20 have them: boxes of tracked objects, read by trackers and their metrics.
+"""MOTChallenge's sequences, as in MOT17 and MOT20: boxes of tracked objects, for trackers and their metrics.
 
     <split>/<sequence>/seqinfo.ini          name, imDir, frameRate, seqLength, imWidth, imHeight, imExt
     <split>/<sequence>/img1/000001.png      the pictures, numbered from 1
-    <split>/<sequence>/gt/gt.txt            a line an object and frame: frame, id, left, top, width, height, conf, class,
-                                            visibility
-    <split>/<sequence>/gt/labels.txt        names of the classes, a line each; not MOTChallenge's, datumaro reads it
+    <split>/<sequence>/gt/gt.txt            a line for each object and frame: frame, id, left, top, width, height, conf,
+                                            class, visibility
+    <split>/<sequence>/gt/labels.txt        class names, one a line; an addition that datumaro reads
 
-A sensor is a sequence of its own: the folder of one that is not named `camera` is `<sequence>-<sensor>`. Frames and ids count
-from 1, an object has its id in the whole sequence, and its class is the number of its category, from 1: MOTChallenge's own
-classes (1 is a pedestrian) are others, so TrackEval needs `DO_PREPROC` off. Boxes are in pixels, and 1-based: the picture's
-upper left corner is (1, 1). conf is 1: every line counts. Visibility is the share of the object's pixels that is seen, those
-outside of the picture included.
+Each sensor is a sequence; the folder of a sensor that is not named `camera` is `<sequence>-<sensor>`. Frames and ids count from
+1, and an object keeps its id over the sequence. Its class is its category's number, from 1. MOTChallenge's own classes differ
+(1 is a pedestrian), so switch off TrackEval's `DO_PREPROC`. Boxes are 1-based pixels: the picture's upper left corner is (1,
+1). conf is 1: every line counts. Visibility is the visible share of the object's pixels, including pixels outside the picture.
 
-Objects of which the box has nothing have no line. seqLength is that of the whole sequence, where only some of its frames are
-exported, too. A frame rate that is no whole number is written as one that is none, which MOTChallenge never has and datumaro
-does not read. There are no detections (`det`), and no camera. Sources: Milan et al. 2016, "MOT16: A Benchmark for Multi-Object
-Tracking", arXiv:1603.00831; TrackEval's readme of MOTChallenge, https://github.com/JonathonLuiten/TrackEval.
+Objects whose box has no visible pixel have no line. seqLength is the length of the whole sequence, even if you export some of
+its frames. A fractional frame rate is written as a fraction; MOTChallenge has none, and datumaro does not read it. There are no
+detections (`det`) and no cameras. Sources: Milan et al. 2016, "MOT16: A Benchmark for Multi-Object Tracking", arXiv:1603.00831;
+TrackEval's readme of MOTChallenge, https://github.com/JonathonLuiten/TrackEval.
 """
 
 from __future__ import annotations

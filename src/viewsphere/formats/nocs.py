@@ -1,29 +1,29 @@
-"""NOCS, as the data set REAL275 has it: category-level poses, read by the loaders of Wang et al. 2019 and of what follows them.
+"""NOCS, in the layout of the data set REAL275: category-level poses, for the loaders of Wang et al. 2019 and their successors.
 
     real/<split>/<scene>/0000_color.png, 0000_depth.png, 0000_mask.png, 0000_coord.png, 0000_meta.txt
     obj_models/real_<split>/<model>.obj, <model>.txt       the mesh; its three extents
     gts/real_<split>/results_real_<split>_<scene>_0000.pkl  the poses
 
-A scene is a sequence, and a picture's number its instant; the scene of a sensor that is not named `camera` is
-`<sequence>-<sensor>`. A thousand still pictures are a scene.
+A scene is a sequence, and a picture's number is its instant. The scene of a sensor that is not named `camera` is
+`<sequence>-<sensor>`. A thousand still pictures make a scene.
 
-- depth: 16 bits, millimetres along z, 0 where nothing is; what is farther than 65.535 m has 65535.
-- mask: 8 bits, the object's id; 255 is background. Loaders take at most 18 objects in a picture, and at least a pixel of
-  background.
+- depth: 16 bits, millimetres along z, 0 for the background; 65535 beyond 65.535 m.
+- mask: 8 bits, the object's id; 255 is background. Loaders accept at most 18 objects in a picture, and require at least one
+  pixel of background.
 - coord: 8 bits, red x, green y, blue 1 - z of the place in the object's box, whose diagonal is 1, times 255; black is
   background.
-- meta: a line an object: id (from 1), class (the category's number, from 1), model. Objects without annotations, which the
-  recipe leaves out, have class 0, as NOCS' distractors.
-- models: metres, around the middle of the box, whose extents along x, y and z are in the text.
-- poses, of what is seen, by id: gt_class_ids, gt_bboxes (y0, x0, y1, x1), gt_RTs (4x4: from places less 0.5, by the box's
-  diagonal in metres, to the camera; OpenCV axes), gt_scales (extents over diagonal), handle_visibility (1), and, of ours,
+- meta: a line for each object: id (from 1), class (the category's number, from 1), model. Objects that the recipe excludes from
+  annotations have class 0, like NOCS' distractors.
+- models: metres, around the centre of the box; the text holds its extents along x, y and z.
+- poses of the visible objects, by id: gt_class_ids, gt_bboxes (y0, x0, y1, x1), gt_RTs (4x4: from places less 0.5, by the box's
+  diagonal in metres, to the camera; OpenCV axes), gt_scales (extents over diagonal), handle_visibility (1). An addition is
   intrinsics (3x3), with the centre of the first pixel at (0, 0).
 
-Objects' axes are turned from the data set's own to y up, x to the object's left and z to its front; NOCS' own models stand
-upright along y, but that they face z is not verified. Models' symmetries and the lens' distortion are not told. The poses' axes
-and units are as readers of REAL275's files use them, and are not verified against these. CAMERA's other layout, with depth in
-two colours, is not written. Source: Wang et al. 2019, "Normalized Object Coordinate Space for Category-Level 6D Object Pose and
-Size Estimation", https://github.com/hughw19/NOCS_CVPR2019.
+The export rotates objects' axes to y up, x to the object's left and z to its front. NOCS' own models stand upright along y; a
+front along z is not verified. Not stored: symmetries of models, and the lens' distortion. Axes and units of the poses follow
+the readers of REAL275's files, but are not verified against the files. CAMERA's other layout, with depth in two colours, is not
+supported. Source: Wang et al. 2019, "Normalized Object Coordinate Space for Category-Level 6D Object Pose and Size Estimation",
+https://github.com/hughw19/NOCS_CVPR2019.
 """
 
 from __future__ import annotations

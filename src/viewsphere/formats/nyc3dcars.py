@@ -1,26 +1,27 @@
-"""NYC3DCars: photographs on the globe with the vehicles that they show, as the tables of its database; for pandas or PostGIS.
+"""NYC3DCars: geolocated photographs with their vehicles, as the tables of its database, for pandas or PostGIS.
 
     images/<split>/<index>.jpg        the pictures
     photos.csv                        id, filename, width, height, focal, k1, k2, t1-t3, r11-r33, lla, test, dataset_id, daytime
     vehicles.csv                      id, pid, x1, y1, x2, y2, occlusion, theta, lla, geom, type_id, object
     vehicle_types.csv                 id, tight_width, tight_length, tight_height, key
 
-The data set's own tables are a PostgreSQL dump; these are files with a head, of the columns that its toolkit reads. The world's
-origin lies at `latitude`, `longitude`, `altitude` (WGS 84; altitudes above the ellipsoid), x to the east, y to the north.
-Cameras are Bundler's: `r` and `t` take earth-centred metres to a camera with x right, y up and z behind it; focal is in pixels,
-the principal point is the picture's centre, k1 and k2 are 0. Points (lla) and footprints (geom) are text that PostGIS reads:
-`SRID=4326;POINT Z (longitude latitude altitude)`.
+The original tables are a PostgreSQL dump. The export writes files with a header and the columns that the original's toolkit
+reads. The world's origin lies at `latitude`, `longitude`, `altitude` (WGS 84; altitudes above the ellipsoid), x to the east, y
+to the north. Cameras follow Bundler: `r` and `t` transform earth-centred metres to a camera with x right, y up and z backwards;
+focal is in pixels, the principal point is the picture's centre, k1 and k2 are 0. Points (lla) and footprints (geom) are text
+for PostGIS: `SRID=4326;POINT Z (longitude latitude altitude)`.
 
-A vehicle is an object of any category: x1 to y2 are its visible pixels' box, as shares of the picture; lla is the middle of
-its box's bottom, geom the bottom's corners; theta is the compass bearing of its front, degrees clockwise from north.
-occlusion: 0 at most 5 % hidden, 1 at most 50 %, 2 more. Types are the models: sizes in feet. pid is a photograph's id; test is
-true in the split `test`; daytime is empty, which PostgreSQL takes for unknown; dataset_id is 1. `object` (the object's id) and
-`key` (the model's) are columns that the data set does not have. Objects of which nothing is seen are left out.
+A vehicle is an object of any category. x1 to y2 are the box of its visible pixels, as shares of the picture; lla is the centre
+of its box's bottom, geom the bottom's corners; theta is the compass bearing of its front, degrees clockwise from north.
+occlusion: 0 at most 5 % hidden, 1 at most 50 %, 2 more. Types are the models, with sizes in feet. pid is a photograph's id;
+test is true in the split `test`; daytime is empty (unknown in PostgreSQL); dataset_id is 1. `object` (the object's id) and
+`key` (the model's) are additional columns. Invisible objects are left out.
 
-Lost: masks, sequences, and how vehicles are tilted, but for their footprint. Left out, as nothing says what they mean:
-view_theta, view_phi, and geom of photographs. Not verified: grades of occlusion above 0. theta follows from two formulas of the
-toolkit. Its detector adds 0.76 m to camera positions, an error of its photographs that these do not have. Source: K. Matzen, N.
-Snavely, NYC3DCars: A Dataset of 3D Vehicles in Geographic Context, ICCV 2013, https://github.com/kmatzen/nyc3dcars-toolkit.
+Not stored: masks, sequences, and the tilt of vehicles, except in their footprint; view_theta, view_phi and geom of photographs,
+whose meaning is not documented. Not verified: grades of occlusion above 0. theta follows from two formulas of the toolkit. Its
+detector adds 0.76 m to camera positions, to correct an error of its photographs that this export does not have. Source: K.
+Matzen, N. Snavely, NYC3DCars: A Dataset of 3D Vehicles in Geographic Context, ICCV 2013,
+https://github.com/kmatzen/nyc3dcars-toolkit.
 """
 
 from __future__ import annotations

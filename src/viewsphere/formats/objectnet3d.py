@@ -1,6 +1,6 @@
-"""ObjectNet3D: pictures whose objects are aligned with CAD models, in MATLAB files; read by its toolbox and by scipy.
+"""ObjectNet3D: pictures whose objects are aligned with CAD models, in MATLAB files, for its toolbox and scipy.
 
-    Annotations/<index>.mat                      `record`: size, and of each object its box, CAD model, viewpoint and anchors
+    Annotations/<index>.mat                      `record`: size; for each object its box, CAD model, viewpoint and anchors
     Images/<index>.JPEG                          the pictures
     CAD/off/<category>/<number>.off              the models, numbers from 01
     CAD/off/<category>/<number>_<point>.off      one of a model's named points, a single vertex
@@ -8,24 +8,25 @@
     CAD/cads.mat                                 `class_names`, and `cads`, a cell with vertices and faces for each of these
     Image_sets/<split>.txt, classes.txt          names of the pictures, and of the categories
 
-Every picture has a record, of no objects if none is seen. `viewpoint` has azimuth (0 looks the model in the face, then
-counter-clockwise seen from above), elevation, and theta (the camera's roll, clockwise seen from behind it), all in degrees,
-distance (metres), focal (1), viewport (the focal length in pixels), and px, py: where the model's origin is seen. CAD models
-are in metres, front -Y, up +Z; their origin is the centre of their box. cad_index and faces count from 1; OFF files count from
-0. The first pixel's centre is (1, 1), and boxes (of the visible pixels) name the first and the last pixel.
+Every picture has a record, with an empty list if it shows no object. `viewpoint` has azimuth (0 faces the model's front, then
+counter-clockwise seen from above), elevation, and theta (the camera's roll, clockwise seen from behind it), all in degrees. It
+also has distance (metres), focal (1), viewport (the focal length in pixels), and px, py: the projection of the model's origin.
+CAD models are in metres, front -Y, up +Z, with the origin at the centre of their box. cad_index and faces count from 1; OFF
+files count from 0. The centre of the first pixel is (1, 1), and boxes (of the visible pixels) name the first and the last
+pixel.
 
-The format's projection takes the camera for one that looks at the model, and moves the picture to px, py: exact where the
-origin is on the optical axis, and near to it elsewhere. The true one is in fields that the format does not have: `record.K`
-(pixels as above) and, of each object, `RT`, 3 x 4, which takes points of its CAD model to the camera (x right, y down, z
-ahead); and `id`, the object's id. The rotation that the benchmark compares is that of `RT`, where the origin is on the axis. An
-object whose origin is behind the camera has distance 0, for which the toolbox draws nothing.
+The format's projection assumes a camera that looks at the model, and shifts the picture to px, py. It is exact if the origin is
+on the optical axis, and close elsewhere. Additional fields hold the true projection: `record.K` (pixels as above) and, for each
+object, `RT`, 3 x 4, which transforms points of its CAD model to the camera (x right, y down, z ahead); and `id`, the object's
+id. The benchmark compares the rotation of `RT` for an origin on the axis. An object whose origin is behind the camera has
+distance 0; the toolbox draws nothing for it.
 
-Anchors are the model's named points; characters that names in MATLAB cannot have become `_`. status 1 and a location are those
-of visible ones. truncated: more than 15 % of the object lies outside of the picture; occluded: others hide more than 5 % of
-what lies inside.
+Anchors are the model's named points; `_` replaces characters that MATLAB names cannot have. Visible anchors have status 1 and a
+location. truncated: more than 15 % of the object is outside the picture; occluded: other objects hide more than 5 % of the part
+inside.
 
-Lost: masks, sequences and sensors. `shapenet`, models of another collection that look alike, is left out: the models are the
-true ones; azimuth_coarse and elevation_coarse are exact. Not verified: that pixels count from 1, and status 2 (occluded) and 4
+Not stored: masks, sequences and sensors; and `shapenet`, similar models of another collection, because the models are the true
+ones. azimuth_coarse and elevation_coarse are exact. Not verified: pixels counted from 1, and status 2 (occluded) and 4
 (outside) of anchors. Writing needs the extra `mat`. Source: Y. Xiang et al., ObjectNet3D: A Large Scale Database for 3D Object
 Recognition, ECCV 2016, https://cvgl.stanford.edu/projects/objectnet3d/, and its toolbox,
 https://github.com/yuxng/ObjectNet3D_toolbox.

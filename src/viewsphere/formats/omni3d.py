@@ -1,24 +1,24 @@
-"""Omni3D: boxes in 3D and 2D of all objects, in JSON like COCO's, as Cube R-CNN reads it.
+"""Omni3D: 3D and 2D boxes of all objects, in JSON similar to COCO's, for Cube R-CNN.
 
     Omni3D/viewsphere_<split>.json       info, images, categories, annotations
     viewsphere/<split>/<index>.png       the pictures
 
-The folder is what Cube R-CNN calls `datasets`: `file_path` of an image is relative to it. All is in metres and the camera's
-axes, x right, y down, z ahead. An annotation has
+The folder is Cube R-CNN's `datasets`: `file_path` of an image is relative to it. Values are in metres and the camera's axes, x
+right, y down, z ahead. An annotation has
 
-- center_cam, dimensions [width, height, length] and R_cam, from axes of the box (x its front, y down, z its left) to the
+- center_cam, dimensions [width, height, length] and R_cam, from the box's axes (x its front, y down, z its left) to the
   camera's;
 - bbox3D_cam, the corners: 0 back-top-right, 1 front-top-right, 2 front-bottom-right, 3 back-bottom-right, 4 to 7 the same on
-  the left, as the object itself has left and right;
+  the object's own left;
 - bbox2D_proj, around the projected corners, and bbox2D_trunc, its part inside the picture; bbox2D_tight, around the visible
-  pixels: corners x1, y1, x2, y2. -1 where there is none, as where a corner is behind the camera (behind_camera);
-- visibility, truncation (0 to 1), segmentation_pts (visible pixels); lidar_pts and depth_error are not known: -1; valid3D;
-- track_id, of ours: the object's id in its sequence.
+  pixels: corners x1, y1, x2, y2. -1 means none, for example with a corner behind the camera (behind_camera);
+- visibility, truncation (0 to 1), segmentation_pts (visible pixels); lidar_pts and depth_error are unknown: -1; valid3D;
+- track_id, an addition: the object's id in its sequence.
 
-Objects that are hidden are listed, with segmentation_pts 0, by which Cube R-CNN ignores them. K has the picture's corner at
-(0, 0), which Omni3D leaves open, as it does which way along its length an object looks: here along x. Image ids count from 1,
-and no two splits share one. Training with Cube R-CNN also wants `Omni3D/stats.json`, which its own scripts make. Source: Brazil
-et al. 2023, "Omni3D: A Large Benchmark and Model for 3D Object Detection in the Wild",
+Hidden objects are listed with segmentation_pts 0, and Cube R-CNN ignores them. Omni3D defines neither the pixel origin nor the
+front of an object. Here K has the picture's corner at (0, 0), and an object looks along x. Image ids count from 1, and no two
+splits share an id. Training with Cube R-CNN also needs `Omni3D/stats.json`, which its own scripts create. Source: Brazil et al.
+2023, "Omni3D: A Large Benchmark and Model for 3D Object Detection in the Wild",
 https://github.com/facebookresearch/omni3d/blob/main/DATA.md.
 """
 

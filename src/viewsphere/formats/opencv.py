@@ -6,16 +6,16 @@
     pictures/<split>/<index>.yaml    a camera's keys, and its pose: R, tvec, rvec
     parts/<number>/                  cameras and stereo of data sets that were merged into the first
 
-The numbers are what OpenCV's functions take. `camera_matrix` counts pixels from the middle of the first one: a camera in the
-middle has cx = (width - 1) / 2. `distortion_coefficients` are k1 k2 p1 p2 [k3 [k4 k5 k6]] for `cv2.projectPoints`, zeros for a
-pinhole, and, where `fisheye_model` is 1, k1 k2 k3 k4 for `cv2.fisheye`. R and tvec take points of the world, metres, z up, to
-the camera's axes, x right, y down, z ahead; R and T of a pair those of the first camera to the second; Q takes (x, y,
-disparity, 1) to points of the left camera.
+The numbers suit OpenCV's functions. `camera_matrix` counts pixels from the centre of the first pixel: a centred camera has cx =
+(width - 1) / 2. `distortion_coefficients` are k1 k2 p1 p2 [k3 [k4 k5 k6]] for `cv2.projectPoints`, zeros for a pinhole. If
+`fisheye_model` is 1, they are k1 k2 k3 k4 for `cv2.fisheye`. R and tvec transform points of the world (metres, z up) to the
+camera's axes, x right, y down, z ahead. R and T of a pair transform the first camera's axes to the second's; Q transforms (x,
+y, disparity, 1) to points of the left camera.
 
-Pairs are all rectified ones, and the first camera with each other. A camera's file is that of its first picture; lenses that
-are drawn, or zoom, are in the pictures' files. Skew, which OpenCV's projection leaves out, cannot be held; LiDARs have no
-files. Pictures themselves are not exported. Sources: https://docs.opencv.org/4.x/d9/d0c/group__calib3d.html;
-https://docs.opencv.org/4.x/da/d56/classcv_1_1FileStorage.html; that fisheye_model is the customary name is not verified.
+Pairs are all rectified pairs, and the first camera with each other camera. A camera's file describes its first picture; for
+random or zooming lenses, use the pictures' files. Not stored: skew, which OpenCV's projection ignores; LiDARs; the pictures
+themselves. Sources: https://docs.opencv.org/4.x/d9/d0c/group__calib3d.html;
+https://docs.opencv.org/4.x/da/d56/classcv_1_1FileStorage.html. Not verified: fisheye_model as the customary name.
 """
 
 from __future__ import annotations

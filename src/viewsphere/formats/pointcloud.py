@@ -1,10 +1,10 @@
-"""Coloured point clouds: a PLY file for each picture, binary, which Open3D, MeshLab, CloudCompare and trimesh read.
+"""Coloured point clouds: a binary PLY file for each picture, for Open3D, MeshLab, CloudCompare and trimesh.
 
     <split>/<index>.ply
 
-Each point has x, y, z (metres), red, green, blue, and, where the data set keeps what they follow from, nx, ny, nz, object (0
-for none) and category. Comments in the head say the axes. Pictures of unknown cameras, which imported data sets have, are left
-out.
+Each point has x, y, z (metres), red, green, blue, and, if the data set keeps the channels behind them, nx, ny, nz, object (0
+for none) and category. Comments in the header name the axes. Pictures of unknown cameras, which imported data sets may have,
+are left out.
 """
 
 from __future__ import annotations

@@ -1,27 +1,27 @@
-"""Render for CNN's training set of viewpoints: a small picture of each object, named by the angles that it is seen from.
+"""Render for CNN's training set of viewpoints: a small picture of each object, named by its viewing angles.
 
     syn_images_cropped_bkg_overlaid/<synset>/<md5>/    the pictures, each named
         <synset>_<md5>_a<azimuth>_e<elevation>_t<tilt>_d<distance>_<index>_<object>.jpg
-    syn_lmdbs/<category>_<split>.txt, all_<split>.txt  a line a picture: path, number of the class, azimuth, elevation, tilt
-    view_distribution/<category>.txt                   a line a picture: azimuth, elevation, tilt, distance, not rounded
-    truncation_distribution/<category>.txt             a line a picture: left, top, right, bottom
-    synsets.txt                                        synset and name of each class, from number 0 on
+    syn_lmdbs/<category>_<split>.txt, all_<split>.txt  a line for each picture: path, class number, azimuth, elevation, tilt
+    view_distribution/<category>.txt                   a line for each picture: azimuth, elevation, tilt, distance, not rounded
+    truncation_distribution/<category>.txt             a line for each picture: left, top, right, bottom
+    synsets.txt                                        synset and name of each class, from number 0
     models.txt                                         md5 and key of each model
 
-A picture is cut out around the object's visible pixels. Angles are whole degrees, the distance whole metres, as `%03d` writes
-them (`e-05`): azimuth 0 looks the model in the face and grows counter-clockwise seen from above, tilt is PASCAL3D+'s theta: the
-camera's roll, clockwise seen from behind it, 0 to 359. In the lists elevation, too, is from 0 to 359 (355 is -5), as the tools
-read names. In view_distribution the tilt has the other sign, by which the tools' renderer gives the same pictures (its models
-look along +x). A truncation is how far the sides of the visible pixels' box lie, right and down, of those of the box that the
-whole model would have, as a share of that one's width and height; none is written of a model that reaches behind the camera.
+A picture is a crop around the object's visible pixels. Angles are whole degrees, the distance whole metres, formatted by `%03d`
+(`e-05`). Azimuth 0 faces the model's front and grows counter-clockwise seen from above. Tilt is PASCAL3D+'s theta: the camera's
+roll, clockwise seen from behind it, 0 to 359. In the lists, elevation is also 0 to 359 (355 is -5), because the tools read
+names so. In view_distribution the tilt has the opposite sign, so that the tools' renderer gives the same pictures (its models
+look along +x). A truncation is the offset of the visible pixels' box from the box of the whole model, right and down for each
+side, as a share of that box's width and height. Models that reach behind the camera have no truncation.
 
-synset: the twelve categories of PASCAL3D+ have their WordNet numbers (car: 02958343); others their name, `-` for what is no
-plain letter, digit or point. md5: of the model's key. The last two numbers of a name keep pictures of equal angles apart; the
-tools read no farther than the distance. Objects of which nothing is seen have no picture.
+synset: the twelve categories of PASCAL3D+ have their WordNet numbers (car: 02958343). Others have their name, with `-` for
+characters other than plain letters, digits and points. md5: of the model's key. The last two numbers of a name separate
+pictures of equal angles; the tools stop reading at the distance. Invisible objects have no picture.
 
-Lost: what is around the objects, masks, cameras, sequences, sensors. The tools' own pictures are of one model without a
-background, which is laid under it later; these are cut out of the whole picture, so that others may hide a part of the object.
-Source: H. Su, C. R. Qi, Y. Li, L. J. Guibas, Render for CNN, ICCV 2015, https://github.com/ShapeNet/RenderForCNN.
+Not stored: the surroundings of objects, masks, cameras, sequences, sensors. The tools render one model without a background and
+add one later. These pictures are crops of whole pictures, so other objects may hide a part. Source: H. Su, C. R. Qi, Y. Li, L.
+J. Guibas, Render for CNN, ICCV 2015, https://github.com/ShapeNet/RenderForCNN.
 """
 
 from __future__ import annotations

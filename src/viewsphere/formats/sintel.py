@@ -1,8 +1,8 @@
-"""MPI Sintel's tree, with its archives of depth, segmentation and stereo, which torchvision and ptlflow read.
+"""MPI Sintel's tree, with its archives of depth, segmentation and stereo, for torchvision and ptlflow.
 
     training/clean/<sequence>/frame_0001.png       the pictures
-    training/albedo/<sequence>/frame_0001.png      where the data set keeps the channel: sRGB, as the pictures
-    training/flow/<sequence>/frame_0001.flo        flow to the next picture; all but the last have one, as all of the next two
+    training/albedo/<sequence>/frame_0001.png      if the data set keeps the channel: sRGB, as the pictures
+    training/flow/<sequence>/frame_0001.flo        flow to the next picture; none for the last, as for the next two
     training/occlusions/<sequence>/frame_0001.png  255 where the next picture does not show the point
     training/invalid/<sequence>/frame_0001.png     255 where there is no flow
     training/depth/<sequence>/frame_0001.dpt
@@ -10,22 +10,22 @@
     training/segmentation/<sequence>/frame_0001.png
     stereo/training/{clean_left,clean_right,disparities,occlusions,outofframe}/<sequence>/frame_0001.png   with `stereo`
 
-The split `test` lies in a folder `test`, all others in `training`; each has all labels. torchvision wants the folder above
-`training` to be called Sintel, ptlflow does not mind: link it. Stereo lies apart because its `occlusions`, of the other eye and
-one for each picture, have the path of those of flow. There is one pass, `clean`, with whatever the recipe has painted (motion
-blur, too); there is none called `final`.
+The split `test` goes to the folder `test`, other splits to `training`; all have labels. torchvision requires the name Sintel
+for the folder above `training`, so link it there; ptlflow accepts any name. Stereo has its own folder because its `occlusions`,
+for the other eye and for every picture, have the same path as those of flow. The one pass, `clean`, holds everything that the
+recipe paints, also motion blur; there is no `final`.
 
-Flow: pixels, right and down, float32, 1e10 where it is unknown: of flat backgrounds and of what is behind the camera then.
-Points that leave the picture have flow, and count as occluded. Depth: metres along z, float32, inf where nothing is. Cameras:
-the 3 x 3 matrix M, the pixel (0, 0) a centre, and the 3 x 4 motion N from the world to the camera (x right, y down, z ahead),
-float64: x = M N X. Segmentation: ids of objects, 0 for none, R 65536 + G 256 + B; they are those of the whole sequence.
-Disparity: pixels, positive, 4 R + G / 64 + B / 16384, below 1024; `outofframe` where the right picture ends before,
-`occlusions` where it is hidden, or not known. Frames count from 1.
+Flow: pixels, right and down, float32. Unknown flow is 1e10: flat backgrounds, and points behind the next camera. Points that
+leave the picture have flow and count as occluded. Depth: metres along z, float32, inf for the background. Cameras: the 3 x 3
+matrix M, the pixel (0, 0) a centre, and the 3 x 4 motion N from the world to the camera (x right, y down, z ahead), float64: x
+= M N X. Segmentation: object ids, constant over the sequence, 0 for none, R 65536 + G 256 + B. Disparity: pixels, positive, 4 R
++ G / 64 + B / 16384, below 1024. `outofframe` marks points outside the right picture, `occlusions` hidden or unknown points.
+Frames count from 1.
 
-Lost: other sensors than the left one but for stereo pictures, boxes and poses of objects, categories, names of splits. Not
-verified with the originals: that depth is z in metres, that pixels are centres, that masks of occlusions hold what leaves the
-picture, the names of the folders camdata_left and segmentation. Source: Butler et al. 2012, "A Naturalistic Open Source Movie
-for Optical Flow Evaluation", http://sintel.is.tue.mpg.de.
+Not stored: sensors other than the left one (except stereo pictures), boxes and poses of objects, categories, names of splits.
+Not verified with the originals: depth as z in metres, pixels as centres, occlusion masks that include points outside the
+picture, the folder names camdata_left and segmentation. Source: Butler et al. 2012, "A Naturalistic Open Source Movie for
+Optical Flow Evaluation", http://sintel.is.tue.mpg.de.
 """
 
 from __future__ import annotations

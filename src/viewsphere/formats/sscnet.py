@@ -1,28 +1,27 @@
-"""SSCNet's data, for semantic scene completion from one depth picture: depth, and what is in each cell before the camera.
+"""SSCNet's data, for semantic scene completion from one depth picture: depth, and the class of each cell before the camera.
 
     depthbin/<split>/00000000_<scene>_fl000_rm0000_0000.png     depth, 16 bits
-    depthbin/<split>/00000000_<scene>_fl000_rm0000_0000.bin     where the grid and the camera are, and the class of each cell
+    depthbin/<split>/00000000_<scene>_fl000_rm0000_0000.bin     positions of the grid and the camera, and each cell's class
 
-The number is the picture's in the data set, the scene its sequence, or `still`; floor and room, as SUNCG counts them, are 0.
+The number is the picture's in the data set, the scene its sequence, or `still`. SUNCG's numbers of floor and room are 0.
 
-Depth is millimetres along z, turned left by three bits, (d << 3) | (d >> 13); 0 where nothing is, and 65535 before it is turned
-where it is 65.535 m or more. A .bin is little-endian: three float32, the corner of the grid in the world, metres; sixteen, the
-motion (4, 4) from the camera (x right, y down, z ahead) to the world, row by row; then pairs of uint32, a class and how many
-cells have it, one after another. The grid has 240 x 144 x 240 cells of 2 cm along the world's y, z and x; y changes fastest.
+Depth is millimetres along z, rotated left by three bits, (d << 3) | (d >> 13); 0 for the background, and 65535 before the
+rotation from 65.535 m on. A .bin is little-endian. It has three float32, the corner of the grid in the world, metres; sixteen
+float32, the motion (4, 4) from the camera (x right, y down, z ahead) to the world, row by row; then pairs of uint32, a class
+and its number of successive cells. The grid has 240 x 144 x 240 cells of 2 cm along the world's y, z and x; y changes fastest.
 
-The world's z points up. It is the data set's where the recipe says `labels: {voxels: {axes: world}}`; else each picture
-has its own, turned so that the camera looks along y: y is ahead, x to the right.
+The world has z up. It is the data set's world if the recipe has `labels: {voxels: {axes: world}}`. Otherwise each picture has a
+world of its own in which the camera looks along y: y is ahead, x to the right.
 
-Classes are SUNCG's 36 root classes as far as SSCNet tells them apart: ceiling 1, floor 2, wall 3, window 4, chair 6, bed 7,
-sofa 8, table 9, desk 10, cabinet (bookcase, dresser, ...) 11, television 16, and 36 for all other objects. The ground, roads,
-pavement and grass are floor, buildings, scenery and fences wall, furniture is 11, all other stuff 36. 0 is
-empty, or outside of the picture; where there is a room (scenery above, and scenery or ground below), empty cells outside of it
-are 255.
+Classes are SUNCG's 36 root classes, as far as SSCNet separates them: ceiling 1, floor 2, wall 3, window 4, chair 6, bed 7, sofa
+8, table 9, desk 10, cabinet (bookcase, dresser, ...) 11, television 16, and 36 for all other objects. The ground, roads,
+pavement and grass are floor; buildings, scenery and fences are wall; furniture is 11; other background classes are 36. 0 is
+empty, or outside the picture. In a room (scenery above, and scenery or ground below), empty cells outside the room are 255.
 
-SSCNet's own code takes pictures of 640 x 480 pixels of a camera with f = 518.8579 and its axis through the middle of pixel
-(320, 240): `camera: {K: [[518.8579, 0, 320.5], [0, 518.8579, 240.5], [0, 0, 1]], size: [640, 480]}`. Its writer leaves out one
-cell of a volume of one class; here none is. Lost: colours, objects, surfaces. Not verified: the meaning of the root classes but
-for how SSCNet joins them to 11 (the numbers above are joined to what they say). Source: Song et al. 2017, "Semantic Scene
+SSCNet's own code expects pictures of 640 x 480 pixels from a camera with f = 518.8579 and its axis through the centre of pixel
+(320, 240): `camera: {K: [[518.8579, 0, 320.5], [0, 518.8579, 240.5], [0, 0, 1]], size: [640, 480]}`. Its writer omits one cell
+of a volume of one class; this export writes all. Not stored: colours, objects, surfaces. Not verified: the meaning of the root
+classes, except for SSCNet's mapping to 11 classes, which the list above follows. Source: Song et al. 2017, "Semantic Scene
 Completion from a Single Depth Image", https://github.com/shurans/sscnet.
 """
 

@@ -1,5 +1,5 @@
 """SYNTHIA's trees: `seqs` of its video sequences, with depth, classes, objects and cameras, or `rand` of its random pictures,
-with classes; datumaro reads the latter.
+with classes.
 
     SYNTHIA-SEQS-<sequence>/RGB/Stereo_Left/Omni_F/000000.png           layout `seqs`: pictures; Stereo_Right is the right one
     SYNTHIA-SEQS-<sequence>/Depth/Stereo_Left/Omni_F/000000.png         cm along z, 16 bits, the same in three channels
@@ -10,24 +10,25 @@ with classes; datumaro reads the latter.
 
     RGB/0000000.png                                                     layout `rand`: pictures
     GT/0000000.png, GTTXT/0000000.txt                                   colours of classes, and their numbers
-    ALL.txt                                                             the names of all pictures, a line each
+    ALL.txt                                                             the names of all pictures, one a line
     label_colors.txt                                                    red, green, blue and name of every class, by its number
 
-A rig of sensors that are all called left or right and one of f, b, l, r (left_f, right_b, ...) has the folders Omni_F, Omni_B,
-Omni_L and Omni_R; of others a camera or a rectified pair is written, to Omni_F.
+datumaro reads `rand`. If all sensors of a rig are called left or right and one of f, b, l, r (left_f, right_b, ...), they have
+the folders Omni_F, Omni_B, Omni_L and Omni_R. Of other rigs, the export writes a camera or a rectified pair to Omni_F.
 
-Classes are SYNTHIA's: Sky, Building, Road, Sidewalk, Fence, Vegetation (grass, too), Pole, Sign, Lanemarking, and of categories
-Car, Pedestrian (also called person), Bicycle (Cyclist in `rand`) and TrafficLight; ground, scenery and street furniture are
-Void, 0. Other categories are numbered from 16 on (from 14 in `rand`), and have colours of their own. Objects have their ids, 0
-for none; they keep them in a sequence. Depth is 65535 where nothing is, and where it is farther than 655.34 m.
+Classes are SYNTHIA's: Sky, Building, Road, Sidewalk, Fence, Vegetation (also grass), Pole, Sign, Lanemarking, and the
+categories Car, Pedestrian (also person), Bicycle (Cyclist in `rand`) and TrafficLight. Ground, scenery and street furniture are
+Void, 0. Other categories count from 16 (from 14 in `rand`) and have colours of their own. Objects have their ids, constant over
+a sequence; 0 is none. Depth is 65535 for the background and beyond 655.34 m.
 
-The 16 numbers lead from the camera to the world, column by column, so that the last four are its place. Both are left-handed:
-x right, y up, z ahead of the camera, and the world's y and z are ours changed for one another; metres. The principal point has
-its origin at the picture's corner; one focal length is for x and y, equal in a sequence.
+The 16 numbers transform the camera to the world, column by column, so the last four are its position. Both are left-handed: x
+right, y up, z ahead of the camera; the world swaps viewsphere's y and z. Lengths are metres. The origin of the principal point
+is the picture's corner. One focal length holds for x and y and for a whole sequence.
 
-Lost: boxes, poses of objects, names of splits, and, in `rand`, all but classes. Not verified with the original files: the
-order, direction and axes of the 16 numbers (public readers disagree; most read them so), what depth is where nothing is, and
-where pixels have their origin. SYNTHIA has no flow. Source: Ros et al. 2016, "The SYNTHIA Dataset", http://synthia-dataset.net.
+Not stored: boxes, poses of objects, names of splits, flow (SYNTHIA has none), and, in `rand`, everything but classes. Not
+verified with the original files: the order, direction and axes of the 16 numbers (public readers disagree; most read them so),
+the depth of the background, and the origin of pixels. Source: Ros et al. 2016, "The SYNTHIA Dataset",
+http://synthia-dataset.net.
 """
 
 from __future__ import annotations

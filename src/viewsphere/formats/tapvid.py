@@ -1,24 +1,25 @@
-"""TAP-Vid and TAPVid-3D: points followed through videos, as the benchmarks' own evaluation reads them.
+"""TAP-Vid and TAPVid-3D: points tracked through videos, for the benchmarks' own evaluation.
 
     <split>/<sequence>.pkl                  `kind: tapvid`
     <split>/<sequence>.npz                  `kind: tapvid3d`
-    <split>/<sequence>_<sensor>.pkl, .npz   of rigs of several cameras
+    <split>/<sequence>_<sensor>.pkl, .npz   for rigs of several cameras
 
-TAP-Vid: a pickle as of TAP-Vid-DAVIS, but one a video, so that none grows with the data set; `dict.update` joins them. It is a
+TAP-Vid: a pickle as in TAP-Vid-DAVIS, but one for each video, so that files stay small; `dict.update` joins them. It is a
 dictionary, by the video's name, of `video`, uint8 (T, H, W, 3); `points`, float32 (N, T, 2), x and y as shares of width and
-height, with the picture's corner as origin, 0 where a point has none; `occluded`, bool (N, T), true where it is hidden, outside
-or behind the camera. There are no queries: readers make them. The pickles need numpy of any version, and nothing else.
+height, with the picture's corner as origin, 0 for a point without a position; `occluded`, bool (N, T), true for a point that is
+hidden, outside or behind the camera. There are no queries: readers create them. The pickles need numpy of any version, and
+nothing else.
 
 TAPVid-3D: arrays `images_jpeg_bytes` (T), a JPEG each; `fx_fy_cx_cy`, pixels, with the picture's corner as origin;
-`tracks_XYZ`, float32 (T, N, 3), metres in the camera's axes of that instant (x right, y down, z ahead), 0 where a point is
-nowhere; `visibility`, bool (T, N); `queries_xyt`, float32 (N, 3), pixels and number of the picture at which each was picked;
-`extrinsics_w2c`, float64 (T, 4, 4). Points of the sky, which have no place, are left out. The names are those that the
+`tracks_XYZ`, float32 (T, N, 3), metres in the camera's axes of that instant (x right, y down, z ahead), 0 for a point without a
+position; `visibility`, bool (T, N); `queries_xyt`, float32 (N, 3), pixels and the number of the picture of each point's query;
+`extrinsics_w2c`, float64 (T, 4, 4). Points of the sky, which have no position, are left out. The names are those that the
 benchmark's programs read; its readme has others.
 
-The points are those of the recipe's `tracks`. Lost: the instants' times, whether an unseen point is hidden or outside, objects;
-of JPEG some colour. Not verified with the originals: that pixels of queries_xyt have the corner as origin. Sources: Doersch et
-al. 2022, "TAP-Vid: A Benchmark for Tracking Any Point in a Video"; Koppula et al. 2024, "TAPVid-3D: A Benchmark for Tracking
-Any Point in 3D", https://github.com/google-deepmind/tapnet.
+The points are the recipe's `tracks`. Not stored: times, whether an invisible point is hidden or outside, objects; JPEG loses
+some colour. Not verified with the originals: the corner as pixel origin of queries_xyt. Sources: Doersch et al. 2022, "TAP-Vid:
+A Benchmark for Tracking Any Point in a Video"; Koppula et al. 2024, "TAPVid-3D: A Benchmark for Tracking Any Point in 3D",
+https://github.com/google-deepmind/tapnet.
 """
 
 from __future__ import annotations

@@ -4,21 +4,21 @@
     <split>/img/001/001_00001.png             the pictures, by the sequence's number and the frame's, both from 1
     <split>/cls/001/001_00001.png             8 bits, grey: the class
     <split>/inst/001/001_00001.png            red is the class, 256 G + B the object's id
-    <split>/flow/001/001_00001.npz            u and v, 16-bit floats, to the next frame; all but the last have one
+    <split>/flow/001/001_00001.npz            u and v, 16-bit floats, to the next frame; none for the last frame
     <split>/camera/001.csv                    frame, projection (16 numbers), view (16 numbers), row by row
 
-Splits are train, val and test. The second sensor of a rig has a sequence 001-1, and so on. Classes are VIPER's 32. Of stuff:
-ground and grass are terrain, road markings road, pavement sidewalk, poles and street furniture infrastructure, vehicles cars,
-walls, doors and windows buildings, scenery and what else is indoors unlabeled (0). Categories that are called as one of its
-classes have it; others are numbered from 32 on, and listed in classes.csv. Objects keep their ids in a sequence; 0 is none.
+Splits are train, val and test. The second sensor of a rig has a sequence 001-1, and so on. Classes are VIPER's 32. Ground and
+grass are terrain, road markings road, pavement sidewalk, poles and street furniture infrastructure, vehicles cars; walls, doors
+and windows are buildings; scenery and other indoor surfaces are unlabeled (0). Categories with a class name have that class;
+others count from 32 and are listed in classes.csv. Objects keep their ids over a sequence; 0 is none.
 
-Flow is pixels, right and down, NaN where there is none; ptlflow passes over what is longer than 512. Its 16 bits are exact to
-one part in 2048. The view matrix leads from the axes that the camera has in the first frame of its sequence to those that it
-has now: x right, y up, z back, metres. The projection is OpenGL's, of a near plane at 0.1 m and a far one at 1000 m.
+Flow is pixels, right and down, NaN if unknown; ptlflow ignores flow beyond 512. Its 16 bits are exact to one part in 2048. The
+view matrix transforms the camera's axes in the first frame of its sequence to its present axes: x right, y up, z back, metres.
+The projection is OpenGL's, with the near plane at 0.1 m and the far plane at 1000 m.
 
-Lost: boxes (VIPER has a list for each frame; in which order the numbers of 3D boxes stand was found nowhere, and its readme and
-a public reader do not agree on where the class is), depth (of which nothing is published), and names of conditions (day, rain,
-...). Not verified with the original files: that lists of cameras have no head, the planes of the projection, that frames count
+Not stored: depth, which the original has not published; names of conditions (day, rain, ...); and boxes. VIPER has a list of
+boxes for each frame, but no source documents the order of the 3D numbers, and its readme and a public reader disagree on the
+class column. Not verified with the original files: camera lists without a header, the planes of the projection, frames counted
 from 1. Source: Richter, Hayder, Koltun 2017, "Playing for Benchmarks", https://github.com/srrichter/viper.
 """
 

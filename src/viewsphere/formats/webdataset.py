@@ -1,10 +1,10 @@
-"""Tar shards that are read as a stream (https://github.com/webdataset/webdataset), and an index of them.
+"""Tar shards to read as a stream (https://github.com/webdataset/webdataset), and an index of them.
 
     <split>-000000.tar, <split>-000001.tar, ...
-    <split>.json                                 the shards and how many samples each has, as `wids` reads it; the categories
+    <split>.json                                 the shards and their numbers of samples, as `wids` reads it; the categories
 
 A sample is a run of files of one key, `<index>`: its pictures as the store keeps them (`.rgb.png`), its other channels as
-arrays (`.depth.npy`), and all the rest of it (`.json`). Equal samples make equal bytes: files have no date and no owner.
+arrays (`.depth.npy`), and all other data (`.json`). Equal samples make equal bytes: files have no date and no owner.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """Blender's own files, to open and change: a scene with its models, lights and ground, the camera on the viewing sphere.
 
     <model>.blend                 the frames of a model, one after another on the timeline
-    <model>-<first frame>.blend   where the model's frames are of several scenes: one of them
-    <the same>/0001.png, ...      the backgrounds of its frames, where they change
+    <model>-<first frame>.blend   one of several scenes, if the model's frames need several
+    <the same>/0001.png, ...      the backgrounds of its frames, if they change
 
-Frames share a file as far as they share a scene: models and where they stand, light, ground. Pictures are packed. Blender
-writes memory addresses, so equal data sets give equal scenes but not equal bytes. Frames of unknown cameras or models, which
-data sets made elsewhere may have, are left out.
+Frames share a file while they share a scene: models and their positions, light, ground. Pictures are packed. Blender writes
+memory addresses, so equal data sets give equal scenes but not equal bytes. Frames of unknown cameras or models, which imported
+data sets may have, are left out.
 """
 
 from __future__ import annotations

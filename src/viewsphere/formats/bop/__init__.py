@@ -1,8 +1,8 @@
-"""BOP, the benchmark for 6D object pose estimation, as bop_toolkit, BlenderProc's users and pose estimators read it.
+"""BOP, the benchmark for 6D object pose estimation, for bop_toolkit, BlenderProc's users and pose estimators.
 
-    camera.json, dataset_info.json           the first lens; which object is which model of the data set
+    camera.json, dataset_info.json           the first lens; the model of each object
     models/obj_<object>.ply, models_info.json
-    test_targets_bop19.json, test_targets_bop24.json     of the split `test`, where there is one
+    test_targets_bop19.json, test_targets_bop24.json     for the split `test`, if there is one
 
 `scenewise`:
 
@@ -15,29 +15,29 @@
     <split>/<scene>/<scene>_<image>.rgb.png, .depth.png, .camera.json, .gt.json, .gt_info.json, .mask.json, .mask_visib.json
     <split>/shard-<number>.tar, key_to_shard.json        at most 1,000 pictures each, in the data set's order, not shuffled
 
-Numbers have six digits. A scene is what one camera of a sequence sees, of still pictures a thousand of them (fewer where
-they show more than ten objects); its number is that of its first picture in the data set, and its images count from 0 (a scene
-whose pictures are in several splits has a part in each). Objects count from 1 in the data set's order of models. Shards are
-numbered by thousands of pictures of the whole data set, so that a split may lack some numbers.
+Numbers have six digits. A scene holds the pictures of one camera of a sequence, or a thousand still pictures (fewer with more
+than ten objects each). Its number is that of its first picture in the data set, and its images count from 0. A scene whose
+pictures are in several splits has a part in each. Objects count from 1 in the data set's order of models. Shards are numbered
+by thousands of pictures of the whole data set, so a split may lack some numbers.
 
-Models and poses are in millimetres, models' z is up and their origin is their box's centre, cameras look along z, x right, y
-down, matrices are row after row. The pixel (0, 0) is the centre of the first pixel, as in BOP's own back-projection: cx and cy
-are half a pixel smaller than elsewhere in viewsphere. Depth is along z in steps of depth_scale mm, 16 bits, 0 where there is
-none or where it ends.
+Models and poses are in millimetres. Models have z up and their origin at their box's centre; cameras look along z, x right, y
+down; matrices are row by row. The pixel (0, 0) is the centre of the first pixel, as in BOP's own back-projection: cx and cy are
+half a pixel smaller than elsewhere in viewsphere. Depth is along z in steps of depth_scale mm, 16 bits, 0 for none or beyond
+its range.
 
-All objects that have pixels in the picture are listed, hidden ones too; others are not. px_count_all and visib_fract count on a
-canvas of three times the picture's width and height, and boxes in scene_gt_info are x, y, and the distance to the last pixel
-(a pixel less than the width), all as BOP's scripts have it; for what is seen they ask depth, with a tolerance, where masks here
-are exact. bbox_obj of an object that reaches out of the picture may be a pixel off; where it reaches behind the camera, it is
-the box of what lies in the picture. bop_toolkit's readers of masks fail at pictures without objects.
+All objects with pixels in the picture are listed, also hidden ones. px_count_all and visib_fract count on a canvas of three
+times the picture's width and height. Boxes in scene_gt_info are x, y, and the distance to the last pixel (a pixel less than the
+width). Both follow BOP's scripts. These scripts decide visibility by depth with a tolerance; masks here are exact. bbox_obj of
+an object that extends beyond the picture may be a pixel off; for an object that reaches behind the camera, it is the box of the
+part in the picture. bop_toolkit's mask readers fail on pictures without objects.
 
-Trees of scenes are imported, others' too, with what of this they have, and with their models, from the first of `models`,
-`models_cad`, `models_reconst`, `models_eval` and `models_fine` that is there. Objects that are exported again have numbers from
-1 on in the order of their models, those without a model their own.
+`import` reads trees of scenes, also those of other origins, with their models, from the first of `models`, `models_cad`,
+`models_reconst`, `models_eval` and `models_fine`. In an export of imported data, objects count from 1 in the order of their
+models; objects without a model keep their numbers.
 
-Lost: looks and parts of models (PLY files have no colours), categories but for dataset_info.json, names of sensors and
-sequences, times. Models that deform are refused. There is no models_eval: the toolkit's remesh script makes it.
-Source: Hodan et al., BOP: Benchmark for 6D Object Pose Estimation (ECCV 2018), https://bop.felk.cvut.cz, and
+Not stored: colours and parts of models (PLY files have no colours), categories except in dataset_info.json, names of sensors
+and sequences, times. Deforming models are refused. There is no models_eval: the toolkit's remesh script creates it. Source:
+Hodan et al., BOP: Benchmark for 6D Object Pose Estimation (ECCV 2018), https://bop.felk.cvut.cz, and
 https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md.
 """
 

@@ -1,37 +1,37 @@
-"""Cityscapes, for torchvision, cityscapesScripts and the many trainers of semantic segmentation of streets.
+"""Cityscapes, for torchvision, cityscapesScripts and many trainers of semantic segmentation of streets.
 
     leftImg8bit/<split>/<city>/<city>_<sequence>_<frame>_leftImg8bit.png
-    rightImg8bit/<split>/<city>/<city>_<sequence>_<frame>_rightImg8bit.png   of the right one of a rectified pair
+    rightImg8bit/<split>/<city>/<city>_<sequence>_<frame>_rightImg8bit.png   the right picture of a rectified pair
     gtFine/<split>/<city>/<city>_<sequence>_<frame>_gtFine_labelIds.png      8 bits: the label's id
     ..._gtFine_instanceIds.png                                               16 bits: 1000 id + n, or the id
     ..._gtFine_color.png, ..._gtFine_polygons.json                           RGBA; labels and polygons
     camera/<split>/<city>/<city>_<sequence>_<frame>_camera.json              intrinsic and extrinsic
     disparity/<split>/<city>/<city>_<sequence>_<frame>_disparity.png         with `stereo`: 16 bits
 
-A sequence is a city, with `-` for `_`, as names are parted at `_`; its number is that in the plan, frames are instants. Still
-pictures are of the city `stills`, and each is a sequence of its own; large data sets have `stills0000`, `stills0001`, ... Only
-the left pictures, or those of the only camera, have labels, as there. torchvision takes splits named train, val and test.
+Each sequence is a city. `-` replaces `_` in its name, because `_` separates the parts of a file name. The sequence number is
+its number in the plan, and frames are instants. Still pictures belong to the city `stills`, one sequence each; large data sets
+have `stills0000`, `stills0001`, ... Only left pictures, or those of the only camera, have labels, as in the original.
+torchvision reads splits named train, val and test.
 
-Labels go by the names of classes and categories: those of Cityscapes, however spelled, and some others: road marking is road,
-pavement sidewalk, grass terrain; tree, hedge and shrub vegetation; house building; lamp post pole; road sign traffic sign;
-pedestrian person; cyclist rider; van and taxi car; lorry truck; tram train; motorbike motorcycle; bike bicycle. Ground without
-a road is `ground`, which evaluations ignore, as they do the rest: scenery, street furniture, benches, post boxes and bins are
-`static`, other things `dynamic`. There is no `unlabeled` pixel. Of person to bicycle, n counts a picture's instances of a label
-from 0; all else has the label's id alone.
+Labels follow the names of classes and categories. Cityscapes' own names match in any spelling. Other names map as follows: road
+marking is road, pavement sidewalk, grass terrain; tree, hedge and shrub vegetation; house building; lamp post pole; road sign
+traffic sign; pedestrian person; cyclist rider; van and taxi car; lorry truck; tram train; motorbike motorcycle; bike bicycle.
+Ground without a road is `ground`; scenery, street furniture, benches, post boxes and bins are `static`; other things are
+`dynamic`. Evaluations ignore these three. No pixel is `unlabeled`. For the labels person to bicycle, n counts the instances of
+a label in the picture from 0; other pixels have the id alone.
 
-polygons.json: drawn one after another by cityscapesScripts, they give labelIds.png; vertices are pixels' columns and rows, and
-outlines belong to them. An instance is one polygon, its pieces joined by lines that what is drawn later covers; where such a
-line crosses another instance in pieces, pixels of it are wrong in maps that are drawn anew. Other labels have one polygon a
-piece.
+polygons.json: cityscapesScripts draws the polygons in order and obtains labelIds.png. Vertices are pixel columns and rows, and
+outlines belong to the polygon. An instance is one polygon; lines that later polygons cover join its pieces. If such a line
+crosses another instance in several pieces, redrawn maps have wrong pixels there. Other labels have one polygon for each piece.
 
-disparity: pixels = (p - 1) / 256, 0 unknown or 256 and more; dense, also where the right camera does not see the point; the
-sky's is 0 pixels. camera.json: u0 and v0 count from the centre of the first pixel; the vehicle, which viewsphere does not know,
-stands on world z = 0 below each camera and heads where it looks: x, y and yaw are 0, z is the height (metres), pitch and roll
-(radians) turn the camera's axes (x ahead, y left, z up) into the vehicle's as Ry(pitch) Rx(roll); `baseline` is 0 of a lone
-camera.
+disparity: pixels = (p - 1) / 256; 0 means unknown, or 256 and more. It is dense, also at points hidden from the right camera;
+the sky has 0 pixels. camera.json: u0 and v0 count from the centre of the first pixel. viewsphere has no vehicle, so the export
+puts one on world z = 0 below each camera, heading where the camera looks: x, y and yaw are 0, z is the height (metres). Pitch
+and roll (radians) rotate the camera's axes (x ahead, y left, z up) into the vehicle's as Ry(pitch) Rx(roll). A single camera
+has `baseline` 0.
 
-Lost: poses in the world, 3D boxes, times, labels of right pictures. Not verified with the originals: how camera.json nests, and
-what their tools make of other cities. Source: M. Cordts et al., The Cityscapes Dataset, CVPR 2016;
+Not stored: poses in the world, 3D boxes, times, labels of right pictures. Not verified with the originals: the nesting of
+camera.json, and how their tools handle other cities. Source: M. Cordts et al., The Cityscapes Dataset, CVPR 2016;
 https://github.com/mcordts/cityscapesScripts, docs/csCalibration.pdf there.
 """
 

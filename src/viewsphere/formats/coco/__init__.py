@@ -1,28 +1,28 @@
 """COCO instances (https://cocodataset.org/#format-data) with the extra keys of Ruiz et al. 2019.
 
-    annotations/instances_<split>.json; with the annotation captions, captions_<split>.json; with keypoints, these, too
+    annotations/instances_<split>.json; with the annotation captions, also captions_<split>.json
     images/<split>/<image id>.png, images/<split>/MASK/<image id>.png     (_<object id> if frames hold several objects)
     MODELS/<key>/<key>.obj, .glb, ...
 
-Large data sets have numbered sub-folders. Image and annotation ids count from 1 and come from the plan: they do not depend
-on what is finished. `Options` say how categories are numbered and where pictures lie. Segmentations are polygons that
-pycocotools rasterises to the identical mask, or run lengths. Imported annotations are kept unchanged, except for their ids.
+Large data sets have numbered sub-folders. Image and annotation ids count from 1 and follow the plan, not the finished frames.
+`Options` select the numbering of categories and the place of pictures. Segmentations are polygons that pycocotools rasterises
+to the identical mask, or run lengths. Imported annotations stay unchanged, except for their ids.
 
-With the annotation keypoints, categories have `keypoints`, the names of all points of their models, and `skeleton`; objects
-have `keypoints`, x, y, v of each name, and `num_keypoints`: v is 2 for a visible point, 1 for an occluded one, and 0 for
-others, of which x and y are 0. As COCO's annotators gave whole pixels, (0, 0) is the centre of the first one, half a pixel less
-than in boxes and polygons; Detectron2 reads them so. They are in the instances file, where trainers look; datumaro looks for
-them in files `person_keypoints_<split>.json` only. COCOeval has to be given sigmas for each category (`params.kpt_oks_sigmas`),
-as its default ones are of 17 points.
+With the annotation keypoints, categories have `keypoints`, the names of all points of their models, and `skeleton`. Objects
+have `keypoints`, x, y, v for each name, and `num_keypoints`. v is 2 for a visible point, 1 for an occluded point, and 0 for
+others, whose x and y are 0. COCO's annotators gave whole pixels, so (0, 0) is the centre of the first pixel, half a pixel less
+than in boxes and polygons; Detectron2 reads them so. Keypoints are in the instances file, where trainers look; datumaro reads
+them only from `person_keypoints_<split>.json`. Pass sigmas for each category to COCOeval (`params.kpt_oks_sigmas`), because its
+default has 17 points.
 
-Data sets that were made elsewhere are imported by their folder or by one file: `viewsphere import coco`. A split's annotations
-are those of instances files, else of person_keypoints files, else of whatever JSON there is; what image_info files name of
-other splits has none, where its pictures are there. Folders of splits, each with labels.json and `data` (FiftyOne) or
-_annotations.coco.json (Roboflow), are read, too; a file called so, annotations.json (supervision) or coco_annotations.json
-(BlenderProc) alone is `train`. A split's `info`, `licenses` and all that categories say (`keypoints`, `skeleton`) are kept,
-and go out again; in a merged data set `info.sources` has what each said, and licences of one id get ids of their own. Pictures
-are turned as their EXIF tag says, and kept as PNG without it, unless the width and height in the file are those of the pixels
-as they are stored.
+`viewsphere import coco` imports a folder or one file of another origin. A split's annotations are those of instances files,
+else of person_keypoints files, else of any JSON. image_info files of other splits add pictures without annotations, if the
+pictures exist. The import also reads folders of splits, each with labels.json and `data` (FiftyOne) or _annotations.coco.json
+(Roboflow). Such a file, annotations.json (supervision) or coco_annotations.json (BlenderProc) alone is the split `train`.
+
+The import keeps a split's `info`, `licenses` and all keys of categories (`keypoints`, `skeleton`), and exports write them
+again. In a merged data set, `info.sources` holds the `info` of each, and licences that share an id get new ids. Pictures are
+rotated by their EXIF tag and stored as PNG without it, unless the file's width and height are those of the stored pixels.
 """
 
 from __future__ import annotations

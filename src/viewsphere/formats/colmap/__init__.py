@@ -1,26 +1,26 @@
-"""COLMAP's sparse models, text or binary, as COLMAP, pycolmap and Gaussian splatting read them.
+"""COLMAP's sparse models, text or binary, for COLMAP, pycolmap and Gaussian splatting.
 
-    <world>/images/<sensor>/<index>.png   the pictures; without <sensor> where there is one
+    <world>/images/<sensor>/<index>.png   the pictures; without <sensor> if there is one
     <world>/sparse/0/cameras.txt          lenses: PINHOLE, OPENCV, FULL_OPENCV, OPENCV_FISHEYE
-    <world>/sparse/0/rigs.txt             how sensors are mounted: sensor_from_rig
-    <world>/sparse/0/frames.txt           rig_from_world at each instant, and the images that are taken then
+    <world>/sparse/0/rigs.txt             mounts of sensors: sensor_from_rig
+    <world>/sparse/0/frames.txt           rig_from_world at each instant, and the images of that instant
     <world>/sparse/0/images.txt           cam_from_world, camera, file and points of each image
     <world>/sparse/0/points3D.txt         points, their colours, and the images that show them
     <world>/sparse/0/<split>.txt          names of the images of a split
 
-A world is what stands still while it is looked at: a sequence, a scene, or a model of still pictures. With `kind: binary` the
-five files end in `.bin`. Metres, z up; cameras look along z, x right, y down; quaternions are w, x, y, z. Pixels are counted
-from the image's corner, so the centre of the first is (0.5, 0.5), as COLMAP has it.
+A world is static while cameras look at it: a sequence, a scene, or a model of still pictures. With `kind: binary` the five
+files end in `.bin`. Lengths are metres, z up; cameras look along z, x right, y down; quaternions are w, x, y, z. Pixels count
+from the image's corner, so the centre of the first is (0.5, 0.5), as in COLMAP.
 
-Points of sequences that follow some (the channel `tracks`) are those that stand still, with all images that show them; those
-of other pictures are pixels of a coarse grid, lifted by their depth, which one image shows. All are exact: their errors are 0.
-COLMAP's world stands still: things that move in a sequence are in its pictures only. Numbers follow from the plan: an image's
-is its frame + 1; a frame's that of its first image. Where a picture's lens is not that of its data set's first, as in zooms, it
-has a camera and a rig of its own. Skew cannot be held. `import` reads the folder of one world, without its points.
+Sequences with the channel `tracks` use its static points, with all images that show them. Other pictures use pixels of a coarse
+grid, lifted by their depth; one image shows each. All are exact: their errors are 0. COLMAP's world is static: only the
+pictures show moving objects. Numbers follow the plan: an image's is its frame + 1; a frame's that of its first image. A picture
+with another lens than the data set's first, for example in zooms, has its own camera and rig. Skew is not supported. `import`
+reads the folder of one world, without its points.
 
-Not verified: that versions before 3.12, which know no rigs, take the other three files. The first program of Gaussian
-splatting takes PINHOLE alone, and looks for pictures without <sensor>/, so for those of one sensor.
-Source: COLMAP's documentation, https://colmap.github.io/format.html.
+Not verified: that versions before 3.12, without rigs, accept the other three files. The first program of Gaussian splatting
+accepts only PINHOLE and pictures without <sensor>/, that is, of one sensor. Source: COLMAP's documentation,
+https://colmap.github.io/format.html.
 """
 
 from __future__ import annotations

@@ -1,39 +1,39 @@
-"""Falling Things (FAT), as torchvision and pose estimators such as DOPE read it; or NDDS, whose program made it.
+"""Falling Things (FAT), as torchvision and pose estimators such as DOPE read it; or NDDS, the program behind it.
 
 `fat`:
 
-    FallingThings/mixed/<split>_<k>/                  of stills; of sequences <split>_<sequence>_<k>
-    FallingThings/single/<model>/<split>_<k>/         where all pictures are of one object
+    FallingThings/mixed/<split>_<k>/                  stills; sequences have <split>_<sequence>_<k>
+    FallingThings/single/<model>/<split>_<k>/         pictures of one object
         _camera_settings.json, _object_settings.json
-        <number>.left.jpg, .left.depth.png, .left.seg.png, .left.json          and the same of .right
+        <number>.left.jpg, .left.depth.png, .left.seg.png, .left.json          and the same with .right
 
 `ndds`:
 
     <split>_<k>/_camera_settings.json, _object_settings.json
-        <number>.png, .depth.mm.16.png, .cs.png, .is.png, .json                of two cameras .left.png, ..., .right.json
+        <number>.png, .depth.mm.16.png, .cs.png, .is.png, .json                with two cameras .left.png, ..., .right.json
 
-k counts thousands of pictures. The number, of six digits, is that of the instant in its sequence, or of the still picture in
-the data set (of a pair's first picture). A rig is one camera, `left`, or a rectified pair.
+k counts thousands of pictures. The number has six digits: the instant in its sequence, or the still picture in the data set (a
+pair uses the number of its first picture). A rig is one camera, `left`, or a rectified pair.
 
-Lengths are centimetres. An object's axes are those of a camera that looks out of its front: x to its right, y down, z ahead;
-their origin is the centre of its box. location and quaternion_xyzw (x, y, z, w) take them to the camera's axes (x right, y
-down, z ahead). pose_transform_permuted, A, is transposed and permuted: A^T P is the pose, where P takes (x, y, z) to
-(z, x, -y); NDDS calls the same matrix pose_transform. Points of bounding_box are [y, x], of cuboids [x, y]; the box is that of
-the projected model, and may reach out of the picture. Cuboids begin at front top right, then front top left, front bottom left,
-front bottom right, and the same of the rear; left and right are the object's own. Pixels have their origin at the picture's
-corner: cx is half the width. What is behind the camera is projected to [-1, -1]. visibility is the share of an object's pixels
-in the picture that nothing hides. The world, of camera_data, is viewsphere's: z up, right-handed (NDDS has Unreal's).
+Lengths are centimetres. An object's axes are those of a camera that looks out of its front: x to its right, y down, z ahead.
+Their origin is the centre of its box. location and quaternion_xyzw (x, y, z, w) transform them to the camera's axes (x right, y
+down, z ahead). pose_transform_permuted, A, is transposed and permuted: A^T P is the pose, where P maps (x, y, z) to (z, x, -y).
+NDDS calls the same matrix pose_transform. Points of bounding_box are [y, x], points of cuboids [x, y]. The box encloses the
+projected model and may extend beyond the picture. Cuboids start at front top right, then front top left, front bottom left,
+front bottom right, then the rear in the same order; left and right are the object's own. The pixel origin is the picture's
+corner: cx is half the width. Points behind the camera project to [-1, -1]. visibility is the unhidden share of an object's
+pixels in the picture. The world, in camera_data, is viewsphere's: z up, right-handed (NDDS has Unreal's).
 
-A class is a model, by its key in the data set; objects of one model share it. fixed_model_transform (transposed) takes a
-model's points in metres, as the store's files and other formats have them, to its class's axes. Depth is along z, 16 bits, in
-steps of 0.1 mm (`ndds`: 1 mm); 65535 is all that is farther than that, and nothing. seg and cs have the number of the class,
-in `single` 255, 0 for none; is has the object's id as R 65536 + G 256 + B.
+A class is a model, named by its key in the data set; objects of one model share it. fixed_model_transform (transposed) maps a
+model's points in metres, as in the store's files and other formats, to the class's axes. Depth is along z, 16 bits, in steps of
+0.1 mm (`ndds`: 1 mm); 65535 is the background and larger depths. seg and cs hold the class number (in `single` 255), 0 for the
+background; is holds the object id as R 65536 + G 256 + B.
 
-torchvision takes every pair to be 6 cm apart, as FAT's are: with another baseline, its disparities are to be multiplied by
-the baseline / 6 cm. Settings have the lenses of the first shot; where lenses differ, camera_data's intrinsics hold (an
-extra). Lost: categories, exact colours (`fat` has JPEG), times. Not verified: how NDDS names the files of two cameras.
-Source: Tremblay, To and Birchfield, Falling Things: A Synthetic Dataset for 3D Object Detection and Pose Estimation (CVPR
-Workshops 2018), https://arxiv.org/abs/1804.06534, and the data set's readme; https://github.com/NVIDIA/Dataset_Synthesizer.
+torchvision assumes that all pairs are 6 cm apart, like FAT's. With another baseline, multiply its disparities by the baseline /
+6 cm. Settings hold the lenses of the first shot; where lenses differ, use camera_data's intrinsics (an extra). Not stored:
+categories, exact colours (`fat` has JPEG), times. Not verified: NDDS's file names for two cameras. Source: Tremblay, To and
+Birchfield, Falling Things: A Synthetic Dataset for 3D Object Detection and Pose Estimation (CVPR Workshops 2018),
+https://arxiv.org/abs/1804.06534, and the data set's readme; https://github.com/NVIDIA/Dataset_Synthesizer.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Parquet files that `datasets.load_dataset` of Hugging Face reads as they lie, with a type for every column.
+"""Parquet files that `datasets.load_dataset` of Hugging Face reads directly, with a type for every column.
 
-    README.md                          the data set's card: which files are which split
-    data/<split>-00000.parquet, ...    one row a sample; pictures are inside
+    README.md                          the data set's card: the files of each split
+    data/<split>-00000.parquet, ...    one row for each sample; pictures are inside
 
-Types stand in the files' Arrow schema, where `datasets` looks for them (https://huggingface.co/docs/datasets). Writing needs
+The files' Arrow schema holds the types, where `datasets` looks for them (https://huggingface.co/docs/datasets). Writing needs
 the extra `huggingface`.
 """
 

@@ -1,14 +1,11 @@
-"""The layout and JSON of Ruiz et al. 2019's own tool, key for key, without its faults, which docs/formats.md
-lists.
+"""The layout and JSON of the tool of Ruiz et al. 2019, key for key, without its faults (docs/formats.md lists them).
 
     dataset1.json
     MODELS/<key>/<key>.obj, .glb, ...
     Pose-<index>/RGB|MASK|DEPTH/<object>-<pose>.png|.tiff
 
-Pictures imported without a camera are left out: the layout sorts everything by pose.
-
-An object's name is its model's key; where a pose has several frames, or a frame several objects, the
-frame's and the object's numbers follow it.
+Pictures imported without a camera are left out, because the layout sorts everything by pose. An object's name is its model's
+key. If a pose has several frames, or a frame several objects, the numbers of the frame and the object follow it.
 """
 
 from __future__ import annotations

@@ -1,30 +1,30 @@
-"""Posed pictures for radiance fields and Gaussian splatting: `transforms.json` as nerfstudio or instant-ngp read it, or NeRF's
+"""Posed pictures for radiance fields and Gaussian splatting: `transforms.json` for nerfstudio or instant-ngp, or NeRF's
 synthetic scenes.
 
-    <world>/transforms.json                  lenses, poses and files of all pictures; for nerfstudio the names of each split's
-    <world>/images/<sensor>/<index>.png      the pictures; without <sensor> where there is one
-    <world>/depths/<sensor>/<index>.png      depth along z, 16 bits, millimetres, 0 where nothing is, or farther than 65.5 m
-    <world>/masks/<sensor>/<index>.png       with `masks`: 255 where an object is, 0 for pixels that training leaves out
-    <world>/points.ply                       coloured points, pixels of a coarse grid, which splatting begins from
+    <world>/transforms.json                  lenses, poses and files of all pictures; for nerfstudio the names of each split
+    <world>/images/<sensor>/<index>.png      the pictures; without <sensor> if there is one
+    <world>/depths/<sensor>/<index>.png      depth along z, 16 bits, millimetres; 0 for the background and beyond 65.5 m
+    <world>/masks/<sensor>/<index>.png       with `masks`: 255 on objects, 0 for pixels that training leaves out
+    <world>/points.ply                       coloured points, pixels of a coarse grid, to initialise splatting
 
 and with `kind: nerf-synthetic`
 
     <world>/transforms_<split>.json          train, val and test: angle of view and poses
-    <world>/<split>/<sensor>/<index>.png     the pictures, with alpha where the data set keeps `rgba`
+    <world>/<split>/<sensor>/<index>.png     the pictures, with alpha if the data set keeps `rgba`
 
-A world is what stands still while it is looked at: a sequence, a scene, or a model of still pictures; what moves in a sequence
-is in its pictures only. `transform_matrix` is world_from_camera, (4, 4), of OpenGL's axes: x right, y up, z back. Metres, z up.
-`cx` and `cy` count from the image's corner: a camera in the middle has half the width, and the ray of the first pixel goes
-through (0.5, 0.5), in nerfstudio and instant-ngp alike. NeRF's own code sends it through (0, 0), half a pixel away. A split of
-train, val and test that a world has not is its first one again, as loaders want all three.
+A world is static while cameras look at it: a sequence, a scene, or a model of still pictures. Only the pictures show moving
+objects of a sequence. `transform_matrix` is world_from_camera, (4, 4), with OpenGL's axes: x right, y up, z back. Lengths are
+metres, z up. `cx` and `cy` count from the image's corner: a centred camera has half the width. The ray of the first pixel
+passes through (0.5, 0.5), in nerfstudio and instant-ngp alike; NeRF's own code uses (0, 0), half a pixel away. Loaders require
+the splits train, val and test, so a missing split repeats the world's first split.
 
-Lenses are pinholes, OpenCV's with k1 k2 p1 p2 (for nerfstudio k3 too), and its fisheye. Those of NeRF's synthetic scenes look
-straight ahead, and all pictures of a world have the same. `kind: instant-ngp` names depth `depth_path` and has `aabb_scale`
-16, which is to be set to the scene's size. The first lens is said for all, too, as nerfstudio's reader of instant-ngp's files
-knows no others. Skew cannot be held. `import` reads the folder of one world, or one of its files.
+Lenses are pinholes, OpenCV's with k1 k2 p1 p2 (for nerfstudio also k3), and its fisheye. NeRF's synthetic scenes have a centred
+pinhole, equal in all pictures of a world. `kind: instant-ngp` calls depth `depth_path` and has `aabb_scale` 16; set it to the
+size of your scene. The file also gives the first lens for all pictures, because nerfstudio's reader of instant-ngp's files
+supports one lens. Skew is not supported. `import` reads the folder of one world, or one of its files.
 
-Not verified by running: these programs, whose readers' code tells the above; that instant-ngp's depth is along z.
-Sources: https://docs.nerf.studio/quickstart/data_conventions.html; https://github.com/NVlabs/instant-ngp; Mildenhall et al.,
+Not verified by running these programs, but read in their code: all of the above. Not verified at all: instant-ngp's depth along
+z. Sources: https://docs.nerf.studio/quickstart/data_conventions.html; https://github.com/NVlabs/instant-ngp; Mildenhall et al.,
 NeRF, ECCV 2020, https://github.com/bmild/nerf.
 """
 

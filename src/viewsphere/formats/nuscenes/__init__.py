@@ -1,29 +1,29 @@
-"""nuScenes: tables of scenes, sensors and boxes in the world, beside pictures and LiDAR points; nuscenes-devkit reads it.
+"""nuScenes: tables of scenes, sensors and boxes in the world, with pictures and LiDAR points, for nuscenes-devkit.
 
     <version>/<table>.json          category, attribute (empty), visibility, instance, sensor, calibrated_sensor, ego_pose, log,
                                     scene, sample, sample_data, sample_annotation, map
     <version>/splits.json           names of the scenes of each split
     samples/<CHANNEL>/<scene>__<CHANNEL>__<instant>.png      pictures; .pcd.bin: points, float32 x y z intensity ring
-    maps/<token>.png                a map that says nothing: the development kit asks for one
+    maps/<token>.png                an empty map, which the development kit requires
 
 A scene is a sequence, a sample an instant, an instance an object; all samples are key frames. A sensor's channel is CAM_ or
-LIDAR_ and its name in capitals, so `front_left` is CAM_FRONT_LEFT; a sensor without a name of its own is CAM_FRONT, and the
-only LiDAR LIDAR_TOP. Tokens are hashes of names: the same data set has the same ones. Categories that nuScenes has, too, are
-written as there (car: vehicle.car); the development kit draws boxes of no others. Scenes are numbered from scene-0001 and begin
-an hour apart; timestamps are microseconds.
+LIDAR_ and its name in capitals, so `front_left` is CAM_FRONT_LEFT. An unnamed sensor is CAM_FRONT, and the only LiDAR
+LIDAR_TOP. Tokens are hashes of names, so the same data set has the same tokens. Categories that nuScenes also has use its
+spelling (car: vehicle.car); the development kit draws no other boxes. Scenes are numbered from scene-0001 and begin an hour
+apart; timestamps are microseconds.
 
-World axes are the data set's, z up; the ego's are those of the rig's first sensor, turned to x ahead, y left, z up, so it
-stands where that sensor does, and is as level as it is; cameras have x right, y down, z ahead, a LiDAR x ahead, y left, z up.
-Metres; quaternions are w x y z. A box is about the middle of the object's own, `size` is width, length, height, its x axis
-points ahead. Pixel (0, 0) is the centre of the first one, so K's principal point is half a pixel less than the data set's.
+World axes are the data set's, z up. The ego is at the rig's first sensor, with its inclination, and has axes x ahead, y left, z
+up. Cameras have x right, y down, z ahead; a LiDAR has x ahead, y left, z up. Lengths are metres; quaternions are w x y z. A box
+has the centre of the object's box; `size` is width, length, height; its x axis points ahead. Pixel (0, 0) is the centre of the
+first pixel, so K's principal point is half a pixel less than the data set's.
 
-Every object has an annotation at every instant at which it is there, whether a sensor sees it or not: `num_lidar_pts` and
-`visibility` say how well (1 below 40 %, 2 below 60 %, 3 below 80 %, 4 more; of the camera that sees most of it, where there is
-none of the LiDAR). Velocities follow from prev and next. What is lost: masks and all other maps of pixels, attributes,
-radar, roads. Intensities are the data set's, whose largest value may be any; rings count from the highest.
+Every object has an annotation at each instant of its presence, visible or not. `num_lidar_pts` and `visibility` measure its
+visibility: 1 below 40 %, 2 below 60 %, 3 below 80 %, 4 above. The value comes from the camera that sees most of it; without a
+camera, from the LiDAR. Velocities follow from prev and next. Not stored: masks and other maps of pixels, attributes, radar,
+roads. Intensities are the data set's, with no fixed maximum; rings count from the highest.
 
-Not verified: the origin of pixels, which nuScenes does not state, and the name and place of splits.json, which newer kits read.
-Source: H. Caesar et al., nuScenes: A multimodal dataset for autonomous driving, CVPR 2020;
+Not verified: the origin of pixels, which nuScenes does not define, and the name and place of splits.json, which newer kits
+read. Source: H. Caesar et al., nuScenes: A multimodal dataset for autonomous driving, CVPR 2020;
 https://github.com/nutonomy/nuscenes-devkit/blob/master/docs/schema_nuscenes.md.
 """
 

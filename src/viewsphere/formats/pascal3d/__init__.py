@@ -1,50 +1,54 @@
-"""PASCAL3D+: pictures whose objects are aligned with CAD models, in MATLAB files; read by its toolbox and by scipy.
+"""PASCAL3D+: pictures whose objects are aligned with CAD models, in MATLAB files, for its toolbox and scipy.
 
-    Annotations/<category>_pascal/<index>.mat    `record`: size, and of each object its box, CAD model, viewpoint and anchors
+    Annotations/<category>_pascal/<index>.mat    `record`: size; for each object its box, CAD model, viewpoint and anchors
     Images/<category>_pascal/<index>.jpg         the pictures
     CAD/<category>.mat                           a struct array: vertices, faces, and a field for each named point
     CAD/<category>/<number>.off                  the same models, numbers from 01
-    PASCAL/VOCdevkit/VOC2012/                    as PASCAL VOC has it:
+    PASCAL/VOCdevkit/VOC2012/                    as in PASCAL VOC:
         SegmentationClass/<index>.png            palette picture: 0 background, else the category's number
         SegmentationObject/<index>.png           palette picture: 0 background, else the object's place in `record.objects`
         ImageSets/Main/<category>_<split>.txt    names of a split's pictures, each with 1 or -1: shows the category or not
         classes.txt                              number and name of each category
 
-A picture lies, with all its objects, in the folders of all categories that it shows; one that shows none is left out.
-`viewpoint` has azimuth (0 looks the model in the face, then counter-clockwise seen from above), elevation, and theta (the
-camera's roll, clockwise seen from behind it), all in degrees, distance (metres), focal (1), viewport (the focal length in
-pixels), and px, py: where the model's origin is seen. CAD models are in metres, front -Y, up +Z; their origin is the centre of
-their box. cad_index and faces count from 1, as all of MATLAB does; the first pixel's centre is (1, 1), and boxes (of the
+A picture appears, with all its objects, in the folder of every category that it shows; a picture without objects is left out.
+`viewpoint` has azimuth (0 faces the model's front, then counter-clockwise seen from above), elevation, and theta (the camera's
+roll, clockwise seen from behind it), all in degrees. It also has distance (metres), focal (1), viewport (the focal length in
+pixels), and px, py: the projection of the model's origin. CAD models are in metres, front -Y, up +Z, with the origin at the
+centre of their box. cad_index and faces count from 1, as in MATLAB. The centre of the first pixel is (1, 1), and boxes (of the
 visible pixels) name the first and the last pixel.
 
-The format's projection takes the camera for one that looks at the model, and moves the picture to px, py: exact where the
-origin is on the optical axis, as of models that are rendered one at a time, and near to it elsewhere (at the edge of a picture
-50 degrees wide up to 9 % of the model's size off). The true one is in fields that the format does not have: `record.K` (pixels
-as above) and, of each object, `RT`, 3 x 4, which takes points of its CAD model to the camera (x right, y down, z ahead); and
-`id`, the object's id. An object whose origin is behind the camera has distance 0, which readers pass over.
+The format's projection assumes a camera that looks at the model, and shifts the picture to px, py. It is exact if the origin is
+on the optical axis, as for models that are rendered one at a time. Elsewhere it is close: at the edge of a picture 50 degrees
+wide, up to 9 % of the model's size off. Additional fields hold the true projection: `record.K` (pixels as above) and, for each
+object, `RT`, 3 x 4, which transforms points of its CAD model to the camera (x right, y down, z ahead); and `id`, the object's
+id. An object whose origin is behind the camera has distance 0, and readers skip it.
 
-Anchors are the model's named points; characters that names in MATLAB cannot have become `_`. status 1 and a location are those
-of visible ones. truncated: more than 15 % of the object lies outside of the picture; occluded: others hide more than 5 % of
-what lies inside. Categories that PASCAL VOC has keep its numbers (car: 7); others count from 21.
+Anchors are the model's named points; `_` replaces characters that MATLAB names cannot have. Visible anchors have status 1 and a
+location. truncated: more than 15 % of the object is outside the picture; occluded: other objects hide more than 5 % of the part
+inside. PASCAL VOC's categories keep its numbers (car: 7); others count from 21.
 
-Data sets that were made elsewhere are imported by their folder: `viewsphere import pascal3d`, without MATLAB or scipy. Read are
-all records in Annotations/<category>_<source>; what a picture shows is each category's own folder's, the rest its first one's.
-Splits are those of the lists in ImageSets/Main, `<category>_<split>.txt` or `<split>.txt`, and in Image_sets,
-`<category>_imagenet_<split>.txt`; a picture of no list is in `train`. CAD/<category>.mat are the data set's models, without
-colours, their anchors its keypoints; OFF files are not read. An object's `view` and pose_category are its viewpoint's, around
-the middle of its model's box, of a coarse one without a distance; truncated, occluded, difficult and the viewpoint are in its
-`source`, and the flags go out as they came. A picture's world is its camera's axes. K and RT, where they are, are its lens and
-poses. Elsewhere the lens has the length focal x viewport: where one object has a viewpoint, px, py is where its axis meets the
-picture, and the pose is exactly the format's projection; where several have, that is the picture's middle, each is turned the
-shortest way to its px, py, and its pose is as near to the format's projection as said above. Where lengths differ, the lens and
-poses are not known. Masks are SegmentationObject's, of `pascal` pictures alone: the numbers are places in `record.objects`, or
-as the boxes tell, and a mask that neither overlaps its object's box by half nor lies in it is none. Not verified: which of both
-they are in PASCAL3D+'s own files. A picture of another size than imgsize is refused where there is K; else the picture counts.
+`viewsphere import pascal3d` imports a folder of another origin, without MATLAB or scipy. It reads all records in
+Annotations/<category>_<source>. Each category's folder gives the objects of that category, the first folder the rest. Splits
+are the lists in ImageSets/Main, `<category>_<split>.txt` or `<split>.txt`, and in Image_sets,
+`<category>_imagenet_<split>.txt`; unlisted pictures go to `train`. CAD/<category>.mat gives the models, without colours, and
+their anchors become keypoints; OFF files are ignored.
 
-Lost: sequences and sensors. `interval_azimuth`, `interval_elevation` and `error`, which tell of human annotators, are left out;
-azimuth_coarse and elevation_coarse are the exact ones. Not verified: that pixels count from 1, and status 2 (occluded) and 4
-(outside) of anchors. Writing needs the extra `mat`. Source: Y. Xiang, R. Mottaghi, S. Savarese, Beyond PASCAL: A Benchmark for
-3D Object Detection in the Wild, WACV 2014, https://cvgl.stanford.edu/projects/pascal3d.html.
+An imported object's `view` and pose_category follow its viewpoint, around the centre of its model's box; a coarse viewpoint has
+no distance. `source` holds truncated, occluded, difficult and the viewpoint, and exports write the flags unchanged. A picture's
+world is its camera's axes. K and RT, if present, give the lens and the poses. Otherwise the focal length is focal x viewport.
+If one object has a viewpoint, px, py is the principal point, and the pose is exactly the format's projection. If several have
+one, the principal point is the picture's centre; the shortest rotation turns each object to its px, py, with the error given
+above. If the focal lengths differ, the lens and the poses are unknown.
+
+Masks come from SegmentationObject, for `pascal` pictures alone. Their numbers are places in `record.objects`, or follow from
+the boxes. A mask that is not inside its object's box, and overlaps it by less than half, is ignored. Not verified: which
+numbering PASCAL3D+'s own files use. A picture whose size differs from imgsize is an error if there is K; otherwise the
+picture's size counts.
+
+Not stored: sequences and sensors; `interval_azimuth`, `interval_elevation` and `error`, which describe human annotators.
+azimuth_coarse and elevation_coarse are exact. Not verified: pixels counted from 1, and status 2 (occluded) and 4 (outside) of
+anchors. Writing needs the extra `mat`. Source: Y. Xiang, R. Mottaghi, S. Savarese, Beyond PASCAL: A Benchmark for 3D Object
+Detection in the Wild, WACV 2014, https://cvgl.stanford.edu/projects/pascal3d.html.
 """
 
 from __future__ import annotations

@@ -1,24 +1,24 @@
-"""RGB-D sequences as those of TUM, which SLAM systems and their evaluations read; or as ICL-NUIM's, which are mirrored.
+"""RGB-D sequences in TUM's layout, for SLAM systems and their evaluations; or in ICL-NUIM's, which is mirrored.
 
-    <world>/<sensor>/rgb/<seconds>.png        the pictures; without <sensor> where there is one
-    <world>/<sensor>/depth/<seconds>.png      depth along z, 16 bits, 5000 a metre, 0 where nothing is, or farther than 13.1 m
+    <world>/<sensor>/rgb/<seconds>.png        the pictures; without <sensor> if there is one
+    <world>/<sensor>/depth/<seconds>.png      depth along z, 16 bits, 5000 a metre; 0 for the background and beyond 13.1 m
     <world>/<sensor>/rgb.txt, depth.txt       a picture a line: seconds, file
     <world>/<sensor>/groundtruth.txt          a pose a line: seconds, tx ty tz, qx qy qz qw, world_from_camera
     <world>/<sensor>/associations.txt         a pair a line: seconds, file of the picture, seconds, file of the depth
     <world>/<sensor>/calibration.txt          fx fy cx cy k1 k2 p1 p2 k3; TUM has these numbers on its web page
 
-A world is a sequence, or, of still pictures, a scene or a model, whose time is the number of the frame. Seconds are those from
-the sequence's beginning, to the microsecond. Metres, z up; cameras look along z, x right, y down. `cx` and `cy` count from
-the middle of the first pixel: a camera in the middle has (width - 1) / 2.
+A world is a sequence. For still pictures it is a scene or a model, and the time is the number of the frame. Seconds count from
+the sequence's beginning, to the microsecond. Lengths are metres, z up; cameras look along z, x right, y down. `cx` and `cy`
+count from the centre of the first pixel: a centred camera has (width - 1) / 2.
 
-With `kind: icl-nuim` names are numbers of frames instead of seconds, `associations.txt` has the depth first, and poses are in
-`<world>.gt.freiburg`, as above, and `<world>.gt.sim`, three rows of four numbers and an empty line each. There, as in
-POV-Ray, y is up in cameras and world: fy is negative, and y and z of the world change places, which mirrors it.
+With `kind: icl-nuim`, file names are frame numbers instead of seconds, and `associations.txt` has the depth first. Poses are in
+`<world>.gt.freiburg`, as above, and `<world>.gt.sim`, three rows of four numbers and an empty line each. As in POV-Ray, y is up
+in cameras and world: fy is negative, and swapping the world's y and z mirrors it.
 
-Fisheyes, lenses of more than five coefficients (of ICL-NUIM's any) and skew cannot be held; nor can lenses that change.
-`import` reads one sensor's folder of either kind, with a `calibration.txt`. Not verified: that ICL-NUIM's loaders need no
-other names of files. Sources: Sturm et al., IROS 2012, https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats; Handa
-et al., ICRA 2014, https://www.doc.ic.ac.uk/~ahanda/VaFRIC/iclnuim.html.
+Not supported: fisheyes, lenses with more than five coefficients (ICL-NUIM: any), skew, and changing lenses. `import` reads one
+sensor's folder of either kind, with a `calibration.txt`. Not verified: that ICL-NUIM's loaders need no other file names.
+Sources: Sturm et al., IROS 2012, https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats; Handa et al., ICRA 2014,
+https://www.doc.ic.ac.uk/~ahanda/VaFRIC/iclnuim.html.
 """
 
 from __future__ import annotations

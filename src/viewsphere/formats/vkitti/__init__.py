@@ -1,11 +1,11 @@
 """Virtual KITTI, in the tree of version 1.3.1 or of 2: videos with depth, segmentation, flow, tracked boxes in 2D and 3D and
-cameras, for code that was written for these data sets.
+cameras.
 
     Scene<sequence>/<variation>/frames/rgb/Camera_0/rgb_00000.jpg     version 2; Camera_1 is the right one of a rectified pair
     .../frames/depth/Camera_0/depth_00000.png                         16 bits, cm along z; 65535: none, or farther
     .../frames/classSegmentation/Camera_0/classgt_00000.png           colours of colors.txt
     .../frames/instanceSegmentation/Camera_0/instancegt_00000.png     8 bits, track id + 1, 0 for none
-    .../frames/forwardFlow/Camera_0/flow_00000.png                    all but the last frame have one
+    .../frames/forwardFlow/Camera_0/flow_00000.png                    all but the last frame
     .../frames/backwardFlow/Camera_0/backwardFlow_00001.png           all but the first
     .../frames/forwardSceneFlow/Camera_0/sceneFlow_00000.png
     .../frames/backwardSceneFlow/Camera_0/backwardSceneFlow_00001.png
@@ -13,31 +13,31 @@ cameras, for code that was written for these data sets.
 
     vkitti_1.3.1_rgb/<sequence>/<variation>/00000.png                 version 1.3.1, of one camera
     vkitti_1.3.1_{depthgt,flowgt}/<sequence>/<variation>/00000.png    as above
-    vkitti_1.3.1_scenegt/<sequence>/<variation>/00000.png             a colour for each object, and for each class of all else
+    vkitti_1.3.1_scenegt/<sequence>/<variation>/00000.png             a colour for each object and each background class
     vkitti_1.3.1_scenegt/<sequence>_<variation>_scenegt_rgb_encoding.txt
     vkitti_1.3.1_extrinsicsgt/<sequence>_<variation>.txt
     vkitti_1.3.1_motgt/<sequence>_<variation>.txt
 
-Frames count from 0, a track id is the object's id less 1, and every text has a line of column names first. Flow: 16 bits; red
-is (flow / (width - 1) + 1) / 2 * 65535, green the same of the height; blue is 0 where there is none, or where it leads farther
-than the picture is wide or high, else 65535. Scene flow: 16 bits, red, green and blue are x, y and z, (metres / 10 + 1) / 2 *
-65535, in the axes of each instant's own camera; longer motion is cut, and none looks like that of what stands still.
+Frames count from 0, a track id is the object's id less 1, and every text starts with a line of column names. Flow: 16 bits; red
+is (flow / (width - 1) + 1) / 2 * 65535, green the same with the height; blue is 65535, or 0 for unknown flow and flow longer
+than the picture's width or height. Scene flow: 16 bits, red, green and blue are x, y and z, (metres / 10 + 1) / 2 * 65535, in
+the axes of each instant's own camera. Longer motion is clipped; unknown motion looks like none.
 
-Extrinsics are from the world to the camera (x right, y down, z ahead), metres; the world's y points down: (x, -z, y) of ours.
-Intrinsics have their origin at the first pixel's centre. 2D boxes are the first and last column and row of the visible pixels,
-occupancy is their share of that box. Places of objects are the middle of the box's bottom; its rotations are so that the object
-(x right, y down, z ahead) is turned by z (roll), x (pitch) and y + pi/2: y is 0 for what looks along x, as in KITTI. Metres,
-radians. Objects of which nothing is seen have no line. Colours of objects are those of the label `looks` where the data set
-keeps it, else Unknown.
+Extrinsics transform the world to the camera (x right, y down, z ahead), in metres; the world's y points down: viewsphere's (x,
+-z, y). The origin of intrinsics is the first pixel's centre. 2D boxes are the first and last column and row of the visible
+pixels; occupancy is their share of that box. Object positions are the centre of the box's bottom. Rotations turn the object (x
+right, y down, z ahead) by z (roll), x (pitch) and y + pi/2: y is 0 for an object that looks along x, as in KITTI. Metres,
+radians. Invisible objects have no line. Object colours come from the label `looks` if the data set keeps it; otherwise they are
+Unknown.
 
-Classes are Virtual KITTI's where it has one: what lies on the ground is Terrain, road markings are Road, fences and furniture
-Misc; categories keep their names (car: Car, van: Van, truck: Truck). In version 1.3.1 `truncated` is 0 (not), 1 or 2 (more than
-half), `occluded` the data set's occlusion level, and no object is DontCare.
+Classes are Virtual KITTI's where they exist: ground is Terrain, road markings are Road, fences and furniture Misc. Categories
+keep their names (car: Car, van: Van, truck: Truck). In version 1.3.1 `truncated` is 0 (not), 1 or 2 (more than half),
+`occluded` is the data set's occlusion level, and no object is DontCare.
 
-Lost: splits, keypoints and parts, names of sensors. Not verified with the original files: that version 1.3.1's `truncated`
-begins at any share, and the header of its encoding. That places are bottoms and how rotations follow one another was inferred
-from a few published lines. Sources: Gaidon et al. 2016, "Virtual Worlds as Proxy for Multi-Object Tracking Analysis", and
-Cabon et al. 2020, "Virtual KITTI 2", https://europe.naverlabs.com/research/computer-vision/proxy-virtual-worlds-vkitti-2/.
+Not stored: splits, keypoints and parts, names of sensors. Not verified with the original files: the threshold of version
+1.3.1's `truncated`, and the header of its encoding. The position at the bottom and the order of rotations follow from a few
+published lines. Sources: Gaidon et al. 2016, "Virtual Worlds as Proxy for Multi-Object Tracking Analysis", and Cabon et al.
+2020, "Virtual KITTI 2", https://europe.naverlabs.com/research/computer-vision/proxy-virtual-worlds-vkitti-2/.
 """
 
 from __future__ import annotations

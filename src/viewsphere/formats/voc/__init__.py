@@ -1,36 +1,36 @@
-"""PASCAL VOC, as the VOC2012 development kit has it; read by torchvision, supervision, datumaro and most trainers of detectors.
+"""PASCAL VOC, in the layout of the VOC2012 development kit, for torchvision, supervision, datumaro and most trainers of
+detectors.
 
     VOCdevkit/VOC2012/JPEGImages/<index>.jpg             the pictures; .png with `pictures: png`
-    VOCdevkit/VOC2012/Annotations/<index>.xml            size; of each object name, pose, truncated, occluded, difficult, box
+    VOCdevkit/VOC2012/Annotations/<index>.xml            size; for each object name, pose, truncated, occluded, difficult, box
     VOCdevkit/VOC2012/SegmentationClass/<index>.png      palette picture: 0 background, else the category's number
     VOCdevkit/VOC2012/SegmentationObject/<index>.png     palette picture: 0 background, else the object's place in the XML
-    VOCdevkit/VOC2012/ImageSets/Main/<split>.txt         names of a split's pictures; in Segmentation/, of those with masks
+    VOCdevkit/VOC2012/ImageSets/Main/<split>.txt         names of a split's pictures; Segmentation/: of those with masks
     VOCdevkit/VOC2012/labelmap.txt                       names and colours of the categories' numbers, for datumaro
 
-Boxes are around the visible pixels and count pixels from 1, both ends inside: xmin = floor(x) + 1, xmax = ceil(x + w).
-datumaro takes them as such with `coordinate_mode="voc-one-based"`, supervision always; torchvision gives the numbers as they
-are. Categories' numbers count from 1 in the data set's order; their colours are VOC's palette. Objects of which nothing is seen
-have no entry.
+Boxes enclose the visible pixels, counted from 1, with both ends inside: xmin = floor(x) + 1, xmax = ceil(x + w). datumaro reads
+them so with `coordinate_mode="voc-one-based"`, supervision always; torchvision returns the numbers unchanged. Category numbers
+count from 1 in the data set's order; their colours are VOC's palette. Invisible objects have no entry.
 
-truncated: more than 15 % of the object lies outside of the picture. occluded: others hide more than 5 % of what lies inside.
-Both numbers are those of the annotators' guidelines. pose: Frontal, Rear, Left or Right, where the camera stands within 20
-degrees of that side, no more than 45 degrees above or below and tilted; else Unspecified. Left is seen of an object that shows
-its own left side: it faces the picture's left. difficult: see the option.
+truncated: more than 15 % of the object is outside the picture. occluded: other objects hide more than 5 % of the part inside.
+Both numbers follow the annotators' guidelines. pose: Frontal, Rear, Left or Right if the camera is within 20 degrees of that
+side, and its elevation and tilt are at most 45 degrees; else Unspecified. Left means that the object shows its own left side
+and faces the picture's left. difficult: see the option.
 
-Lost: sequences, sensors and cameras. Masks have no void line (255) around objects, as VOC's own have: all pixels are known. The
-class lists of the classification task (`<category>_<split>.txt`) and `trainval.txt` are not written: they follow from the XML,
-and from `train.txt` and `val.txt`. torchvision takes only splits named train, val and trainval, and pictures that are JPEG;
-supervision looks at no sub-folders, which data sets of more than 10,000 pictures have; datumaro passes over splits with `_` in
-their name. Not verified: what `Left` means, of which the guidelines say nothing.
+Not stored: sequences, sensors and cameras; VOC's void line (255) around objects, because all pixels are known; the class lists
+of the classification task (`<category>_<split>.txt`) and `trainval.txt`, which follow from the XML, and from `train.txt` and
+`val.txt`. torchvision reads only splits named train, val and trainval, and JPEG pictures. supervision ignores sub-folders,
+which data sets of more than 10,000 pictures have. datumaro skips splits with `_` in their name. Not verified: the meaning of
+`Left`, which the guidelines do not define.
 
-Data sets that were made elsewhere are imported by their folder: `viewsphere import voc`. Their pictures are those of the lists
-in ImageSets/Main (trainval is passed over where there are train and val), or else of all annotations, which then are in
-`train`. Objects keep their flags and poses; masks are SegmentationObject's, without the void line. Parts (head, hand, foot) are
-not read. Others' trees are read, too: supervision's (annotations, images), with polygons, and FiftyOne's (labels, data);
-datumaro's, whose pictures have no XML where they show nothing, or masks alone, if there is a labelmap.txt. datumaro and
-FiftyOne count pixels from 0, which only a box that begins at 0 tells: then all of the tree are taken so, else they come out a
-pixel too large. Such numbers go out as they came. Source: M. Everingham et al., The PASCAL Visual Object Classes Challenge,
-http://host.robots.ox.ac.uk/pascal/VOC/voc2012/, and its annotation guidelines of 2009.
+`viewsphere import voc` imports a folder of another origin. Its pictures are those of the lists in ImageSets/Main (without
+trainval if train and val exist). Without lists, all annotations go to `train`. Objects keep their flags and poses; masks are
+SegmentationObject's, without the void line. Parts (head, hand, foot) are ignored. The import also reads the trees of
+supervision (annotations, images), with polygons, of FiftyOne (labels, data), and of datumaro with a labelmap.txt, in which
+pictures without objects, or with masks alone, have no XML. datumaro and FiftyOne count pixels from 0. Only a box that begins at
+0 reveals this; then the import reads the whole tree so, else boxes are a pixel too large. Exports write such numbers unchanged.
+Source: M. Everingham et al., The PASCAL Visual Object Classes Challenge, http://host.robots.ox.ac.uk/pascal/VOC/voc2012/, and
+its annotation guidelines of 2009.
 """
 
 from __future__ import annotations

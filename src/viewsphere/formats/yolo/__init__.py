@@ -1,4 +1,4 @@
-"""YOLO, as Ultralytics trains it: a text file beside each picture, a line an object, numbers as shares of the picture.
+"""YOLO, for Ultralytics' trainers: a text file for each picture, a line for each object, numbers as shares of the picture.
 
     data.yaml                        train, val, test, names; for pose kpt_shape, flip_idx, kpt_names
     images/<split>/<index>.png       the pictures
@@ -6,17 +6,17 @@
                                      box; `segment` the mask's polygon; `pose` the box, then x, y, v of each point; `obb` four
                                      corners
 
-Classes count from 0 in the data set's order of categories. `segment`: an object has one ring; several pieces are joined by
-lines of no width, as Ultralytics' own converter does. `pose`: v is 2 for a visible point, 1 for an occluded one, 0 for others,
-and the points of all models together are one list, of which each object has its own. Objects of which nothing is seen have no
-line. Imported objects keep their own polygons, corners and points.
+Classes count from 0 in the data set's order of categories. `segment`: an object has one ring; lines of no width join its
+pieces, as in Ultralytics' own converter. `pose`: v is 2 for a visible point, 1 for an occluded point, 0 for others. One list
+joins the points of all models, and each object has its own among them. Invisible objects have no line. Imported objects keep
+their own polygons, corners and points.
 
-Data sets that were made elsewhere are imported by their data.yaml: `viewsphere import yolo`. What a line is, its numbers tell:
-4 are a box, as many as kpt_shape says a box with points, others a polygon; one of four corners is an oriented box, too. Splits
-are data.yaml's: folders, or lists of pictures. A picture's labels lie where the last `images` of its path is `labels`; it may
-have none. A data.yaml without splits, as supervision writes it, is of `images`, or of its folders train, val and test. Trees of
-Darknet, as datumaro and FiftyOne write them, have obj.names and lists, `<split>.txt`; labels lie beside their pictures. Source:
-Ultralytics' documentation, https://docs.ultralytics.com/datasets/.
+`viewsphere import yolo` imports a data.yaml of another origin. The count of numbers in a line decides its kind: 4 are a box,
+the count that kpt_shape gives a box with points, others a polygon; a polygon of four corners is also an oriented box. Splits
+are data.yaml's: folders, or lists of pictures. The path of a picture's labels has `labels` for its last `images`; a picture may
+have none. A data.yaml without splits, as supervision writes it, describes `images`, or its folders train, val and test.
+Darknet's trees, as datumaro and FiftyOne write them, have obj.names and lists, `<split>.txt`; their labels are next to the
+pictures. Source: Ultralytics' documentation, https://docs.ultralytics.com/datasets/.
 """
 
 from __future__ import annotations
