@@ -40,8 +40,8 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import SHOT_FRAMES
 from viewsphere.plugins.engine import EngineSpec
-from viewsphere.run.allocator import keep_freed_memory
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
+from viewsphere.run.workers.allocator import keep_freed_memory
 from viewsphere.store import Store
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility, rasterize

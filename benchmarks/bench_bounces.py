@@ -28,7 +28,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Scene, Sky, Sun
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.raster.visibility import rasterize
 
 TURNS = 7

@@ -28,7 +28,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.rendering.sky.sky import sky_pictures
 from viewsphere.rendering.sky.sun import sun_light
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.raster.visibility import rasterize
 
 HERE = Path(__file__).parent

@@ -17,7 +17,7 @@ from typing import Any
 from unittest.mock import patch
 
 from viewsphere import Dataset, Recipe, export, generate
-from viewsphere.run.preparing import Target
+from viewsphere.run.exports.preparing import Target
 
 TRAINERS = ("yolo", "voc", "coco", "coco_panoptic", "cityscapes", "mot", "imagefolder", "csv")
 POSES = (

@@ -21,8 +21,8 @@ from viewsphere.errors import MissingExtraError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.allocator import keep_freed_memory
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
+from viewsphere.run.workers.allocator import keep_freed_memory
 from viewsphere.store import encode
 
 ROUNDS = 20

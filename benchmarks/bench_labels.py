@@ -28,7 +28,7 @@ from viewsphere.labels import (
 )
 from viewsphere.labels.shared.context import Sight
 from viewsphere.labels.shared.spec import later
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.raster.visibility import Visibility, rasterize
 from viewsphere.truth.shot_views import ShotViews
 

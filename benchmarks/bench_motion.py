@@ -23,7 +23,7 @@ from viewsphere.labels import observe
 from viewsphere.model.model_spec import Size
 from viewsphere.model.sample import Float
 from viewsphere.model.shot import Shot
-from viewsphere.run.stages import Stages, render_sample
+from viewsphere.run.shots.stages import Stages, render_sample
 from viewsphere.truth.shot_views import ShotViews
 
 PLAIN = ("depth", "instances", "normals")

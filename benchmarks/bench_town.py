@@ -21,7 +21,7 @@ from bench_parts import timed
 from viewsphere import Recipe, plan
 from viewsphere.engines.raster import staging
 from viewsphere.model.shot import Shot
-from viewsphere.run import stages
+from viewsphere.run.shots import stages
 from viewsphere.truth import view
 from viewsphere.truth.raster.geometry import Geometry
 

@@ -24,7 +24,7 @@ from bench_scene import reference_recipe
 import viewsphere as vs
 from viewsphere.labels import channels
 from viewsphere.model.sample import Sample
-from viewsphere.run.allocator import keep_freed_memory
+from viewsphere.run.workers.allocator import keep_freed_memory
 from viewsphere.store import decode
 
 PICTURES = ("rgb", "depth")

@@ -24,7 +24,7 @@ from viewsphere.model.instant import Instant
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.shot import Shot
 from viewsphere.plugins.engine import EngineSpec
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.raster.visibility import rasterize
 
 SIZE = 320, 240

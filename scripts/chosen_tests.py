@@ -153,7 +153,7 @@ class Modules:
         return {
             "viewsphere.planning.plan": samplers,
             "viewsphere.planning.checks.models": defaults,
-            "viewsphere.run.stages": defaults,
+            "viewsphere.run.shots.stages": defaults,
             "viewsphere.blender.process": worker,
         }
 

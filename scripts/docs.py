@@ -33,8 +33,8 @@ from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.material import MaterialSpec
 from viewsphere.recipe.file import schema
-from viewsphere.run.listing import Listed, listed
-from viewsphere.run.overview import SPECS
+from viewsphere.run.reports.format_list import Listed, listed
+from viewsphere.run.reports.plugin_list import SPECS
 
 DOCS = Path(__file__).parent.parent / "docs"
 NOTE = "<!-- written by scripts/docs; do not edit -->\n\n"

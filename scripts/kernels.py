@@ -84,7 +84,7 @@ def tiny(recipe: Any) -> dict[str, Any]:
     """The features of a recipe's first shot, and the kernels that a tiny frame of it calls."""
     from viewsphere import plan
     from viewsphere.geometry.box import box_vertices
-    from viewsphere.run import warm
+    from viewsphere.run.shots import precompile as warm
 
     shot = next(iter(plan(recipe).shots(lambda *_: box_vertices((-0.5,) * 3, (0.5,) * 3))))
     warm.load_kernels(shot)
@@ -125,7 +125,7 @@ def needs(name: str, runs: Iterable[Mapping[str, Any]]) -> tuple[str, ...] | Non
 
 def timed(made: Iterable[Overload]) -> list[Overload]:
     """The overloads with the CPU seconds of their compilation, less those that cannot be compiled any more."""
-    import viewsphere.run.warm  # noqa: F401, which imports what kernels need
+    import viewsphere.run.shots.precompile  # noqa: F401, which imports what kernels need
 
     rows = list[Overload]()
     with tempfile.TemporaryDirectory() as folder:

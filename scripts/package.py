@@ -34,7 +34,7 @@ PLATFORM = "manylinux_2_17_x86_64"
 COMPILE = """
 import sys
 from viewsphere.kernels.build import COMMON, TARGET
-from viewsphere.run.warm import compile_table
+from viewsphere.run.shots.precompile import compile_table
 assert TARGET.cpu == COMMON, TARGET
 sys.exit(compile_table(lambda done, total: None))
 """

@@ -29,7 +29,7 @@ from viewsphere.model.thing import Thing
 from viewsphere.planning.distances import Distances
 from viewsphere.preview import INK, PAPER, draw_sample
 from viewsphere.run.opening import prepare
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"

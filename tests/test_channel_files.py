@@ -18,8 +18,8 @@ from viewsphere.codecs.palette import palette
 from viewsphere.errors import MissingExtraError, RecipeError, StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.datasets.merging import merge
 from viewsphere.store import check_codecs, decode, depth_step, encode
 
 MASKS, GEOMETRY = ("instances", "categories", "parts"), ("normals", "coordinates", "triangles", "barycentrics")

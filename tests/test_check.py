@@ -23,7 +23,7 @@ from viewsphere.labels import Needs, channel_labels, channels, labels, labels_of
 from viewsphere.labels.shared.spec import nothing
 from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Dataset, encode
 from viewsphere.store.shots.checksums import write_checksums
 from viewsphere.store.shots.manifest import MANIFEST

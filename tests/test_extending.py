@@ -27,10 +27,10 @@ from viewsphere.check import check
 from viewsphere.errors import PluginError, RecipeError, UserError
 from viewsphere.formats import coco
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.run.exporting import export
-from viewsphere.run.listing import listed
-from viewsphere.run.overview import overview
-from viewsphere.run.writable import writable_formats
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.writable import writable_formats
+from viewsphere.run.reports.format_list import listed
+from viewsphere.run.reports.plugin_list import overview
 from viewsphere.store.shots.sample_records import from_whole_sample, whole_sample
 
 PAGE = Path(__file__).parent.parent / "docs" / "extending.md"

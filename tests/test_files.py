@@ -134,7 +134,7 @@ ALLOWED = {
     "kernels/digests.py": "the package's own sources",
     "kernels/entries.py": "regular files of its own folder, none behind links",
     "recipe/starts": "the package's own recipes",
-    "run/warm.py": "a lock",
+    "run/shots/precompile.py": "a lock",
     "store/shots/moving.py": "os.open to bring a file to the disk",
     "store/shots/shot_files.py": "os.open to write",
     "rendering/sky/environment_file.py": "OpenEXR behind check_file",

@@ -13,7 +13,7 @@ from viewsphere.planning.plan import plan
 from viewsphere.preview.sides import facing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.generate import generate
-from viewsphere.run.inspection import inspect_model, model_spec
+from viewsphere.run.reports.inspection import inspect_model, model_spec
 
 
 def one_line(*words):

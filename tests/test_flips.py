@@ -12,7 +12,7 @@ from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Dataset, decode
 from viewsphere.store.shots.checksums import damaged_files
 from viewsphere.store.shots.manifest import Manifest

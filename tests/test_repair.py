@@ -12,8 +12,8 @@ from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.check.repair import repair
-from viewsphere.run.exporting import export
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 from viewsphere.store.shots.manifest import MANIFEST, Manifest
 
 

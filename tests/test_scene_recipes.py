@@ -6,7 +6,7 @@ from built_once import QUICK, built_once
 from small import ROOT
 from viewsphere import Recipe, generate, plan
 from viewsphere.check import check
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Dataset
 
 SMALL = {"camera.size": [96, 72], "formats": [], "engine": QUICK}

@@ -19,7 +19,7 @@ from viewsphere.aside import aside, of_this_process
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.tracks import TRACK
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
 from viewsphere.store.places import local
 from viewsphere.store.shots.moving import DURABILITIES, DURABILITY, move, write_through

@@ -358,7 +358,7 @@ def test_no_hard_links(said, monkeypatch):
 
 def test_the_first_run_says_why_it_takes_longer(monkeypatch, tmp_path, capsys):
     from viewsphere.cli.making import _compile_kernels
-    from viewsphere.run import warm
+    from viewsphere.run.shots import precompile as warm
 
     def compile_all(overloads, tell):
         tell(0, 2)

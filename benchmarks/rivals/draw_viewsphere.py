@@ -13,8 +13,8 @@ from view_loop import opened
 
 from viewsphere import __version__, plan, plugins
 from viewsphere.plugins.engine import EngineSpec
-from viewsphere.run.allocator import keep_freed_memory
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
+from viewsphere.run.workers.allocator import keep_freed_memory
 from viewsphere.store import Store
 
 scene = opened()

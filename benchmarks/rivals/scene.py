@@ -15,7 +15,7 @@ from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.model.camera import Camera
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 TO_GLTF = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 SUN = [0.5, 0.7, 0.5]

@@ -20,11 +20,11 @@ from viewsphere.model.notebook import Shown
 if TYPE_CHECKING:
     from viewsphere.planning.plan import plan
     from viewsphere.recipe.recipe import Recipe
-    from viewsphere.run.converting import convert
-    from viewsphere.run.exporting import export
+    from viewsphere.run.datasets.converting import convert
+    from viewsphere.run.exports.exporting import export
     from viewsphere.run.generate import generate
-    from viewsphere.run.matching import matches
     from viewsphere.run.memory import render
+    from viewsphere.run.shots.matching import matches
     from viewsphere.run.status import status
     from viewsphere.store import Dataset
     from viewsphere.store import Dataset as open
@@ -36,10 +36,10 @@ __all__ = ["Dataset", "Recipe", "__version__", "convert", "export", "generate", 
 _HOMES = {
     "Dataset": "store.Dataset",
     "Recipe": "recipe.recipe.Recipe",
-    "convert": "run.converting.convert",
-    "export": "run.exporting.export",
+    "convert": "run.datasets.converting.convert",
+    "export": "run.exports.exporting.export",
     "generate": "run.generate.generate",
-    "matches": "run.matching.matches",
+    "matches": "run.shots.matching.matches",
     "open": "store.Dataset",
     "plan": "planning.plan.plan",
     "render": "run.memory.render",

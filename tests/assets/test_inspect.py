@@ -9,7 +9,7 @@ from viewsphere.assets.inspect import describe
 from viewsphere.assets.timeline import Blenders
 from viewsphere.errors import MissingExtraError, ModelError
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.run.inspection import report_lines
+from viewsphere.run.reports.inspection import report_lines
 
 WIDE = "v 0 0 0\nv 300 0 0\nv 0 20 0\nv 0 0 100\n"
 

@@ -18,7 +18,7 @@ from viewsphere.assets.metadata.traits import with_body_parts
 from viewsphere.assets.skin import NONE, strongest
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec, Parts
-from viewsphere.run.models import mesh_digest
+from viewsphere.run.shots.models import mesh_digest
 
 BENT = {"upper": [float(np.sin(0.5)), 0.0, 0.0, float(np.cos(0.5))]}
 

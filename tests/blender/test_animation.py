@@ -23,9 +23,9 @@ from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.camera import project
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.inspection import report_lines
-from viewsphere.run.stages import Stages
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.reports.inspection import report_lines
+from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Choice
 
 FRAMES = (1, 13, 25)

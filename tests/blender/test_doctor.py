@@ -89,7 +89,8 @@ def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
 
 
 def test_speed_is_measured_in_a_second_once_kernels_are_there(monkeypatch):
-    from viewsphere.run import speed, warm
+    from viewsphere.run import speed
+    from viewsphere.run.shots import precompile as warm
 
     monkeypatch.setattr(speed, "is_precompiled", lambda shot: False)
     assert speed.measure_speed() is None

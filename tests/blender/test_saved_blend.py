@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from viewsphere import Dataset, Recipe, generate
-from viewsphere.run.exporting import export
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Choice
 
 pytestmark = [pytest.mark.slow]

@@ -15,7 +15,7 @@ from viewsphere.engines._blender.staging import camera_request
 from viewsphere.errors import RecipeError, UserError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.rendering.view import develop
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.raster.visibility import rasterize
 
 pytestmark = [pytest.mark.usefixtures("blender", "blenders")]

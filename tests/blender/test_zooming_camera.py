@@ -12,7 +12,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.generate import generate
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 SCRIPT = """
 import sys, bpy

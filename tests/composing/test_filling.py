@@ -13,7 +13,7 @@ from viewsphere.composing.filling import distance_of
 from viewsphere.errors import RecipeError
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 LENSES = {
     "wide": {"size": [96, 72], "fov_deg": 75},

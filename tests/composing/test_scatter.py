@@ -8,7 +8,7 @@ from viewsphere.composing.placing import obstacles
 from viewsphere.errors import RecipeError
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 TABLE = {"size": [2, 2], "height": 0.001}
 

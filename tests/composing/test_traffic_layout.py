@@ -6,7 +6,7 @@ import pytest
 from viewsphere.errors import RecipeError, UserError
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.zoo.townscape.street_life import stretches
 
 CAMERA = {"size": [32, 32], "fov_deg": 70}

@@ -12,7 +12,7 @@ from viewsphere import Recipe, plan
 from viewsphere.engines import cycles
 from viewsphere.engines._blender.staging import Arrangement, camera_request
 from viewsphere.model.shot import Shot
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 DRAFT = {"name": "cycles", "quality": "draft"}
 HAIR_DRIER = {"source": "zoo:hair_drier", "category": "hair drier", "scale": {"length": 0.3}}

@@ -26,7 +26,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, PointLight, Scene, Sky, Sun
 from viewsphere.model.thing import Thing
-from viewsphere.run import warm
+from viewsphere.run.shots import precompile as warm
 from viewsphere.truth.raster.visibility import rasterize
 
 EVEN = Sky(zenith=(1, 1, 1), horizon=(1, 1, 1))

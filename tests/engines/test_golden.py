@@ -35,7 +35,7 @@ from viewsphere.model.scene import (
     ViewTransform,
 )
 from viewsphere.model.thing import Thing
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 GOLDEN = Path(__file__).parent / "golden"
 WIDTH, HEIGHT = 160, 120

@@ -26,8 +26,8 @@ from viewsphere.assets.metadata.sidecars import said_of
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.planning.plan import plan
-from viewsphere.run.again import make_again
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.reproduce import make_again
 
 K = np.array([[110.0, 0, 46.3], [0, 108.0, 33.7], [0, 0, 1]])
 SIZE = (96, 72)

@@ -16,9 +16,9 @@ from proven import close, equal
 from viewsphere.errors import UserError
 from viewsphere.formats.airsim import KINDS, AirSim, Options, needs, refuses
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import export
-from viewsphere.run.preparing import Views
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.preparing import Views
+from viewsphere.run.exports.scope import scope_of
 
 NED = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
 AXES = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])  # of a body (ahead, right, down), of a camera's (right, down, ahead)

@@ -24,9 +24,9 @@ from viewsphere.formats import blend
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Scene
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.stages import Stages
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Choice, frame_ranges
 from viewsphere.zoo import build_zoo_model
 

@@ -26,7 +26,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import bop
 from viewsphere.formats.bop import Options
 from viewsphere.geometry.mask import decode_rle
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from worlds import poses, stills
 
 SAID = ("scene_gt.json", "scene_gt_info.json")

@@ -15,8 +15,8 @@ from viewsphere import Dataset
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats.bop import read
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export
 
 JSON = ("scene_camera.json", "scene_gt.json", "scene_gt_info.json", "scene_gt_coco.json")
 

@@ -17,9 +17,9 @@ from proven import close
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.errors import StoreError
 from viewsphere.planning.plan import plan
-from viewsphere.run.again import make_again
-from viewsphere.run.again_recipe import _free
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.reproduce import make_again
+from viewsphere.run.reproduce_recipe import _free
 from viewsphere.run.stand_in import stand_in
 
 SIZES = ((64, 48), (64, 48))

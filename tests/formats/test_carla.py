@@ -13,8 +13,8 @@ from proven import close, equal
 from viewsphere.formats.carla import TAGS, Carla, refuses, transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Rig
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 
 NAMED = {"sky": 11, "ground": 25, "car": 14, "chair": 21, "post_box": 21}
 FLIP = np.diag([1, -1, 1])

@@ -21,8 +21,8 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.classes import SemanticClass
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import export, write
-from viewsphere.run.scope import refusals, scope_of
+from viewsphere.run.exports.exporting import export, write
+from viewsphere.run.exports.scope import refusals, scope_of
 from viewsphere.store import Category
 
 IDS = {"sky": 23, "ground": 6, "car": 26, "chair": 5, "post_box": 4}

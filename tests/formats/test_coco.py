@@ -15,7 +15,7 @@ from viewsphere.formats.coco.categories import CATEGORY_IDS, category_ids, offic
 from viewsphere.formats.coco.options import Options
 from viewsphere.geometry.mask import encode_rle
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import write
+from viewsphere.run.exports.exporting import write
 from viewsphere.store import Category
 
 COCOS_OWN = {"category_ids": "coco"}

@@ -9,7 +9,7 @@ from PIL import Image
 from viewsphere.check import check
 from viewsphere.geometry.mask import encode_rle
 from viewsphere.labels.mask import prove
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.store import Dataset
 
 SIDE = 6000

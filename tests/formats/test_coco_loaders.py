@@ -12,7 +12,7 @@ import pytest
 from torchvision_readers import torchvision_datasets
 
 from cube_dataset import make
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 
 
 @pytest.fixture(scope="module")

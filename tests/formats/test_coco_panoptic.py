@@ -12,7 +12,7 @@ import cube_dataset
 from proven import close, equal
 from viewsphere.model.classes import FIRST_THING
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import export, write
+from viewsphere.run.exports.exporting import export, write
 from viewsphere.store import Category
 
 

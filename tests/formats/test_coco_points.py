@@ -17,7 +17,7 @@ from torchvision_readers import torchvision_datasets
 
 from proven import close, equal
 from viewsphere.formats.coco import Options, verify
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from viewsphere import Dataset
 from viewsphere.check import check
 from viewsphere.errors import StoreError
 from viewsphere.formats.shared.exif import shown_size, upright
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 
 ORIENTATION = 0x0112
 PERSON = {"keypoints": ["nose", "tail", "paw"], "skeleton": [[3, 1], [1, 2]], "color": "red"}

@@ -18,8 +18,8 @@ from viewsphere import Dataset, generate
 from viewsphere.composing.viewpoints.pose_files.colmap import read_colmap
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import project
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export
 from viewsphere.store.samples.choice import Choice
 
 KINDS = ("binary", "text")

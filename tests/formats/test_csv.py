@@ -10,7 +10,7 @@ from PIL import Image
 from cube_dataset import make
 from viewsphere.formats.csv import HEAD, Options, _rows, verify
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import write
+from viewsphere.run.exports.exporting import write
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["one object", "three objects"])

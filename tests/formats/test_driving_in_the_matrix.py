@@ -11,8 +11,8 @@ import supervision
 
 from proven import close, equal
 from viewsphere.formats.driving_in_the_matrix import Matrix, Options, refuses
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 from viewsphere.store import Category
 
 NAME = "driving_in_the_matrix"

@@ -11,7 +11,7 @@ from PIL import Image
 from proven import close, equal
 from quick import quick
 from viewsphere import Dataset, generate
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from worlds import MODELS
 from worlds import poses as poses_recipe
 

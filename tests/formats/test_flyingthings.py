@@ -11,8 +11,8 @@ from torchvision_readers import torchvision_datasets
 from proven import close, equal
 from quick import quick
 from viewsphere.formats import Scope, flyingthings
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 
 FRAMES = 6
 KINDS = {"flyingthings3d": "FlyingThings3D", "monkaa": "Monkaa", "driving": "Driving"}

@@ -13,8 +13,8 @@ from viewsphere import Dataset
 from viewsphere.check import check
 from viewsphere.errors import StoreError
 from viewsphere.geometry.mask import encode_rle, rle_runs
-from viewsphere.run.converting import convert
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.converting import convert
+from viewsphere.run.datasets.importing import import_dataset
 
 NAMES = ["traffic light", "car"]
 

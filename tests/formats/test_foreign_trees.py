@@ -17,8 +17,8 @@ from PIL import Image
 from proven import close, equal
 from viewsphere import Dataset
 from viewsphere.check import check
-from viewsphere.run.converting import convert
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.converting import convert
+from viewsphere.run.datasets.importing import import_dataset
 
 SIZE = WIDTH, HEIGHT = 80, 60
 CLASSES = ["traffic light", "car"]

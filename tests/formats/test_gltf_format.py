@@ -20,7 +20,7 @@ from viewsphere.formats.gltf import verify
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import write
+from viewsphere.run.exports.exporting import write
 
 
 def exported(dataset, folder):

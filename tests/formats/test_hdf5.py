@@ -14,7 +14,7 @@ from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import MissingExtraError, RecipeError, UserError
 from viewsphere.formats.hdf5 import SOURCES
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from worlds import poses as recipe
 
 STILL = [key for key in SOURCES if "flow" not in key]

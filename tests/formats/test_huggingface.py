@@ -14,8 +14,8 @@ from viewsphere.errors import UserError
 from viewsphere.formats.huggingface import Options, verify
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # its own, of packages that it uses
 PICTURES = [name for name in CHANNELS if name in {"rgb", "rgba"} or channels()[name].components == 1]

@@ -15,8 +15,8 @@ from proven import close, equal, told
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Choice
 
 TYPES = {"car": "Car", "chair": "chair", "post_box": "post_box"}
@@ -300,7 +300,7 @@ def test_imported_boxes_have_unknown_values(stills, tmp_path):
 
 def test_merged_pictures(stills, poses, written, tmp_path):
     """They have no shots, but cameras and boxes: all is as it was, but for the numbers of frames."""
-    from viewsphere.run.merging import merge
+    from viewsphere.run.datasets.merging import merge
 
     merge([stills.root, poses.root], tmp_path / "merged", mixed=True)
     export(tmp_path / "merged", "kitti", output=tmp_path)
@@ -312,7 +312,7 @@ def test_merged_pictures(stills, poses, written, tmp_path):
 
 @pytest.mark.slow
 def test_merged_rigs_are_refused(videos, drives, tmp_path):
-    from viewsphere.run.merging import merge
+    from viewsphere.run.datasets.merging import merge
 
     merge([videos.root, drives.root], tmp_path / "merged", mixed=True)
     told = "expected shots with their rigs, which imported and merged data sets do not have; found none"

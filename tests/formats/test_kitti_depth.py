@@ -12,8 +12,8 @@ from flow_readers import read_picture
 
 from proven import close, equal
 from viewsphere.formats import Scope, kitti_depth
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 
 
 @pytest.fixture(scope="module")

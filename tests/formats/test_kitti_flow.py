@@ -10,8 +10,8 @@ from torchvision_readers import torchvision_datasets
 
 from proven import close, equal
 from viewsphere.formats import Scope, kitti_flow
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 
 FRAMES = 6
 HALF = 1 / 512 + 1e-9

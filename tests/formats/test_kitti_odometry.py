@@ -11,7 +11,7 @@ import pytest
 from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Choice
 
 FORMAT = "kitti_odometry"

@@ -16,9 +16,9 @@ from viewsphere import Dataset, convert
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.report import write_report
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 
 SIZE = (124, 37)
 P2 = "7.215377e+01 0 6.095593e+01 4.485728e+00 0 7.215377e+01 1.728540e+01 2.163791e-02 0 0 1 2.745884e-03"

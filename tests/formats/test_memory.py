@@ -12,7 +12,7 @@ import pytest
 from small import small_recipe
 from viewsphere import Dataset, generate
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import write
+from viewsphere.run.exports.exporting import write
 
 CHANNELS = ["rgb", "depth", "instances", "normals", "parts", "semantic", "panoptic", "nocs"]
 MOST_GROWTH = 400

@@ -15,8 +15,8 @@ from torchvision_readers import torchvision_datasets
 from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.formats import Scope, middlebury
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 from worlds import stills as stills_recipe
 
 

@@ -11,7 +11,7 @@ from PIL import Image
 from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from worlds import videos as recipe
 
 
@@ -148,7 +148,7 @@ def test_names_of_more_than_a_line_are_refused(videos, name):
     from dataclasses import replace
 
     from viewsphere.formats.mot import Options, refuses
-    from viewsphere.run.scope import scope_of
+    from viewsphere.run.exports.scope import scope_of
 
     scope = scope_of(videos)
     odd = replace(scope, categories=(replace(scope.categories[0], name=name),))

@@ -7,7 +7,7 @@ from PIL import Image
 from cube_dataset import MESHES, POSES, make
 from viewsphere.model.camera import Intrinsics
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import write
+from viewsphere.run.exports.exporting import write
 
 TOP = ["vehicles", "poses"]
 VEHICLE = ["supercategory", "category", "model_file", "bbox3D_model", "real_size"]

@@ -21,8 +21,8 @@ from viewsphere.check import check
 from viewsphere.composing.viewpoints.pose_files.nerfstudio import read_nerfstudio
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import project
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export
 
 
 def written(dataset, place, **options):

@@ -13,8 +13,8 @@ from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.formats.nocs import refuses
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 from worlds import stills as recipe
 
 

@@ -16,7 +16,7 @@ from viewsphere import Dataset, generate, plugins
 from viewsphere.errors import UserError
 from viewsphere.formats.nuscenes import Options
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Choice
 
 TABLES = (

@@ -12,7 +12,7 @@ from proven import close, equal
 from viewsphere import Dataset, generate, plugins
 from viewsphere.errors import UserError
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from worlds import MODELS
 from worlds import poses as poses_recipe
 

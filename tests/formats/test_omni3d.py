@@ -14,7 +14,7 @@ from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.geometry.box import VERTEX_SIGNS
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from worlds import poses as recipe
 
 NAMED = {"back": (0, 3, 4, 7), "front": (1, 2, 5, 6), "top": (0, 1, 4, 5), "bottom": (2, 3, 6, 7), "right": (0, 1, 2, 3),

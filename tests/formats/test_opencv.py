@@ -14,7 +14,7 @@ from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import project
 from viewsphere.planning.rig_files import read_rig
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 
 
 def written(dataset, place):

@@ -17,8 +17,8 @@ from viewsphere.errors import RecipeError, StoreError
 from viewsphere.formats import pascal3d
 from viewsphere.formats.shared.viewpoint_mat import off_bytes
 from viewsphere.planning.plan import plan
-from viewsphere.run.again import make_again
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.reproduce import make_again
 from viewsphere.store.again import AgainModel, Drafted
 
 

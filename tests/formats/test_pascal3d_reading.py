@@ -17,9 +17,9 @@ from viewsphere.check import check
 from viewsphere.codecs.palette import palette
 from viewsphere.errors import StoreError, UserError
 from viewsphere.report import write_report
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 
 KIT = "PASCAL/VOCdevkit/VOC2012"
 SIZE = (50, 40)

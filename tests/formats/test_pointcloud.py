@@ -17,7 +17,7 @@ from viewsphere.formats.pointcloud import Options, verify
 from viewsphere.geometry.camera import project
 from viewsphere.model.camera import Distortion
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import write
+from viewsphere.run.exports.exporting import write
 
 NAMES = ("depth", "depth_ray", "instances", "normals", "categories", "position")
 

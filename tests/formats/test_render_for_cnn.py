@@ -12,7 +12,7 @@ import pytest
 from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from worlds import MODELS
 from worlds import poses as poses_recipe
 

@@ -16,7 +16,7 @@ from PIL import Image
 
 from proven import close, equal
 from viewsphere import Dataset, generate
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from worlds import poses as poses_recipe
 from worlds import videos as videos_recipe
 

@@ -12,8 +12,8 @@ from proven import close, equal
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope, sintel
 from viewsphere.model.camera import Distortion, Intrinsics
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 
 FRAMES = 6
 BENT = Intrinsics(

@@ -15,8 +15,8 @@ from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.formats.sscnet import Sscnet, refuses
 from viewsphere.model.voxels import RUN
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 from worlds import stills as recipe
 
 NUMBERS = {"ground": 2, "scenery": 3, "building": 3, "chair": 6, "sky": 0}

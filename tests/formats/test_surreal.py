@@ -23,8 +23,8 @@ from viewsphere.check import check
 from viewsphere.errors import MissingExtraError, UserError
 from viewsphere.formats import Scope, surreal
 from viewsphere.formats.surreal import body, writing
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 
 io = pytest.importorskip("scipy.io")
 ffmpeg = pytest.importorskip("imageio_ffmpeg")
@@ -251,7 +251,7 @@ def test_videos_show_the_pictures(clips):
 @pytest.mark.slow
 @pytest.mark.usefixtures("short")
 def test_it_is_proved_and_the_same_by_several_processes(people, written, tmp_path, monkeypatch):
-    from viewsphere.run import preparing
+    from viewsphere.run.exports import preparing
 
     monkeypatch.setattr(preparing, "PATIENCE_S", 0.0)
     assert list(surreal.verify(people, written, ())) == []

@@ -16,8 +16,8 @@ from viewsphere.errors import UserError
 from viewsphere.formats.synthia import COLORS, Options, Synthia, refuses
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Rig, Sensor
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 from viewsphere.store import Category
 
 CLASSES = {"sky": 1, "ground": 0, "car": 8, "chair": 0, "post_box": 0}

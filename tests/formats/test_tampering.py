@@ -28,8 +28,8 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.instant import Moment
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export
 from viewsphere.store.shots.checksums import CHECKSUMS
 
 

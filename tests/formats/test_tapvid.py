@@ -24,8 +24,8 @@ from proven import close, equal
 from viewsphere.errors import UserError
 from viewsphere.formats import tapvid
 from viewsphere.formats.shared.archives import archive, pickled
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 from viewsphere.store import Choice, Dataset
 
 TAPNET = "VIEWSPHERE_TAPNET"

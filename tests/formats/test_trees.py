@@ -13,10 +13,10 @@ from viewsphere import Dataset, plugins
 from viewsphere.errors import UserError
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import export
-from viewsphere.run.preparing import Views
-from viewsphere.run.scope import refusals, scope_of
-from viewsphere.run.writable import writable_formats
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.preparing import Views
+from viewsphere.run.exports.scope import refusals, scope_of
+from viewsphere.run.exports.writable import writable_formats
 from viewsphere.store import Choice
 from viewsphere.store.shots.checksums import CHECKSUMS
 from worlds import WORLDS
@@ -160,7 +160,7 @@ def is_named(path, messages):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_an_export_is_the_same_by_several_processes(exported, name, request, tmp_path, monkeypatch):
-    from viewsphere.run import preparing
+    from viewsphere.run.exports import preparing
 
     monkeypatch.setattr(preparing, "PATIENCE_S", 0.0)
     monkeypatch.setattr(preparing, "WORTH_S", 0.0)

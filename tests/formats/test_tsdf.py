@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 SEEN = 6

@@ -14,8 +14,8 @@ from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.formats.viper import CLASSES, Viper, refuses
-from viewsphere.run.exporting import export
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.scope import scope_of
 from viewsphere.store import Category
 from worlds import videos as recipe
 

@@ -14,9 +14,9 @@ from viewsphere.formats.vkitti.names import COLORS, Names, object_colors
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Rig
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import export
-from viewsphere.run.preparing import Views
-from viewsphere.run.scope import scope_of
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.exports.preparing import Views
+from viewsphere.run.exports.scope import scope_of
 
 WORLD = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # y down, of ours
 

@@ -17,8 +17,8 @@ from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.exporting import export, write
-from viewsphere.run.scope import refusals, scope_of
+from viewsphere.run.exports.exporting import export, write
+from viewsphere.run.exports.scope import refusals, scope_of
 from viewsphere.store import Category
 
 SIDES = {"Frontal": 0, "Left": 90, "Rear": 180, "Right": 270}

@@ -14,8 +14,8 @@ from small import tree_hash
 from viewsphere import Dataset
 from viewsphere.check import check
 from viewsphere.errors import StoreError
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export
 
 OBJECTS = {
     "2007_01": [

@@ -16,7 +16,7 @@ from viewsphere.preview import PAPER, draw_sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.report.frames import frame_data
 from viewsphere.report.pictures import SCALES, layers
-from viewsphere.run.exporting import write
+from viewsphere.run.exports.exporting import write
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import supervision
 import yaml
 
 from proven import close, equal
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,8 @@ from small import tree_hash
 from viewsphere import Dataset
 from viewsphere.check import check
 from viewsphere.errors import StoreError
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export
 
 SIZES = {"train/a": (40, 30), "train/deep/b": (64, 48), "val/c d": (33, 21)}
 NAMES = ["cat", 'd\'été "à"', "日本"]

@@ -551,7 +551,7 @@ def _made(short: bool, shots: str = "files") -> Path:
     import tempfile
 
     from viewsphere.model.files import Files as Kinds
-    from viewsphere.run.exporting import export
+    from viewsphere.run.exports.exporting import export
     from viewsphere.store.shots.heartbeat import Heartbeat
     from viewsphere.store.shots.records import NAME_BYTES
 
@@ -625,8 +625,8 @@ def _read(root: Path) -> None:
 
 def _store(root: Path, out: Path) -> None:
     from viewsphere.check import check
-    from viewsphere.run.exporting import export
-    from viewsphere.run.merging import merge
+    from viewsphere.run.datasets.merging import merge
+    from viewsphere.run.exports.exporting import export
     from viewsphere.run.status import status
     from viewsphere.store import Dataset
 
@@ -642,7 +642,7 @@ def _store(root: Path, out: Path) -> None:
 @cache
 def _others() -> Path:
     """Trees of formats that are imported and whose texts are no JSON."""
-    from viewsphere.run.exporting import export
+    from viewsphere.run.exports.exporting import export
 
     whole = _made(False)
     export(whole, ["kitti", {"pascal3d": {"anchors": False}}], output=whole.parent / "others")
@@ -657,7 +657,7 @@ def _exports(root: Path, out: Path) -> None:
 
 
 def _import(kind: str, root: Path, out: Path) -> None:
-    from viewsphere.run.importing import import_dataset
+    from viewsphere.run.datasets.importing import import_dataset
 
     _each(
         lambda: import_dataset(kind, root / kind, out / "strict"),

@@ -12,9 +12,9 @@ from viewsphere.check import check
 from viewsphere.errors import ViewsphereError
 from viewsphere.formats.shared.paper import json_bytes
 from viewsphere.planning.rig_files import read_rig
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 from viewsphere.run.status import status
 from viewsphere.store import Dataset
 from viewsphere.store.index import Block, Index

@@ -14,7 +14,7 @@ from viewsphere.labels import labels
 from viewsphere.labels.referring import Scene
 from viewsphere.labels.shared.captions.english import listed, number, plural, with_article
 from viewsphere.labels.shared.captions.statements import Company, of_one, phrases, place_of, side_of
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
 from viewsphere.store import Dataset
 
 SIZE = (300, 300)

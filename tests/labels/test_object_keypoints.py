@@ -68,7 +68,7 @@ def test_they_are_proved(made):
 def test_rays_reach_what_is_visible_and_nothing_else(made):
     """Embree's ray towards a point meets nothing before it, but for the slack; near edges rounding may decide otherwise."""
     pytest.importorskip("embreex")
-    from viewsphere.run.stages import Stages
+    from viewsphere.run.shots.stages import Stages
 
     wrong = total = 0
     stages = Stages()

@@ -14,7 +14,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import random_rotation
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 POST_BOX = {"source": "zoo:post_box", "category": "post box", "count": 2, "scale": {"length": 0.18}}
 

@@ -13,7 +13,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.planning.plan import plan
 from viewsphere.planning.rigs import rig_of
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.rig_view import rig_lines, rig_mesh, sensor_facts
+from viewsphere.run.reports.rig_view import rig_lines, rig_mesh, sensor_facts
 
 BENT = {"model": "brown_conrady", "coefficients": [-0.1, 0.01, 0, 0]}
 

@@ -8,7 +8,7 @@ from small import small_recipe, tree_hash
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Floor
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
 
 
 def recipe(**changes):

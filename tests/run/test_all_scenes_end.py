@@ -6,8 +6,8 @@ import pytest
 
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.framing import Framing
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.framing import Framing
+from viewsphere.run.shots.stages import Stages
 
 COUNT = int(os.environ.get("SCENES", "20"))
 """Scenes of each kind."""

@@ -18,7 +18,7 @@ pytestmark = [
 NEW_PAGES = """
 import resource, sys
 import numpy as np
-from viewsphere.run.allocator import keep_freed_memory
+from viewsphere.run.workers.allocator import keep_freed_memory
 
 def pages(shape, count):
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
@@ -31,7 +31,7 @@ pages(shape, count)
 print(told, pages(shape, count), pages(shape, count))
 """
 TELL = """
-from viewsphere.run import allocator
+from viewsphere.run.workers import allocator
 allocator.KEPT_BYTES = 1 << 26
 told = allocator.keep_freed_memory()
 """

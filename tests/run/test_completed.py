@@ -9,10 +9,10 @@ from viewsphere import Dataset, generate
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import yolo
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run import sights
-from viewsphere.run.completed import Completed, lacking
-from viewsphere.run.exporting import export
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.completed import Completed, lacking
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.shots import reconstruct as sights
 from viewsphere.store import Choice
 from viewsphere.truth.raster.visibility import rasterize
 from worlds import MODELS, rendered, shared_place, stills, videos

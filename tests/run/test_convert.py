@@ -15,10 +15,10 @@ from small import tree_hash
 from viewsphere import Dataset
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
-from viewsphere.run import converting
-from viewsphere.run.exporting import export, writable
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.writable import writable_formats
+from viewsphere.run.datasets import converting
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.exports.exporting import export, writable
+from viewsphere.run.exports.writable import writable_formats
 
 TAKEN = {"coco", "csv", "driving_in_the_matrix", "fiftyone", "hdf5", "huggingface", "imagefolder", "kitti", "voc", "webdataset"}
 """The formats, with YOLO's, that hold pictures of which nobody knows the camera."""

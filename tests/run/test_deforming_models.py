@@ -19,9 +19,9 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.merging import merge
-from viewsphere.run.stages import Stages
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Choice, Store
 
 FRAMES = (1, 13, TORN)

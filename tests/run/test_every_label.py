@@ -14,8 +14,8 @@ from viewsphere.check import check
 from viewsphere.errors import PluginError
 from viewsphere.labels import ChannelLabel, Field, ObjectLabel, by_table, channel_labels, in_attributes, labels, on_request
 from viewsphere.labels.shared.ids import has_whole_numbers
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.datasets.merging import merge
 
 BOX = [(x, y, z) for x in (-1, 1) for y in (-0.5, 0.5) for z in (-0.25, 0.25)]
 FACES = ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4")

@@ -11,7 +11,7 @@ from deadline import DEADLINE
 
 ENDING = """
 import atexit, os, sys, threading, time
-from viewsphere.run.exit_at_once import exit_at_once
+from viewsphere.run.workers.exit_at_once import exit_at_once
 
 class Slow:
     def __del__(self):
@@ -25,7 +25,7 @@ print("printed", end=";")
 exit_at_once(int(sys.argv[1]))
 """
 PRINTING = """
-from viewsphere.run.exit_at_once import exit_at_once
+from viewsphere.run.workers.exit_at_once import exit_at_once
 print("left in the buffer")
 exit_at_once(0)
 """
@@ -61,7 +61,7 @@ def test_output_that_nobody_takes_is_no_success():
 @pytest.mark.skipif(os.name != "posix", reason="a shell of POSIX's")
 @pytest.mark.parametrize("stream", ["1", "2"])
 def test_a_process_without_a_stream_that_it_does_not_need_succeeds(stream):
-    script = "from viewsphere.run.exit_at_once import exit_at_once; exit_at_once(0)"
+    script = "from viewsphere.run.workers.exit_at_once import exit_at_once; exit_at_once(0)"
     command = f"'{sys.executable}' -c '{script}' {stream}>&-"
     assert subprocess.run(command, shell=True, timeout=DEADLINE).returncode == 0
 

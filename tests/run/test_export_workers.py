@@ -16,9 +16,9 @@ import pytest
 from small import small_recipe, tree_hash
 from viewsphere import generate
 from viewsphere.errors import StoreError, UserError, ViewsphereError, WorkerDied
-from viewsphere.run import preparing
-from viewsphere.run.exporting import export
-from viewsphere.run.in_order import AHEAD, _answer, in_order
+from viewsphere.run.exports import preparing
+from viewsphere.run.exports.exporting import export
+from viewsphere.run.workers.in_order import AHEAD, _answer, in_order
 from viewsphere.store import Choice
 
 FORMATS = ["coco", "native", "csv", "webdataset"]

@@ -14,7 +14,7 @@ from viewsphere.cli.arguments import asked_formats
 from viewsphere.errors import RecipeError, UserError
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 
 COCOS_OWN = {"coco": {"category_ids": "coco"}}
 POST_BOX = {"contiguous": 1, "coco": 91}

@@ -6,7 +6,7 @@ import viewsphere as vs
 from quick import quick
 from small import ROOT, small_recipe, tree_hash
 from viewsphere.errors import RecipeError
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from viewsphere.run.opening import check_formats, prepare
 
 FEW = ["rgb", "instances"]

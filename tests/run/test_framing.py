@@ -17,9 +17,9 @@ from viewsphere.limits import limits
 from viewsphere.planning.plan import plan
 from viewsphere.planning.samplers.shared import stock as _stock
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.framing import Framing
-from viewsphere.run.merging import merge
-from viewsphere.run.stages import Stages
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.shots.framing import Framing
+from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Exported
 from viewsphere.store.shots.checksums import write_checksums, written_least, written_options
 

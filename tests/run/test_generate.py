@@ -19,7 +19,7 @@ from small import small_recipe, tree_hash
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError, WorkerDied
 from viewsphere.run.executors import Listed, Outcome
 from viewsphere.run.executors.local import LocalCrew
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from viewsphere.run.generate import generate
 from viewsphere.run.progress import Progress
 from viewsphere.store import Store

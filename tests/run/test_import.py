@@ -12,9 +12,9 @@ from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.planning.extension import extend
 from viewsphere.planning.plan import plan
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 
 SIZE = (40, 30)
 

@@ -13,8 +13,8 @@ from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.check.repair import repair
 from viewsphere.model.credit import Credit
-from viewsphere.run.importing import import_dataset
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.importing import import_dataset
+from viewsphere.run.datasets.merging import merge
 from viewsphere.store.credits import CREDITS, credits_text
 
 MAKER = Credit(licence="CC-BY-4.0", attribution="A <b>Maker</b> | *& co* [x](y) `z`", source_url="https://example.org/a_b*c")

@@ -18,7 +18,7 @@ from viewsphere.planning.extension import whole
 from viewsphere.run.executors import Job, Listed, Queue
 from viewsphere.run.executors._jobs import MOST_DEATHS
 from viewsphere.run.executors.local import LocalCrew
-from viewsphere.run.tasks import ModelTask
+from viewsphere.run.shots.tasks import ModelTask
 
 PORTION = whole(vs.plan(small_recipe()))
 

@@ -12,8 +12,8 @@ from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.options import Options
-from viewsphere.run.exporting import export
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 from viewsphere.store.index import numbers
 
 COCOS_OWN = Options(category_ids="coco")

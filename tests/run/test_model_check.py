@@ -9,7 +9,7 @@ from command_line import viewsphere
 from small import small_recipe, tree_hash
 from viewsphere.composing.physics import packages
 from viewsphere.errors import MissingExtraError, ModelError, RecipeError, StoreError
-from viewsphere.run import converting
+from viewsphere.run.datasets import converting
 from viewsphere.run.model_check import check_models
 
 HOUSE = "v 0 0 0\nv 103 0 0\nv 103 50 0\nv 0 50 60\nf 1 2 3\nf 1 3 4\nf 1 2 4\n"
@@ -106,7 +106,7 @@ def test_a_forward_beside_the_up_axis_is_taken(more, folder):
 def test_a_forward_along_the_up_axis_that_the_file_names_is_refused_when_it_is_read(tmp_path):
     from viewsphere.assets.normalise import axes
     from viewsphere.assets.primitive import FileFacts
-    from viewsphere.run.inspection import model_spec
+    from viewsphere.run.reports.inspection import model_spec
 
     facts = FileFacts(tmp_path / "a.dae", "dae", "+z", "-y", 1.0)
     with pytest.raises(ModelError, match=r"a\.dae: `forward: \+z` lies along \+z, which is up in this file"):

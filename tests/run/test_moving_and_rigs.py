@@ -17,7 +17,7 @@ from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.scene import IDENTITY, Ground, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("embreex")

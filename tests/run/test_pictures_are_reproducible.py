@@ -105,7 +105,7 @@ def test_workers_make_the_same_pictures_as_one_process(pictures, whole, tmp_path
 def test_frames_come_out_alike_in_any_order(pictures):
     """Each frame, made after others and first of all in a fresh stage."""
     from viewsphere.planning.plan import plan
-    from viewsphere.run.stages import Stages
+    from viewsphere.run.shots.stages import Stages
 
     forwards, backwards = Stages(), Stages()
     shots = list(plan(recipe(pictures)).shots(forwards.box))
@@ -120,7 +120,7 @@ def test_frames_come_out_alike_in_any_order(pictures):
 def test_labels_know_nothing_of_what_is_done_to_pictures(pictures):
     """Light, materials, background, view, smoother and effects change the pictures; no label changes by a bit."""
     from viewsphere.planning.plan import plan
-    from viewsphere.run.stages import Stages
+    from viewsphere.run.shots.stages import Stages
 
     plain = {"jitter": scene(pictures)["jitter"], "ground": True}
     made = {}

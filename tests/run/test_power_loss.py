@@ -19,8 +19,8 @@ import pytest
 
 from small import small_recipe, tree_hash
 from viewsphere.errors import UserError
+from viewsphere.run.datasets.merging import merge
 from viewsphere.run.generate import generate
-from viewsphere.run.merging import merge
 from viewsphere.store.places import local
 from viewsphere.store.shots import moving
 from viewsphere.store.shots.manifest import MANIFEST, digest, unsealed

@@ -112,7 +112,7 @@ import viewsphere as vs
 from small import ROOT, small_recipe
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.executors import Job, Listed, hired
-from viewsphere.run.tasks import ModelTask
+from viewsphere.run.shots.tasks import ModelTask
 from viewsphere.planning.extension import whole
 from viewsphere.store import Store
 

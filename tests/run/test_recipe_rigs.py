@@ -14,9 +14,9 @@ from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import plan
 from viewsphere.preview import contact_sheet, dataset_samples, preview_samples
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from viewsphere.run.generate import generate
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 BASE = {
     "models": [{"source": "zoo:chair"}],

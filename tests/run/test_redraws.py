@@ -9,8 +9,8 @@ from viewsphere.composing.redraws import scene_draws
 from viewsphere.errors import RecipeError
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.framing import Framing
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.framing import Framing
+from viewsphere.run.shots.stages import Stages
 
 CAMERA = {"size": [32, 32], "fov_deg": 70}
 LOW = {"kind": "sphere", "count": 1, "elevation": [10, 25], "distance": [1, 2]}

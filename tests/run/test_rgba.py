@@ -17,7 +17,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene
 from viewsphere.model.thing import Thing
 from viewsphere.rendering.background import display_background
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 WIDTH, HEIGHT = 128, 96
 CAR = ModelSpec(key="car", source="zoo:car", seed=1, category="car", category_id=1)

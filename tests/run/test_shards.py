@@ -25,7 +25,7 @@ from viewsphere.model.share import Share
 from viewsphere.planning.extension import whole
 from viewsphere.run.generate import Missing, generate
 from viewsphere.run.opening import prepare, to_render
-from viewsphere.run.share import shard_named
+from viewsphere.run.shards import shard_named
 from viewsphere.run.status import status
 from viewsphere.store import Dataset, Store
 from viewsphere.store.index import Block, Index

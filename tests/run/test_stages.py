@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.run import stages
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots import stages
+from viewsphere.run.shots.stages import Stages
 
 DRIER = ModelSpec(key="d", source="zoo:hair_drier", seed=3, category="hair drier", category_id=1)
 

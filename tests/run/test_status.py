@@ -16,7 +16,7 @@ from small import small_recipe
 from viewsphere.aside import LOCK
 from viewsphere.errors import StoreError
 from viewsphere.planning.extension import whole
-from viewsphere.run.exporting import export
+from viewsphere.run.exports.exporting import export
 from viewsphere.run.generate import generate
 from viewsphere.run.status import status
 from viewsphere.store import Store

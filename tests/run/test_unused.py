@@ -10,7 +10,7 @@ from small import ROOT, small_recipe
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.formats import blend
 from viewsphere.recipe.formats import read_formats
-from viewsphere.run.unused import among
+from viewsphere.run.exports.unused import among
 
 CHANNELS = ["rgb", "depth", "instances", "normals"]
 

@@ -13,7 +13,7 @@ from viewsphere import Dataset, Recipe, generate
 from viewsphere.check.models import differing
 from viewsphere.errors import ModelError, RecipeError, StoreError
 from viewsphere.planning.models import model_specs
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 SAID = """\
 axes: file  # millimetres, z up

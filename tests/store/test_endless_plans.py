@@ -8,8 +8,8 @@ from viewsphere.check import check
 from viewsphere.check.repair import repair
 from viewsphere.errors import StoreError
 from viewsphere.report import write_report
-from viewsphere.run.exporting import export
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Dataset
 from viewsphere.store.index import Index
 from viewsphere.store.shots.manifest import sealed, unsealed

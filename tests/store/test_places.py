@@ -16,8 +16,8 @@ from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.check.repair import repair
 from viewsphere.errors import RemoteError, StoreError, UserError
-from viewsphere.run.exporting import export
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Store, located
 from viewsphere.store.shots.checksums import CHECKSUMS
 from viewsphere.urls import byte_range, files_below, here, remote_path

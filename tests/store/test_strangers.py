@@ -18,9 +18,9 @@ from viewsphere.check import check
 from viewsphere.codecs.png_tiff import decode_png, encode_png
 from viewsphere.codecs.size import check_size
 from viewsphere.errors import StoreError, UserError
+from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.executors import local
-from viewsphere.run.exporting import export
-from viewsphere.run.importing import import_dataset
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import Dataset
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.store.shots.manifest import MANIFEST, Manifest, sealed, unsealed
@@ -319,7 +319,7 @@ def test_a_worker_whose_parent_is_gone_ends_quietly(error, tmp_path):
         def recv(self):
             raise error
 
-    with patch("signal.signal"), patch("viewsphere.run.tasks.Worker"):
+    with patch("signal.signal"), patch("viewsphere.run.shots.tasks.Worker"):
         local._serve(Pipe(), tmp_path, None)
 
 

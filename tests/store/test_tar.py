@@ -17,8 +17,8 @@ from viewsphere.check import check
 from viewsphere.check.repair import repair
 from viewsphere.codecs import tar
 from viewsphere.errors import StoreError
-from viewsphere.run.exporting import export
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
+from viewsphere.run.exports.exporting import export
 from viewsphere.store import located
 from viewsphere.store.shots.manifest import SHARD, Manifest, digest
 from viewsphere.urls import files_below

@@ -14,7 +14,7 @@ from truth_scenes import LENSES, cube, lens, orbit_camera, placed
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.check.frames.rays import RayCaster
-from viewsphere.run.scenery import Scenery
+from viewsphere.run.shots.scenery import Scenery
 from viewsphere.truth.raster.visibility import is_edge_on, rasterize, with_ground
 
 STANDING = placed(cube(), ground=True)

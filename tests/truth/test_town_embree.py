@@ -10,7 +10,7 @@ from two_views import brute_hidden
 
 import viewsphere as vs
 from viewsphere.engines._arranged import Arrangements
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.shot_views import ShotViews

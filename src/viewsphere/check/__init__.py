@@ -20,7 +20,7 @@ from viewsphere.check.models import differing
 from viewsphere.check.report import Finding, Report, joined
 from viewsphere.errors import ViewsphereError
 from viewsphere.model.channel import PASSES
-from viewsphere.run.in_order import in_order
+from viewsphere.run.workers.in_order import in_order
 from viewsphere.store import Dataset
 from viewsphere.store.shots.checksums import damaged_files
 

@@ -17,7 +17,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.scene import engine_entry
-from viewsphere.run.scenery import Scenery
+from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Dataset
 
 

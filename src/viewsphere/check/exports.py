@@ -11,7 +11,7 @@ from viewsphere.check.report import Finding, Report
 from viewsphere.errors import PluginError
 from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.preparing import Views
+from viewsphere.run.exports.preparing import Views
 from viewsphere.store import Dataset
 from viewsphere.store.shots.checksums import damaged_files, written_least, written_options
 from viewsphere.urls import here

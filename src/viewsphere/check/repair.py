@@ -14,8 +14,8 @@ from viewsphere.check.frames.sources import Sources
 from viewsphere.check.models import differing
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.limits import limits
-from viewsphere.run.exporting import export
-from viewsphere.run.mending import Mender
+from viewsphere.run.datasets.repairing import Mender
+from viewsphere.run.exports.exporting import export
 from viewsphere.run.progress import Listener, unheard
 from viewsphere.store import Dataset
 from viewsphere.store.credits import CREDITS, write_credits

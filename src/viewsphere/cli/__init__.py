@@ -17,7 +17,7 @@ from viewsphere.errors import CheckFailedError, UserError, ViewsphereError
 
 def program() -> NoReturn:
     """Run the command line as the whole of a process, which ends at once."""
-    from viewsphere.run.exit_at_once import exit_at_once
+    from viewsphere.run.workers.exit_at_once import exit_at_once
 
     try:
         main()
@@ -36,7 +36,7 @@ def main() -> None:
     from viewsphere.cli.commands import app
     from viewsphere.cli.options import UsageError, explain
     from viewsphere.cli.terminal import complain, say
-    from viewsphere.run.allocator import keep_freed_memory
+    from viewsphere.run.workers.allocator import keep_freed_memory
 
     _print_anything()
     signal.signal(signal.SIGTERM, _stop)

@@ -128,7 +128,7 @@ def split(names: str | None) -> tuple[str, ...] | None:
 
 def asked_formats(formats: str | None, option: str = "--format") -> tuple[str, ...] | None:
     """The formats that an option names, None for None; UserError names one that cannot be written."""
-    from viewsphere.run.writable import writable
+    from viewsphere.run.exports.writable import writable
 
     asked = split(formats)
     for name in asked or ():

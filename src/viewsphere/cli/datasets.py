@@ -31,7 +31,7 @@ from viewsphere.cli.terminal import (
     waiting,
 )
 from viewsphere.errors import UserError
-from viewsphere.run.crew_size import cores
+from viewsphere.run.workers.worker_count import cores
 
 if TYPE_CHECKING:
     from viewsphere.report import Proof
@@ -64,8 +64,8 @@ def export(
     json_: AsJson = False,
 ) -> None:
     """Write a finished or half-finished data set, or some of its frames, in other formats, without rendering."""
-    from viewsphere.run.exporting import export as write_formats
-    from viewsphere.run.writable import writable_formats
+    from viewsphere.run.exports.exporting import export as write_formats
+    from viewsphere.run.exports.writable import writable_formats
     from viewsphere.store import Choice, Dataset, frame_ranges
 
     names = asked_formats(format_)
@@ -89,7 +89,7 @@ def export(
 
 def formats(json_: AsJson = False) -> None:
     """List all formats with the channels they need, their content and their readers."""
-    from viewsphere.run.listing import listed
+    from viewsphere.run.reports.format_list import listed
 
     found = listed()
     if json_:
@@ -100,7 +100,7 @@ def formats(json_: AsJson = False) -> None:
 
 def plugins(json_: AsJson = False) -> None:
     """List all plug-ins with their distributions, and any reason why they cannot be loaded."""
-    from viewsphere.run.overview import overview
+    from viewsphere.run.reports.plugin_list import overview
 
     found = overview()
     if json_:

@@ -16,7 +16,7 @@ import typer
 from viewsphere.cli.arguments import AsJson
 from viewsphere.cli.terminal import print_json, say
 from viewsphere.errors import UserError
-from viewsphere.run.crew_size import cores
+from viewsphere.run.workers.worker_count import cores
 
 LEFT = 12
 
@@ -91,7 +91,7 @@ def _kernels() -> dict[str, Any]:
     """The folder of compiled kernels, whether it is writable, whether there are any and from where, and what they are for."""
     from viewsphere.kernels.build import LLVMLITE, NUMBA, TARGET
     from viewsphere.kernels.entries import SUFFIX, kernel_folder
-    from viewsphere.run.warm import has_all
+    from viewsphere.run.shots.precompile import has_all
 
     folder = kernel_folder()
     there = next(place for place in (folder, *folder.parents) if place.exists())

@@ -13,7 +13,7 @@ from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats,
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json, say
 from viewsphere.errors import UserError
 from viewsphere.model.quantity import quantity
-from viewsphere.run.crew_size import cores
+from viewsphere.run.workers.worker_count import cores
 
 if TYPE_CHECKING:
     from viewsphere.recipe.formats import FormatEntry
@@ -34,7 +34,7 @@ def merge(
     json_: AsJson = False,
 ) -> None:
     """Join data sets into a new one: categories by name, models by content. Links pictures and leaves the sources unchanged."""
-    from viewsphere.run.merging import merge as join
+    from viewsphere.run.datasets.merging import merge as join
 
     target, formats = _needed(output), with_options(asked_formats(format_) or (), format_option)
     with ProgressBar(quiet=json_) as bar:
@@ -69,7 +69,7 @@ def import_(
     json_: AsJson = False,
 ) -> None:
     """Open a data set made elsewhere, so that you can merge, view and export it. Links the pictures."""
-    from viewsphere.run.importing import import_dataset
+    from viewsphere.run.datasets.importing import import_dataset
 
     target, formats = _needed(output), with_options(asked_formats(format_) or (), format_option)
     with ProgressBar(quiet=json_) as bar:
@@ -110,9 +110,9 @@ def convert(
     json_: AsJson = False,
 ) -> None:
     """Convert a data set made elsewhere to other formats, each in a folder of its name. Links or copies the pictures."""
-    from viewsphere.run.converting import convert as write_formats
-    from viewsphere.run.importing import readable_formats
-    from viewsphere.run.writable import writable_formats
+    from viewsphere.run.datasets.converting import convert as write_formats
+    from viewsphere.run.datasets.importing import readable_formats
+    from viewsphere.run.exports.writable import writable_formats
 
     if kind is None:
         raise UserError(f"--from: expected one of {', '.join(readable_formats())}; found none")
@@ -159,6 +159,6 @@ def _needed(output: Path | None, what: str = "the new data set") -> Path:
 
 
 def _exported(folder: Path, formats: Sequence[FormatEntry]) -> list[str]:
-    from viewsphere.run.exporting import export
+    from viewsphere.run.exports.exporting import export
 
     return list(export(folder, formats, workers=cores())) if formats else []

@@ -40,7 +40,7 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.kernels.garbage import pause_collection
 from viewsphere.model.quantity import quantity
 from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
-from viewsphere.run.crew_size import cores
+from viewsphere.run.workers.worker_count import cores
 
 if TYPE_CHECKING:
     from viewsphere.planning.plan import Plan
@@ -86,7 +86,7 @@ def new(
 
 
 def _new_again(format_: str, source: Path, folder: Path | None) -> None:
-    from viewsphere.run.again import make_again
+    from viewsphere.run.reproduce import make_again
 
     _compile_kernels()
     made = make_again(format_, source, folder or Path(f"{source.resolve().stem}-again"))
@@ -165,7 +165,7 @@ def inspect(
 ) -> None:
     """Show a model's size, axes, parts, materials, animations, warnings, and a picture from four sides; or a recipe's rig."""
     from viewsphere.preview import four_sides
-    from viewsphere.run.inspection import inspect_model, model_spec, report_lines
+    from viewsphere.run.reports.inspection import inspect_model, model_spec, report_lines
 
     if (model is None) == (rig is None):
         raise UserError(
@@ -193,8 +193,8 @@ def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, j
     """Show the sensors of a recipe: in words, as a model (GLB), and in a picture of this model from four sides."""
     from viewsphere.assets.exporting.glb import glb_bytes
     from viewsphere.preview import four_sides
-    from viewsphere.run.inspection import model_spec
-    from viewsphere.run.rig_view import recipe_rig, rig_lines, rig_mesh, sensor_facts
+    from viewsphere.run.reports.inspection import model_spec
+    from viewsphere.run.reports.rig_view import recipe_rig, rig_lines, rig_mesh, sensor_facts
 
     shown = recipe_rig(load_recipe(recipe, changes))
     _compile_kernels()
@@ -384,7 +384,7 @@ def render(
         from viewsphere.planning.plan import plan as make_plan
         from viewsphere.run.generate import generate
         from viewsphere.run.opening import to_append
-        from viewsphere.run.share import shard_named
+        from viewsphere.run.shards import shard_named
         from viewsphere.store import Store
 
         share = None if shard is None else shard_named(shard)
@@ -449,7 +449,7 @@ def _estimate(recipe: Recipe, workers: int | None) -> Estimate:
 def _compile_kernels(recipe: Recipe | None = None) -> None:
     """Compile the kernels that a recipe's frames call, or a plain one's: the first picture on a machine takes longer."""
     from viewsphere.recipe.recipe import Recipe
-    from viewsphere.run.warm import precompile_for, told_to
+    from viewsphere.run.shots.precompile import precompile_for, told_to
 
     plain = {"models": [{"source": "zoo:car"}], "viewpoints": {"azimuth": [0], "elevation": [20], "distance": 4}}
     with ProgressBar(quiet=False) as bar:

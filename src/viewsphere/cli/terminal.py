@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from viewsphere.planning.plan import Plan
     from viewsphere.run.estimate import Estimate
     from viewsphere.run.generate import Summary, Warnings
-    from viewsphere.run.listing import Listed
-    from viewsphere.run.overview import Installed
     from viewsphere.run.progress import Listener, Progress
+    from viewsphere.run.reports.format_list import Listed
+    from viewsphere.run.reports.plugin_list import Installed
     from viewsphere.run.status import Status
     from viewsphere.store.shots.heartbeat import Heartbeat
 

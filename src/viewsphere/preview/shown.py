@@ -22,9 +22,9 @@ from viewsphere.model.tracks import Tracks
 from viewsphere.planning.plan import Plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.rig import SensorList
-from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.framing import Framing
+from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Dataset, Row
 from viewsphere.store.index import Ranges, length, nth, numbers
 from viewsphere.store.samples.films import Film

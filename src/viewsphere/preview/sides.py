@@ -18,7 +18,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.preview.frame import Picture
 from viewsphere.preview.tiles import tiled
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0), ("right side", 270.0))
 

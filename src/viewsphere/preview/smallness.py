@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from viewsphere.model.sample import Sample
 from viewsphere.planning.checks.warnings import SMALLEST, TOO_SMALL
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.rig_view import recipe_rig
+from viewsphere.run.reports.rig_view import recipe_rig
 
 
 def small_objects(samples: Iterable[Sample], recipe: Recipe | None = None) -> Iterator[str]:

@@ -23,11 +23,11 @@ from viewsphere.planning.extension import Portion
 from viewsphere.planning.plan import Plan
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.exporting import write
+from viewsphere.run.exports.exporting import write
+from viewsphere.run.exports.unused import Unused, unused
 from viewsphere.run.opening import prepare, to_render
-from viewsphere.run.tasks import Worker
-from viewsphere.run.unused import Unused, unused
-from viewsphere.run.warm import load_kernels
+from viewsphere.run.shots.precompile import load_kernels
+from viewsphere.run.shots.tasks import Worker
 from viewsphere.store import Dataset, Row, Store
 
 SUBJECTS = 3

@@ -22,20 +22,20 @@ from viewsphere.planning.plan import Plan
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.chance import left_by_chance
-from viewsphere.run.crew_size import cores, default_workers
 from viewsphere.run.executors import Crew, Job, Listed, Outcome, hired
-from viewsphere.run.exporting import export, is_out_of_date, is_written
+from viewsphere.run.exports.exporting import export, is_out_of_date, is_written
+from viewsphere.run.exports.unused import unused
 from viewsphere.run.opening import check_formats, commit, prepare, to_append, to_render
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.pulse import heard, watched
-from viewsphere.run.share import share_of
+from viewsphere.run.shards import share_of
+from viewsphere.run.shots.precompile import is_compiled, precompile, told_to
+from viewsphere.run.shots.stages import Stages, StoredBoxes
+from viewsphere.run.shots.tasks import KernelTask, Kind, ModelTask
 from viewsphere.run.skies import check_skies
-from viewsphere.run.stages import Stages, StoredBoxes
 from viewsphere.run.status import Status, status
-from viewsphere.run.tasks import KernelTask, Kind, ModelTask
 from viewsphere.run.unpainted import unpainted
-from viewsphere.run.unused import unused
-from viewsphere.run.warm import is_compiled, precompile, told_to
+from viewsphere.run.workers.worker_count import cores, default_workers
 from viewsphere.store import Dataset, Row, Store, located
 from viewsphere.store.credits import write_credits
 from viewsphere.store.shots.checksums import damaged_files

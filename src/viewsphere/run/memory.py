@@ -18,12 +18,12 @@ from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import Plan, plan
 from viewsphere.planning.turns import Turns
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
 from viewsphere.run.progress import shown_on_terminal
-from viewsphere.run.share import known_to_loaders, share_of, share_of_rank, share_of_worker
-from viewsphere.run.stages import Stages
-from viewsphere.run.warm import precompile, told_to
+from viewsphere.run.shards import known_to_loaders, share_of, share_of_rank, share_of_worker
+from viewsphere.run.shots.framing import Framing
+from viewsphere.run.shots.precompile import precompile, told_to
+from viewsphere.run.shots.stages import Stages
 
 
 class Frames(Shown, Iterable[Sample]):

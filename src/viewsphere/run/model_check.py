@@ -6,7 +6,7 @@ from viewsphere.errors import each
 from viewsphere.planning.distances import Distances
 from viewsphere.planning.plan import Plan
 from viewsphere.run.progress import Listener, Progress, unheard
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 
 
 def check_models(planned: Plan, tell: Listener = unheard) -> tuple[str, ...]:

@@ -20,8 +20,8 @@ from viewsphere.planning.plan import Plan, check_engine, check_images, plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.scope import is_computed, needs_of, not_held, scope_of_plan
-from viewsphere.run.writable import writable
+from viewsphere.run.exports.scope import is_computed, needs_of, not_held, scope_of_plan
+from viewsphere.run.exports.writable import writable
 from viewsphere.store import check_codecs
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.memory import render
-from viewsphere.run.warm import is_precompiled, sketched
+from viewsphere.run.shots.precompile import is_precompiled, sketched
 
 RECIPE = Recipe.model_validate(
     {

@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from viewsphere.assets.exporting.glb import material_names
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.stages import model_files
+from viewsphere.run.shots.stages import model_files
 from viewsphere.store import Store
 
 MOST_NAMES = 8

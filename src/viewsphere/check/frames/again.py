@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from viewsphere.errors import RecipeError, ViewsphereError
 from viewsphere.labels import ChannelLabel, Sight, annotated, channel_labels, labels_of, sample_labels, sample_values
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.run.scenery import Scenery
-from viewsphere.run.sights import Sights
+from viewsphere.run.shots.reconstruct import Sights
+from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Dataset, ModelInfo, depth_step
 from viewsphere.store.samples.channel_files import MOST_STEPS
 

@@ -19,7 +19,7 @@ from viewsphere.check.report import Finding, Report, in_short
 from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.labels import channel_labels, labels, on_request
 from viewsphere.model.sample import Sample
-from viewsphere.run.scenery import Scenery
+from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Dataset, ModelInfo, Row
 from viewsphere.store.index import numbers
 

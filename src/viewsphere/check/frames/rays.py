@@ -19,8 +19,8 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import Sample
 from viewsphere.model.thing import Thing
-from viewsphere.run.composing import SceneryRecord
-from viewsphere.run.scenery import Scenery
+from viewsphere.run.shots.composing import SceneryRecord
+from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Dataset, depth_step
 from viewsphere.store.samples.channel_files import MOST_STEPS
 from viewsphere.truth.raster.visibility import EDGE_ON

@@ -21,9 +21,9 @@ from viewsphere.files import read_bytes, read_text
 from viewsphere.planning.engine_digest import script_digest
 from viewsphere.planning.extension import NOTHING, Portion, extend
 from viewsphere.planning.plan import Plan
-from viewsphere.run.composing import Composer
-from viewsphere.run.replanning import AnotherPlan, Replanned
-from viewsphere.run.stages import Stages, StoredBoxes
+from viewsphere.run.shots.composing import Composer
+from viewsphere.run.shots.replanning import AnotherPlan, Replanned
+from viewsphere.run.shots.stages import Stages, StoredBoxes
 from viewsphere.store import Dataset, PlanRecord, Row, kept_shot
 from viewsphere.store.texts import parsed
 

@@ -14,7 +14,7 @@ from viewsphere.check.report import in_short
 from viewsphere.errors import UserError
 from viewsphere.files import read_bytes
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.run.models import Export, Models
+from viewsphere.run.shots.models import Export, Models
 from viewsphere.store import Dataset, ModelInfo
 from viewsphere.store.credits import credits_problem
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from viewsphere.errors import UserError, ViewsphereError, WorkerDied
 
 if TYPE_CHECKING:
-    from viewsphere.run.tasks import Worker
+    from viewsphere.run.shots.tasks import Worker
 
 LIVES = 2
 """Tries of a task whose process dies; the last one runs alone, in case memory was too small."""

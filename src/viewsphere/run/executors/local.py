@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, cast
 
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.kernels.garbage import pause_collection
-from viewsphere.run.executors._hands import OUT_OF_MEMORY, Hand, belong_to_parent, deaf, end_of
 from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored
+from viewsphere.run.workers.pool import OUT_OF_MEMORY, Hand, belong_to_parent, deaf, end_of
 
 if TYPE_CHECKING:
     from viewsphere.planning.extension import Portion
-    from viewsphere.run.tasks import Worker
+    from viewsphere.run.shots.tasks import Worker
 
 ADVICE = ", the last time while it was alone: give it more memory, or ask for smaller pictures or models"
 
@@ -103,7 +103,7 @@ class LocalCrew:
 
     def _run_here(self, queue: Queue, heard: Callable[[], None]) -> Iterator[Outcome]:
         with pause_collection():
-            from viewsphere.run.tasks import Worker
+            from viewsphere.run.shots.tasks import Worker
 
         self._here = self._here or Worker(self._root, self._portion)
         line = ""
@@ -180,8 +180,8 @@ def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
     """A worker's life: take a job, tell of each of its frames by their number so far, answer, until the other side is gone."""
     belong_to_parent()
     with pause_collection():
-        from viewsphere.run.allocator import keep_freed_memory
-        from viewsphere.run.tasks import Worker
+        from viewsphere.run.shots.tasks import Worker
+        from viewsphere.run.workers.allocator import keep_freed_memory
 
     keep_freed_memory()
     worker = Worker(root, portion)

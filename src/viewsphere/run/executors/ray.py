@@ -31,7 +31,7 @@ except ImportError:
 
 if TYPE_CHECKING:
     from viewsphere.planning.extension import Portion
-    from viewsphere.run.tasks import Worker
+    from viewsphere.run.shots.tasks import Worker
 
 TICK = 1.0
 """Seconds between two looks at which machines there are, and how far workers are with their jobs."""
@@ -243,9 +243,9 @@ class _Actor:
 
     def ready(self) -> None:
         """Begin. Raises StoreError for a machine without the data set, or whose viewsphere would render another one."""
-        from viewsphere.run.allocator import keep_freed_memory
         from viewsphere.run.opening import check_whether_same
-        from viewsphere.run.tasks import Worker
+        from viewsphere.run.shots.tasks import Worker
+        from viewsphere.run.workers.allocator import keep_freed_memory
         from viewsphere.store import Store
 
         with suppress(OSError):  # a folder of the machine that began the run; names of files may count from it

@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar, cast
 
 from viewsphere.errors import UserError, ViewsphereError, WorkerDied
-from viewsphere.run.executors._hands import OUT_OF_MEMORY, Hand, belong_to_parent, deaf, end_of
+from viewsphere.run.workers.pool import OUT_OF_MEMORY, Hand, belong_to_parent, deaf, end_of
 
 Task = TypeVar("Task")
 Made = TypeVar("Made")
@@ -73,7 +73,7 @@ def _answered(hand: Hand) -> Any:
 def _serve(pipe: Connection, make: Callable[[], Callable[[Any], Any]]) -> None:
     """A worker's life: take a task, answer, until the other side is gone."""
     belong_to_parent()
-    from viewsphere.run.allocator import keep_freed_memory
+    from viewsphere.run.workers.allocator import keep_freed_memory
 
     keep_freed_memory()
     made = cache(make)

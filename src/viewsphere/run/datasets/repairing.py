@@ -12,10 +12,10 @@ from viewsphere.planning.extension import Portion
 from viewsphere.run.executors import Job, Listed, hired
 from viewsphere.run.opening import check_whether_same
 from viewsphere.run.progress import Listener, Progress
-from viewsphere.run.replanning import AnotherPlan, Replanned
-from viewsphere.run.stages import StoredBoxes
-from viewsphere.run.tasks import Damaged, ModelTask
-from viewsphere.run.warm import compile_kernels
+from viewsphere.run.shots.precompile import compile_kernels
+from viewsphere.run.shots.replanning import AnotherPlan, Replanned
+from viewsphere.run.shots.stages import StoredBoxes
+from viewsphere.run.shots.tasks import Damaged, ModelTask
 from viewsphere.store import PlanRecord, Row, Store
 
 Errors = dict[str, ViewsphereError]

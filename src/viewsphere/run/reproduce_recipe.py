@@ -25,7 +25,7 @@ from viewsphere.recipe.file import dump
 from viewsphere.recipe.formats import Formats, read_formats
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.viewpoints import PoseList
-from viewsphere.run.scope import needs_of
+from viewsphere.run.exports.scope import needs_of
 from viewsphere.run.stand_in import CATEGORY, SOURCE, StandIn, stand_in
 from viewsphere.store.again import Again, AgainModel, Drafted
 

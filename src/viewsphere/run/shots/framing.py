@@ -25,7 +25,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.planning.plan import Plan
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Row
 from viewsphere.truth.moving import Ring, shot_floor
 from viewsphere.truth.raster.geometry import Geometry

@@ -16,9 +16,9 @@ from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.scenery import Scenery
-from viewsphere.run.scope import is_computed, needs_of
-from viewsphere.run.sights import Sights
+from viewsphere.run.exports.scope import is_computed, needs_of
+from viewsphere.run.shots.reconstruct import Sights
+from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Choice, Dataset, Exported
 
 

@@ -15,7 +15,7 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.model.sample import Sample, Taken
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Store, located
 from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.shot_views import views_of

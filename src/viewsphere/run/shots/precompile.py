@@ -42,7 +42,7 @@ from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.progress import Listener, Progress
-from viewsphere.run.stages import render_sample
+from viewsphere.run.shots.stages import render_sample
 from viewsphere.store import encode
 from viewsphere.truth.shot_views import ShotViews
 

@@ -11,7 +11,7 @@ from viewsphere.errors import RecipeError, UserError
 from viewsphere.model.mistakes import one_of
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.run.again_recipe import RECIPE, draft
+from viewsphere.run.reproduce_recipe import RECIPE, draft
 from viewsphere.store import new_folder
 from viewsphere.store.again import Again
 

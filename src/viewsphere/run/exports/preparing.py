@@ -19,11 +19,11 @@ from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.in_order import in_order
+from viewsphere.run.workers.in_order import in_order
 from viewsphere.store import Dataset, Exported
 
 if TYPE_CHECKING:
-    from viewsphere.run.completed import Completed
+    from viewsphere.run.exports.completed import Completed
 
 PATIENCE_S, WORTH_S = 2.0, 8.0
 """Seconds after which this process looks how long it would take for what is left; and for how many of them others help, each
@@ -53,7 +53,7 @@ class Views:
         """The data set with the labels that a format needs, and without annotations of what is seen no more than `least`, but
         for a format that writes scenes. Raises UserError for needs that cannot be met.
         """
-        from viewsphere.run.completed import lacking  # which loads what reads and draws models
+        from viewsphere.run.exports.completed import lacking  # which loads what reads and draws models
 
         spec = plugins.load(FormatSpec, entry.name)
         return self._seen(None if spec.keeps_all_objects else least, lacking(self._dataset, spec, entry))
@@ -61,7 +61,7 @@ class Views:
     def _made(self, least: float | None, names: tuple[str, ...]) -> Dataset:
         if least is None and not names:
             return self._dataset
-        from viewsphere.run.completed import Completed
+        from viewsphere.run.exports.completed import Completed
 
         root, choice = self._dataset.root, self._dataset.choice
         if names:

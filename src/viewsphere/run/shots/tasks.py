@@ -17,10 +17,10 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
 from viewsphere.planning.extension import Portion
 from viewsphere.plugins.engine import EngineSpec
-from viewsphere.run.composing import Composer
-from viewsphere.run.models import Models
-from viewsphere.run.stages import Stages, StoredBoxes
-from viewsphere.run.warm import compile_kernels
+from viewsphere.run.shots.composing import Composer
+from viewsphere.run.shots.models import Models
+from viewsphere.run.shots.precompile import compile_kernels
+from viewsphere.run.shots.stages import Stages, StoredBoxes
 from viewsphere.store import Row, Store
 
 Kind = Literal["model", "same model", "damaged model"]

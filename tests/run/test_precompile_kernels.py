@@ -18,7 +18,7 @@ from viewsphere import Recipe, plan
 from viewsphere.geometry.mask import decode_rle, encode_rle
 from viewsphere.kernels import entries
 from viewsphere.kernels.digests import package_digest
-from viewsphere.run import warm
+from viewsphere.run.shots import precompile as warm
 
 RUN = """
 import sys

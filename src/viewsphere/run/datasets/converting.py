@@ -15,11 +15,11 @@ from viewsphere.aside import aside
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
 from viewsphere.recipe.formats import Formats, read_formats
-from viewsphere.run.exporting import linked, write
-from viewsphere.run.importing import put_in_store, read_dataset
+from viewsphere.run.datasets.importing import put_in_store, read_dataset
+from viewsphere.run.exports.exporting import linked, write
+from viewsphere.run.exports.scope import refuse, scope_of_foreign
+from viewsphere.run.exports.writable import writable
 from viewsphere.run.progress import Listener, unheard
-from viewsphere.run.scope import refuse, scope_of_foreign
-from viewsphere.run.writable import writable
 from viewsphere.store import Dataset, located, new_folder
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.places.local import TAKEN

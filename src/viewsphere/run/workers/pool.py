@@ -14,7 +14,7 @@ from threading import Thread, current_thread, main_thread
 from types import FrameType
 from typing import Any
 
-from viewsphere.run.exit_at_once import exit_at_once
+from viewsphere.run.workers.exit_at_once import exit_at_once
 
 OUT_OF_MEMORY = 77
 """Exit code of a worker that was refused memory."""

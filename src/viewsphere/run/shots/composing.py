@@ -9,9 +9,9 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.planning.extension import Portion
-from viewsphere.run.framing import Framing
-from viewsphere.run.models import mesh_digest
-from viewsphere.run.stages import Stages, StoredBoxes
+from viewsphere.run.shots.framing import Framing
+from viewsphere.run.shots.models import mesh_digest
+from viewsphere.run.shots.stages import Stages, StoredBoxes
 from viewsphere.store import Row
 
 

@@ -22,7 +22,7 @@ from viewsphere.labels import labels
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.run.stages import Stages, model_files
+from viewsphere.run.shots.stages import Stages, model_files
 from viewsphere.store import ModelInfo, PlanRecord, Store
 from viewsphere.store.shots.manifest import Manifest
 from viewsphere.zoo import build_zoo_model

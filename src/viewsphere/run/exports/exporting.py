@@ -13,10 +13,10 @@ from viewsphere.errors import UserError
 from viewsphere.model.quantity import quantity
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
-from viewsphere.run.preparing import Entries, prepared, targets
+from viewsphere.run.exports.preparing import Entries, prepared, targets
+from viewsphere.run.exports.scope import refuse, scope_of
+from viewsphere.run.exports.writable import writable
 from viewsphere.run.progress import Listener, Progress, unheard
-from viewsphere.run.scope import refuse, scope_of
-from viewsphere.run.writable import writable
 from viewsphere.store import Choice, Dataset, located, new_folder
 from viewsphere.store.credits import credits_digest
 from viewsphere.store.shots.checksums import write_checksums, written_credits, written_frames, written_least, written_options
@@ -50,7 +50,7 @@ def export(
     entries = tuple(entry.over(_known_options(dataset, entry.name)) for entry in read_formats(formats))
     if not entries:
         return ()
-    from viewsphere.run.completed import lacking  # which loads what reads and draws models
+    from viewsphere.run.exports.completed import lacking  # which loads what reads and draws models
 
     specs = {entry.name: writable(entry.name) for entry in entries}
     refuse(entries, scope_of(dataset), dataset.root)

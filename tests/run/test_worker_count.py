@@ -6,10 +6,10 @@ import viewsphere as vs
 from command_line import viewsphere
 from small import small_recipe
 from viewsphere.planning.extension import whole
-from viewsphere.run import crew_size
-from viewsphere.run.crew_size import default_workers
 from viewsphere.run.executors.local import LocalCrew
 from viewsphere.run.generate import Missing
+from viewsphere.run.workers import worker_count as crew_size
+from viewsphere.run.workers.worker_count import default_workers
 from viewsphere.store import Store
 
 CIRCLE = {"azimuth": {"start": 0, "stop": 360, "step": 5}, "elevation": [0, 20, 40], "distance": 1.0}

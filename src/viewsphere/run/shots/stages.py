@@ -35,7 +35,7 @@ from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.traits import Traits
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.rendering.ground.material import ground_stamps
-from viewsphere.run.walls import Step, check_rooms, check_way
+from viewsphere.run.shots.camera_collisions import Step, check_rooms, check_way
 from viewsphere.store import ModelInfo, Store
 from viewsphere.truth.raster.visibility import with_ground
 from viewsphere.truth.shot_views import ShotViews

@@ -11,9 +11,9 @@ from viewsphere.errors import ViewsphereError
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.run.composing import SceneryRecord
-from viewsphere.run.models import mesh_digest
-from viewsphere.run.stages import Stages
+from viewsphere.run.shots.composing import SceneryRecord
+from viewsphere.run.shots.models import mesh_digest
+from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Dataset
 
 NONE = SceneryRecord(things=(), digests={})

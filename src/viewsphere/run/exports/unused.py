@@ -13,7 +13,7 @@ from viewsphere.errors import StoreError
 from viewsphere.model.channel import PICTURES
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
-from viewsphere.run.scope import needs_of
+from viewsphere.run.exports.scope import needs_of
 from viewsphere.store import Store
 from viewsphere.store.shots.manifest import Manifest
 

@@ -19,8 +19,8 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
-from viewsphere.run.composing import SceneryRecord
-from viewsphere.run.scenery import Scenery
+from viewsphere.run.shots.composing import SceneryRecord
+from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Dataset, ModelInfo, Row
 from viewsphere.truth.raster.geometry import Geometry, build_geometry, present
 from viewsphere.truth.raster.visibility import rasterize

@@ -1,0 +1,1 @@
+"""Whole data sets: import, conversion, merge and repair."""

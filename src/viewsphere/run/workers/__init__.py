@@ -1,0 +1,1 @@
+"""Worker processes of this machine: their number, start, tasks and end."""
