@@ -32,7 +32,7 @@ import grimp
 from viewsphere import _HOMES
 from viewsphere.model.channel import DEFAULT_CHANNELS, PICTURES
 from viewsphere.model.shot import Shot
-from viewsphere.plugins.registry import SEAMS
+from viewsphere.plugins.registry import SEAMS, shipped
 
 ROOT = Path(__file__).parent.parent
 MAIN = "origin/main"
@@ -128,11 +128,13 @@ class Modules:
         graph = grimp.build_graph("viewsphere", exclude_type_checking_imports=True)
         self.all = frozenset(graph.modules)
         self.plugins = defaultdict[str, set[str]](set)
-        homes = {seam.package for seam in SEAMS.values()}
-        homes |= {"viewsphere.composing.trajectories", "viewsphere.zoo", "viewsphere.zoo.places"}
+        for kind in SEAMS:
+            for name, module in shipped(kind).items():
+                self.plugins[name].add(module)
+        homes = {"viewsphere.composing.trajectories", "viewsphere.zoo", "viewsphere.zoo.places"}
         for module in self.all:
             package, _, name = module.rpartition(".")
-            if package in homes and not name.startswith("_") and name != "shared":
+            if package in homes and not name.startswith("_"):
                 self.plugins[name].add(module)
         self.needs = {module: graph.find_modules_directly_imported_by(module) | self._named(module) for module in self.all}
         for loader, meant in self._implied().items():

@@ -11,7 +11,7 @@ from proven import equal
 from rigged import BODY, arm, person, write_gltf
 from sealing import seal_again
 from viewsphere.check import check
-from viewsphere.labels.body_parts import LABEL
+from viewsphere.labels import channel_labels
 from viewsphere.store import Dataset
 
 NAMES = ["depth", "instances", "triangles", "coordinates", "body_parts"]
@@ -86,7 +86,7 @@ def test_it_is_kept_and_proved(people):
 
 def test_its_proof_notices_others(people):
     sample, models = people[0], {info.key: info for info in people.models}
-    assert list(LABEL.prove(sample, models)) == []
+    assert list(channel_labels()["body_parts"].prove(sample, models)) == []
     on, off = tuple(np.argwhere(sample.body_parts > 0)[40]), tuple(np.argwhere(sample.instances == 0)[0])
     for place, value, message in (
         (on, 99, "body parts 0 to 16 of"),
@@ -94,11 +94,11 @@ def test_its_proof_notices_others(people):
         (on, -1, "others at"),
     ):
         other = changed(sample, "body_parts", lambda a, place=place, value=value: a.__setitem__(place, value))
-        assert any(message in found for found in LABEL.prove(other, models))
+        assert any(message in found for found in channel_labels()["body_parts"].prove(other, models))
     pairs = sample.triangles[sample.body_parts > 0]
     often = np.argwhere((sample.triangles == np.bincount(pairs).argmax()) & (sample.body_parts > 0))
     split = changed(sample, "body_parts", lambda a: a.__setitem__(tuple(often[0]), a[tuple(often[0])] % 16 + 1))
-    assert any("one body part in each triangle" in found for found in proof(LABEL, split))
+    assert any("one body part in each triangle" in found for found in proof(channel_labels()["body_parts"], split))
 
 
 def test_other_names_are_noticed(people, tmp_path):

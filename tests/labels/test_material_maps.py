@@ -15,8 +15,7 @@ from viewsphere import generate
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Material
 from viewsphere.check import check
-from viewsphere.labels import observe
-from viewsphere.labels.materials import LABEL
+from viewsphere.labels import channel_labels, observe
 from viewsphere.store import Dataset
 from viewsphere.truth.raster.visibility import rasterize
 
@@ -61,7 +60,7 @@ def test_embree_meets_triangles_of_these(name, seed):
 @pytest.mark.parametrize("name", LENSES)
 def test_its_proof_notices_others(name):
     sample, *_ = sample_of(1, name)
-    assert proof(LABEL, sample) == []
+    assert proof(channel_labels()["materials"], sample) == []
     pairs = sample.triangles * 10 + sample.instances
     shared = np.argwhere(
         (sample.instances > 0)
@@ -73,7 +72,7 @@ def test_its_proof_notices_others(name):
         lambda a: a.__setitem__(thing, 0),
         lambda a: a.__setitem__(background, 1),
     ):
-        assert proof(LABEL, changed(sample, "materials", change))
+        assert proof(channel_labels()["materials"], changed(sample, "materials", change))
 
 
 @pytest.mark.slow
@@ -88,7 +87,7 @@ def test_names_are_in_the_data_set_and_proved(tmp_path):
         assert info.materials == tuple(m.name for m in mesh.materials) and {"paint", "dark"} <= set(info.materials)
         np.testing.assert_array_equal(sample.materials[own], mesh.triangle_material[sample.triangles[own]] + 1)
         few = {o.key: replace(info, materials=info.materials[:1])}
-        assert any("expected the materials 1 to 1" in line for line in LABEL.prove(sample, few))
+        assert any("expected the materials 1 to 1" in line for line in channel_labels()["materials"].prove(sample, few))
     assert check(dataset, rays=False).ok
     file = next(tmp_path.glob("store/models/*/model.json"))
     told = json.loads(file.read_text())

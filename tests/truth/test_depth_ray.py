@@ -8,8 +8,7 @@ import pytest
 from proven import close
 from truth_scenes import LENSES, lens, orbit_camera, placed, random_soup, sphere
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.labels import observe
-from viewsphere.labels.depth_ray import LABEL
+from viewsphere.labels import channel_labels, observe
 from viewsphere.model.sample import Sample
 from viewsphere.truth.raster.visibility import rasterize
 
@@ -76,7 +75,7 @@ def test_embree_measures_the_same(name):
 def test_its_proof_notices_other_distances():
     camera, _, observed = seen(placed(sphere(3, 1.0), ground=True), "fisheye")
     sample = Sample(0, "train", camera, None, (), observed, {})
-    assert list(LABEL.prove(sample, {})) == []
+    assert list(channel_labels()["depth_ray"].prove(sample, {})) == []
     endless = np.full_like(observed["depth_ray"], np.inf)
     for change in (endless, -observed["depth_ray"], np.nan_to_num(observed["depth_ray"], posinf=5)):
-        assert list(LABEL.prove(replace(sample, channels={**observed, "depth_ray": change}), {}))
+        assert list(channel_labels()["depth_ray"].prove(replace(sample, channels={**observed, "depth_ray": change}), {}))

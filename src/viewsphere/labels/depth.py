@@ -1,22 +1,23 @@
-"""depth: distance along the camera's z axis."""
+"""depth and depth_ray: distance along the camera's z axis, and along a pixel's ray, as range finders measure it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels.shared.drawing.depth_colors import extent, picture
-from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Proof, channel_of
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import Sight
 
 
-def compute(sight: Sight) -> NDArray[np.float32]:
+def along_axis(sight: Sight) -> NDArray[np.float32]:
     """z of the seen point, (H, W) metres, infinite where nothing is seen; negative behind the image plane of a fisheye."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
@@ -25,7 +26,7 @@ def compute(sight: Sight) -> NDArray[np.float32]:
     return out
 
 
-def prove(sample: Sample, models: Models) -> Iterator[str]:
+def prove_depth(sample: Sample, models: Models) -> Iterator[str]:
     """Depth is metres, and finite wherever an object is seen."""
     depth, instances = channel_of(sample, "depth"), channel_of(sample, "instances")
     if depth is None:
@@ -36,19 +37,50 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected metres where an object is seen; found infinity at {np.isinf(depth[instances > 0]).sum()} pixels"
 
 
-LABEL = ChannelLabel(
-    name="depth",
-    meaning="distance along the camera's z axis",
-    axes="camera",
-    dtype=np.float32,
-    unit="m",
-    empty=np.inf,
-    compute=compute,
-    prove=prove,
-    drawing=Drawing(
-        "depth",
-        within=lambda sample, within: picture(sample.channels["depth"], within),
-        extent=lambda sample: extent(sample.channels["depth"]),
-        key=(("depth: light is near", None),),
-    ),
+def along_ray(sight: Sight) -> NDArray[np.float32]:
+    """Distance from the camera's centre to the seen point, (H, W) metres, infinite where nothing is seen.
+
+    It is the length of the pixel's ray times 1/s of `truth.raster.visibility`: never negative, behind a fisheye neither.
+    """
+    length = np.linalg.norm(pixel_rays(sight.camera.intrinsics), axis=-1)
+    out = np.full(length.shape, np.inf, np.float32)
+    seen = sight.visibility.inverse_depth > 0
+    out[seen] = length[seen] / sight.visibility.inverse_depth[seen]
+    return out
+
+
+def prove_depth_ray(sample: Sample, models: Models) -> Iterator[str]:
+    """Distances are metres above 0, and finite where depth is. Depth may be kept in steps, so the numbers are not compared."""
+    distance, depth = channel_of(sample, "depth_ray"), channel_of(sample, "depth")
+    if distance is None:
+        return
+    if not (distance > 0).all():
+        yield "expected metres above 0, or infinity where nothing is seen; found others"
+    if depth is not None and not np.array_equal(np.isfinite(distance), np.isfinite(depth)):
+        yield "expected finite distances where depth is finite, and nowhere else; found others"
+
+
+def _label(name: str, compute: Callable[[Sight], Array], meaning: str, prove: Proof) -> ChannelLabel:
+    """A channel of distances."""
+    return ChannelLabel(
+        name=name,
+        meaning=meaning,
+        axes="camera",
+        dtype=np.float32,
+        unit="m",
+        empty=np.inf,
+        compute=compute,
+        prove=prove,
+        drawing=Drawing(
+            name,
+            within=lambda sample, within: picture(sample.channels[name], within),
+            extent=lambda sample: extent(sample.channels[name]),
+            key=((f"{name}: light is near", None),),
+        ),
+    )
+
+
+LABELS = (
+    _label("depth", along_axis, "distance along the camera's z axis", prove_depth),
+    _label("depth_ray", along_ray, "distance from the camera's centre, along the pixel's ray", prove_depth_ray),
 )

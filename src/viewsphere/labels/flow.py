@@ -1,38 +1,79 @@
-"""flow: optical flow, where the seen point is one instant later."""
+"""flow and flow_backward: optical flow, where the seen point is one instant later or earlier."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared import flow as _flow
 from viewsphere.labels.shared.drawing.flow_colors import drawing
-from viewsphere.labels.shared.spec import ChannelLabel, Needs
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Models, Needs, channel_of
+from viewsphere.model.sample import Sample
+from viewsphere.truth.correspondences.correspondence import pixel_centers
+from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import Sight
 
+EDGE = 1e-3
+"""Pixels from the picture's border within which the rounding of stored flow decides whether it leads outside."""
 
-def compute(sight: Sight) -> NDArray[np.float32]:
-    """Return the motion of each seen point to the next instant, (H, W, 2) pixels, right and down.
+
+def flow(sight: Sight, instants: int) -> NDArray[np.float32]:
+    """Return the motion of each seen point to so many instants later, (H, W, 2) pixels, right and down.
 
     NaN where the point has no pixel then: behind the camera, on a thing that is absent then, on a flat picture.
     """
-    return _flow.flow(sight, 1)
+    match = sight.match(instants)
+    return np.full((*sight.visibility.triangle.shape, 2), np.nan, np.float32) if match is None else match.flow
 
 
-LABEL = ChannelLabel(
-    name="flow",
-    meaning="where the seen point is one instant later, right and down of where it is",
-    axes="image",
-    needs=Needs(instants=(1,)),
-    dtype=np.float32,
-    components=2,
-    unit="px",
-    empty=np.nan,
-    compute=compute,
-    prove=_flow.flow_proof("flow", "flow_state"),
-    drawing=drawing("flow"),
-)
+def _prove(sample: Sample, name: str) -> Iterator[str]:
+    """Flow is there wherever its point has a pixel, and leads outside where the state says so."""
+    state = f"{name}_state"
+    vectors, states = channel_of(sample, name), channel_of(sample, state)
+    if vectors is None:
+        return
+    if (np.isnan(vectors[..., 0]) != np.isnan(vectors[..., 1])).any():
+        yield "expected both components or none; found one of them"
+    elif states is not None:
+        yield from _against(vectors, states, state)
+
+
+def _against(vectors: Array, states: Array, state: str) -> Iterator[str]:
+    has_pixel = np.isfinite(vectors[..., 0])
+    wrong = has_pixel != (states < BEHIND)
+    if wrong.any():
+        yield f"expected vectors where {state} is 0, 1 or 2, NaN elsewhere; found others at {wrong.sum()} pixels"
+    height, width = states.shape
+    there = pixel_centers(states.shape) + vectors
+    inside = np.minimum(there, (width, height) - there).min(axis=-1)  # how far inside of the picture
+    wrong = has_pixel & (np.abs(inside) > EDGE) & ((inside < 0) != (states == OUTSIDE))
+    if wrong.any():
+        yield f"expected {state} 2 where the vectors lead outside; found others at {wrong.sum()} pixels"
+
+
+def _label(name: str, instants: int, when: str) -> ChannelLabel:
+    """One direction of flow."""
+
+    def prove(sample: Sample, models: Models) -> Iterator[str]:
+        return _prove(sample, name)
+
+    return ChannelLabel(
+        name=name,
+        meaning=f"where the seen point is one instant {when}, right and down of where it is",
+        axes="image",
+        needs=Needs(instants=(instants,)),
+        dtype=np.float32,
+        components=2,
+        unit="px",
+        empty=np.nan,
+        compute=lambda sight: flow(sight, instants),
+        prove=prove,
+        drawing=drawing(name),
+    )
+
+
+LABELS = (_label("flow", 1, "later"), _label("flow_backward", -1, "earlier"))

@@ -1,20 +1,24 @@
-"""normals: which way the seen surface faces, smoothed as it is shaded."""
+"""normals and normals_geometric: the direction in which the seen surface faces, as shaded and of its triangle."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared.directions import drawing, unit_proof
-from viewsphere.labels.shared.spec import ChannelLabel
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Picture, channel_of
+from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import Sight
 
+TOLERANCE = 1e-5
+"""Length by which stored float32 directions may differ from 1: rounding alone gives some 1e-7."""
 
-def compute(sight: Sight) -> NDArray[np.float32]:
+
+def shading_normals(sight: Sight) -> NDArray[np.float32]:
     """Interpolated vertex normals (H, W, 3) on the visible side of their triangle, bent to at most perpendicular to the ray
     where interpolation turns them away.
     """
@@ -28,13 +32,57 @@ def compute(sight: Sight) -> NDArray[np.float32]:
     return out
 
 
-LABEL = ChannelLabel(
-    name="normals",
-    meaning="shading normal, camera axes, towards the camera",
-    axes="camera",
-    dtype=np.float32,
-    components=3,
-    compute=compute,
-    prove=unit_proof("normals"),
-    drawing=drawing("normals"),
+def triangle_normals(sight: Sight) -> NDArray[np.float32]:
+    """The triangle's normal (H, W, 3) in camera axes, towards the camera; 0 where nothing is seen."""
+    from viewsphere.truth.raster import kernels_channels as kernels
+
+    out, seen = sight.empty(np.float32, 3), sight.visibility.triangle
+    kernels.normals_geometric(seen, sight.geometry.triangle_normals, sight.rays, sight.camera_from_ray, sight.camera.R, out)
+    return out
+
+
+def _prove(sample: Sample, name: str) -> Iterator[str]:
+    """Directions are unit vectors, or 0 where nothing is seen."""
+    array = channel_of(sample, name)
+    if array is None:
+        return
+    square = np.einsum("...k,...k", array, array)
+    wrong = ~((np.abs(square - 1) < 2 * TOLERANCE) | (square == 0))
+    if wrong.any():
+        yield f"expected directions of length 1, or 0 where there is none; found others at {wrong.sum()} pixels"
+
+
+def picture(normals: Array) -> Picture:
+    """Normals as a picture (H, W, 3) uint8, as normal maps have them: red to the right, green up, blue towards the camera."""
+    right, down, away = np.moveaxis(normals.astype(np.float64), -1, 0)
+    shares = (np.stack([right, -down, -away], axis=-1) + 1) / 2
+    is_seen = (right != 0) | (down != 0) | (away != 0)
+    return np.where(is_seen[..., None], shares * 255, 0).round().astype(np.uint8)
+
+
+def _label(name: str, compute: Callable[[Sight], Array], what: str) -> ChannelLabel:
+    """A channel of directions."""
+
+    def prove(sample: Sample, models: Models) -> Iterator[str]:
+        return _prove(sample, name)
+
+    return ChannelLabel(
+        name=name,
+        meaning=f"{what} normal, camera axes, towards the camera",
+        axes="camera",
+        dtype=np.float32,
+        components=3,
+        compute=compute,
+        prove=prove,
+        drawing=Drawing(
+            name,
+            beside=lambda sample: picture(sample.channels[name]),
+            key=((f"{name}: red to the right, green up, blue towards the camera", None),),
+        ),
+    )
+
+
+LABELS = (
+    _label("normals", shading_normals, "shading"),
+    _label("normals_geometric", triangle_normals, "triangle's"),
 )

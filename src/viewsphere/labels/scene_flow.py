@@ -1,38 +1,68 @@
-"""scene_flow: by how much the seen point moves to one instant later, in metres."""
+"""scene_flow and scene_flow_backward: the motion of the seen point to one instant later or earlier, in metres."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared import flow as _flow
 from viewsphere.labels.shared.drawing.flow_colors import NEAR, drawing
-from viewsphere.labels.shared.spec import ChannelLabel, Needs
+from viewsphere.labels.shared.spec import ChannelLabel, Models, Needs, channel_of
+from viewsphere.model.sample import Sample
+from viewsphere.truth.surface_points.raster import INVALID
 
 if TYPE_CHECKING:
     from viewsphere.labels.shared.context import Sight
 
 
-def compute(sight: Sight) -> NDArray[np.float32]:
-    """X an instant later less X now, (H, W, 3) metres, each in its own instant's camera axes: the camera's motion is in it.
-
-    NaN of the sky, and of what is not there then.
+def scene_flow(sight: Sight, instants: int) -> NDArray[np.float32]:
+    """Return X so many instants later less X now, (H, W, 3) metres, each in its own instant's camera axes: the camera's motion
+    is in it. NaN of the sky, and of what is not there then.
     """
-    return _flow.scene_flow(sight, 1)
+    match = sight.match(instants)
+    return np.full((*sight.visibility.triangle.shape, 3), np.nan, np.float32) if match is None else match.scene_flow
 
 
-LABEL = ChannelLabel(
-    name="scene_flow",
-    meaning="motion of the seen point to one instant later, each place in its own instant's camera axes",
-    axes="camera",
-    needs=Needs(instants=(1,)),
-    dtype=np.float32,
-    components=3,
-    unit="m",
-    empty=np.nan,
-    compute=compute,
-    prove=_flow.scene_flow_proof("scene_flow", "flow_state"),
-    drawing=drawing("scene_flow", NEAR),
+def _prove(sample: Sample, name: str, state: str) -> Iterator[str]:
+    """Points that are seen, and not gone, have scene flow, and nothing else has."""
+    vectors, states, depth = (channel_of(sample, n) for n in (name, state, "depth"))
+    if vectors is None:
+        return
+    has = np.isfinite(vectors).all(axis=-1)
+    if (has != np.isfinite(vectors).any(axis=-1)).any():
+        yield "expected all components or none; found some of them"
+    if states is not None and (has & (states == INVALID)).any():
+        yield f"expected NaN where {state} is 4; found vectors at {(has & (states == INVALID)).sum()} pixels"
+    if states is not None and depth is not None:
+        missing = (np.isfinite(depth) & (states != INVALID)) & ~has
+        if missing.any():
+            yield f"expected vectors where something is seen and {state} is not 4; found NaN at {missing.sum()} pixels"
+
+
+def _label(name: str, instants: int, when: str, state: str) -> ChannelLabel:
+    """One direction of scene flow; `state` is the channel of the same direction's states."""
+
+    def prove(sample: Sample, models: Models) -> Iterator[str]:
+        return _prove(sample, name, state)
+
+    return ChannelLabel(
+        name=name,
+        meaning=f"motion of the seen point to one instant {when}, each place in its own instant's camera axes",
+        axes="camera",
+        needs=Needs(instants=(instants,)),
+        dtype=np.float32,
+        components=3,
+        unit="m",
+        empty=np.nan,
+        compute=lambda sight: scene_flow(sight, instants),
+        prove=prove,
+        drawing=drawing(name, NEAR),
+    )
+
+
+LABELS = (
+    _label("scene_flow", 1, "later", "flow_state"),
+    _label("scene_flow_backward", -1, "earlier", "flow_backward_state"),
 )

@@ -14,6 +14,7 @@ from viewsphere.plugins.registry import (
     origin,
     place,
     places,
+    shipped,
     source,
 )
 
@@ -31,5 +32,6 @@ __all__ = [
     "origin",
     "place",
     "places",
+    "shipped",
     "source",
 ]

@@ -3,6 +3,10 @@
 A plug-in is one module that holds a spec, such as `FORMAT = FormatSpec(...)`. A module's name is the plug-in's name, so listing
 names imports no plug-in. Third parties name their modules in entry points of the groups `viewsphere.formats` and so on. A
 plug-in of theirs that cannot be loaded is an error for those that name it, and for nothing else.
+
+A module of labels may hold several, as `LABELS = (ChannelLabel(name="flow", ...), ...)`. Listing reads their names in the text
+of that statement, without importing the module. Loading compares them with the labels. Third parties write one entry point for
+each label; several may name the same module.
 """
 
 from __future__ import annotations
@@ -11,8 +15,9 @@ import importlib
 import importlib.util
 import os
 import pkgutil
+import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -33,16 +38,19 @@ S = TypeVar("S", bound=Specified)
 
 
 class Seam(NamedTuple):
-    """The package of a kind's built-in plug-ins, and the constant of a module that holds its spec."""
+    """The package of a kind's built-in plug-ins, the constant of a module that holds its spec, and the constant that holds
+    several specs; empty: a module holds one.
+    """
 
     package: str
     constant: str
+    several: str = ""
 
 
 SEAMS: dict[Kind, Seam] = {
     "engines": Seam("viewsphere.engines", "ENGINE"),
     "formats": Seam("viewsphere.formats", "FORMAT"),
-    "labels": Seam("viewsphere.labels", "LABEL"),
+    "labels": Seam("viewsphere.labels", "LABEL", "LABELS"),
     "materials": Seam("viewsphere.materials", "MATERIAL"),
     "motions": Seam("viewsphere.composing.motion", "MOTION"),
     "placers": Seam("viewsphere.composing.placing", "PLACER"),
@@ -52,7 +60,7 @@ SEAMS: dict[Kind, Seam] = {
 
 def names(kind: Kind) -> tuple[str, ...]:
     """Names of all plug-ins of this kind, sorted; no plug-in is imported."""
-    return tuple(sorted({*_shipped(kind), *(entry.name for entry in entry_points(group=f"viewsphere.{kind}"))}))
+    return tuple(sorted({*shipped(kind), *(entry.name for entry in entry_points(group=f"viewsphere.{kind}"))}))
 
 
 def load(spec: type[S], name: str) -> S:
@@ -91,7 +99,9 @@ def origin(kind: Kind, name: str) -> str:
 def source(kind: Kind, name: str) -> Path | None:
     """The file of a plug-in's module; None where it has none."""
     entry = _entry(kind, name)
-    found = importlib.util.find_spec(f"{SEAMS[kind].package}.{name}" if entry is None else entry.module)
+    found = importlib.util.find_spec(
+        shipped(kind).get(name, f"{SEAMS[kind].package}.{name}") if entry is None else entry.module
+    )
     return None if found is None or found.origin is None else Path(found.origin)
 
 
@@ -99,8 +109,10 @@ def _entry(kind: Kind, name: str) -> metadata.EntryPoint | None:
     return next((entry for entry in entry_points(group=f"viewsphere.{kind}") if entry.name == name), None)
 
 
-def _shipped(kind: Kind) -> tuple[str, ...]:
-    return tuple(name for name, _ in _listed(SEAMS[kind].package) if not name.startswith("_") and name != "shared")
+def shipped(kind: Kind) -> Mapping[str, str]:
+    """The modules of the built-in plug-ins of a kind, by the plug-ins' names; none is imported."""
+    seam = SEAMS[kind]
+    return _plugins_in(_changes(importlib.import_module(seam.package).__path__), seam)
 
 
 def _module_of(kind: Kind, name: str) -> Any:
@@ -108,9 +120,9 @@ def _module_of(kind: Kind, name: str) -> Any:
     entry = _entry(kind, name)
     if entry is not None:
         return _entered(entry)
-    if name not in _shipped(kind):
+    if name not in shipped(kind):
         raise _unknown(kind[:-1], name, names(kind))
-    return importlib.import_module(f"{SEAMS[kind].package}.{name}")
+    return importlib.import_module(shipped(kind)[name])
 
 
 def _entered(entry: metadata.EntryPoint) -> Any:
@@ -130,8 +142,10 @@ def _spec(spec: type[S], found: Any, name: str) -> S:
 
     if isinstance(found, spec):
         return found
-    constant = SEAMS[spec.KIND].constant
+    _, constant, several = SEAMS[spec.KIND]
     where, others = getattr(found, "__file__", None) or name, vars(found) if hasattr(found, "__dict__") else {}
+    if several in others:
+        return _one_of_several(spec, f"{where}: {several}", others[several], found.__name__, name)
     if constant not in others:
         meant = nearest(constant, [other for other in others if other.isupper()])
         raise PluginError(f"{where}: expected {constant} = {spec.__name__}(...); found no {constant}{meant}")
@@ -142,6 +156,26 @@ def _spec(spec: type[S], found: Any, name: str) -> S:
         other = shown(vars(held)["name"])
         raise PluginError(f"{where}: {constant}.name: expected {name!r}, the name of its file; found {other}")
     return held
+
+
+def _one_of_several(spec: type[S], where: str, held: Any, module: str, name: str) -> S:
+    """The spec of this name among those of a module; raises PluginError where listing does not name all of them."""
+    from viewsphere.model.mistakes import shown
+
+    for i, each in enumerate(held if isinstance(held, tuple) else (held,)):
+        if not isinstance(held, tuple) or not isinstance(each, spec):
+            raise PluginError(f"{where}[{i}]: expected a {spec.__name__} in a tuple; found {shown(each)}")
+    specs = {vars(each)["name"]: each for each in held}
+    entries = entry_points(group=f"viewsphere.{spec.KIND}")
+    named = {entry.name for entry in entries if entry.module == module} or {
+        each for each, home in shipped(spec.KIND).items() if home == module
+    }
+    if len(specs) < len(held) or specs.keys() != named:
+        raise PluginError(
+            f"{where}: expected the names {', '.join(sorted(named))}, each once, as entry points or the text of the statement "
+            f"list them; found {', '.join(vars(each)['name'] for each in held)}"
+        )
+    return specs[name]
 
 
 def _file(module: str) -> str:
@@ -227,6 +261,52 @@ def _listed(package: str) -> tuple[tuple[str, bool], ...]:
 @lru_cache(maxsize=2 * len(SEAMS))
 def _modules_in(paths: Changes) -> tuple[tuple[str, bool], ...]:
     return tuple((m.name, m.ispkg) for m in pkgutil.iter_modules([path for path, _ in paths]))
+
+
+@lru_cache(maxsize=2 * len(SEAMS))
+def _plugins_in(paths: Changes, seam: Seam) -> Mapping[str, str]:
+    """The modules in a package's folders by the names of the plug-ins that they hold."""
+    homes: dict[str, str] = {}
+    for module in pkgutil.iter_modules([path for path, _ in paths]):
+        if not module.name.startswith("_") and module.name != "shared":
+            held = _names_in_text(module, seam.several) if seam.several else None
+            homes |= dict.fromkeys(held or (module.name,), f"{seam.package}.{module.name}")
+    return homes
+
+
+def _names_in_text(module: pkgutil.ModuleInfo, constant: str) -> tuple[str, ...] | None:
+    """The names of the plug-ins that a module's text lists in a statement; None without that statement.
+
+    Only the text from the statement on is parsed, so that listing 50 files takes 3 ms.
+    """
+    found = module.module_finder.find_spec(module.name, None)
+    loader: Any = found and found.loader
+    if found is None or found.origin is None:
+        return None
+    text = loader.get_data(found.origin)
+    start = re.search(rb"^%s\b[^=\n]*=" % constant.encode(), text, re.MULTILINE)
+    if start is None:
+        return None
+    import ast
+
+    statement: Any = ast.parse(text[start.start() :]).body[0]
+    elements = getattr(statement.value, "elts", ())
+    names = [name for each in elements if (name := _literal_name(each)) is not None]
+    if not names or len(names) < len(elements):
+        raise PluginError(
+            f"{found.origin}: {constant}: expected a tuple of calls, each with its name as text, first or as `name`"
+        )
+    return tuple(names)
+
+
+def _literal_name(call: object) -> str | None:
+    """The text that a call has as its `name`, or else as its first value."""
+    import ast  # which takes 4 ms, and few modules hold several plug-ins
+
+    if not isinstance(call, ast.Call):
+        return None
+    given = [word.value for word in call.keywords if word.arg == "name"] or call.args[:1]
+    return next((each.value for each in given if isinstance(each, ast.Constant) and isinstance(each.value, str)), None)
 
 
 def _module(package: str, what: str, name: str) -> Any:

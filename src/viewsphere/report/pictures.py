@@ -17,6 +17,7 @@ from PIL import Image
 from viewsphere.errors import UserError
 from viewsphere.labels import Extent, alone, channel_labels
 from viewsphere.labels.disparity import extent as disparity_extent
+from viewsphere.labels.match_states import picture as state_colors
 from viewsphere.labels.motion_boundaries import COLOR as BOUNDARY
 from viewsphere.labels.shared.drawing.depth_colors import extent as depth_extent
 from viewsphere.labels.shared.drawing.depth_colors import nearness
@@ -24,7 +25,6 @@ from viewsphere.labels.shared.drawing.flow_colors import longest_of
 from viewsphere.labels.shared.drawing.flow_colors import picture as flow_colors
 from viewsphere.labels.shared.drawing.passes import DRAWINGS
 from viewsphere.labels.shared.drawing.passes import picture as pass_colors
-from viewsphere.labels.shared.states import picture as state_colors
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.report.unknown import number

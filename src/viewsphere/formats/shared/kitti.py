@@ -12,9 +12,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.mounting import CAMERA_FROM_LIDAR, Float, centred, measured, mounted, pointless, unmoved
 from viewsphere.geometry.rotation import compose, product, transform
-from viewsphere.labels.occlusion_level import LARGELY, PARTLY, UNKNOWN
-from viewsphere.labels.truncation_level import LARGELY as LARGELY_TRUNCATED
-from viewsphere.labels.truncation_level import TRUNCATED
+from viewsphere.labels.kitti_levels import LARGELY_HIDDEN, LARGELY_OUTSIDE, PARTLY, TRUNCATED, UNKNOWN
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
@@ -137,7 +135,7 @@ def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
         return int(o.more["truncation_level"])
     if math.isnan(o.truncation):
         return NO_SHARE
-    return (o.truncation > TRUNCATED) + (o.truncation > LARGELY_TRUNCATED) if in_grades else o.truncation
+    return (o.truncation > TRUNCATED) + (o.truncation > LARGELY_OUTSIDE) if in_grades else o.truncation
 
 
 def _hidden(o: ObjectAnnotation) -> int:
@@ -147,7 +145,7 @@ def _hidden(o: ObjectAnnotation) -> int:
     if math.isnan(o.visibility) or o.truncation >= 1:
         return UNKNOWN
     hidden = 1 - o.visibility / (1 - o.truncation)
-    return (hidden > PARTLY) + (hidden > LARGELY)
+    return (hidden > PARTLY) + (hidden > LARGELY_HIDDEN)
 
 
 def inclusive(box: Box) -> Box:

@@ -1,14 +1,14 @@
-"""The shared parts of labels of states: whether another picture shows the seen point, too."""
+"""flow_state, flow_backward_state and disparity_state: whether another picture shows the seen point, too."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared.spec import Drawing, Models, Picture, Proof, channel_of
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.surface_points.raster import INVALID
@@ -20,7 +20,7 @@ MEANING = "0 visible, 1 occluded, 2 outside the picture, 3 behind the camera, 4 
 COLORS = np.array([(235, 235, 235), (200, 60, 50), (60, 110, 200), (120, 70, 160), (0, 0, 0)], np.uint8)
 
 
-def state(sight: Sight, match: Match | None) -> NDArray[np.uint8]:
+def states(sight: Sight, match: Match | None) -> NDArray[np.uint8]:
     """The states of the seen points in another view, (H, W); all invalid without one."""
     return np.full(sight.visibility.triangle.shape, INVALID, np.uint8) if match is None else match.state
 
@@ -41,12 +41,30 @@ def picture(states: NDArray[np.uint8]) -> Picture:
     return COLORS[np.minimum(states, INVALID)]
 
 
-def state_proof(name: str) -> Proof:
-    """The proof that a channel holds nothing but states."""
+def _label(name: str, where: str, needs: Needs, match: Callable[[Sight], Match | None]) -> ChannelLabel:
+    """The states in one other picture."""
 
     def prove(sample: Sample, models: Models) -> Iterator[str]:
-        states = channel_of(sample, name)
-        if states is not None and (states > INVALID).any():
-            yield f"expected 0 to 4; found others at {(states > INVALID).sum()} pixels"
+        known = channel_of(sample, name)
+        if known is not None and (known > INVALID).any():
+            yield f"expected 0 to 4; found others at {(known > INVALID).sum()} pixels"
 
-    return prove
+    return ChannelLabel(
+        name=name,
+        meaning=f"the seen point {where}: {MEANING}",
+        needs=needs,
+        dtype=np.uint8,
+        ids={},
+        empty=4,
+        encoding="png",
+        compute=lambda sight: states(sight, match(sight)),
+        prove=prove,
+        drawing=drawing(name),
+    )
+
+
+LABELS = (
+    _label("flow_state", "one instant later", Needs(instants=(1,)), lambda sight: sight.match(1)),
+    _label("flow_backward_state", "one instant earlier", Needs(instants=(-1,)), lambda sight: sight.match(-1)),
+    _label("disparity_state", "in the rectified sensor's picture", Needs(rectified=True), lambda sight: sight.partner_match()),
+)
