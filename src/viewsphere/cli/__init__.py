@@ -13,12 +13,19 @@ from io import TextIOWrapper
 from typing import NoReturn
 
 from viewsphere.errors import CheckFailedError, UserError, ViewsphereError
+from viewsphere.kernels.garbage import pause_collection
+
+ONE_BLAS_THREAD = ("OPENBLAS_NUM_THREADS", "1")
+"""One thread for numpy's matrix library. Other threads spin while they wait, 50 ms of CPU for each core at each start, also of
+workers. No stage of a frame multiplies large matrices, and sums keep their order on any number of cores.
+"""
 
 
 def program() -> NoReturn:
     """Run the command line as the whole of a process, which ends at once."""
     from viewsphere.run.workers.exit_at_once import exit_at_once
 
+    os.environ.setdefault(*ONE_BLAS_THREAD)
     try:
         main()
     except SystemExit as end:
@@ -30,13 +37,14 @@ def program() -> NoReturn:
 
 def main() -> None:
     """Run the command line; the user's mistakes are one line and exit status 2, never a traceback."""
-    import typer
+    with pause_collection():
+        import typer
 
-    from viewsphere.cli import completion
-    from viewsphere.cli.commands import app
-    from viewsphere.cli.options import UsageError, explain
-    from viewsphere.cli.terminal import complain, say
-    from viewsphere.run.workers.allocator import keep_freed_memory
+        from viewsphere.cli import completion
+        from viewsphere.cli.commands import app
+        from viewsphere.cli.options import UsageError, explain
+        from viewsphere.cli.terminal import complain, say
+        from viewsphere.run.workers.allocator import keep_freed_memory
 
     _print_anything()
     signal.signal(signal.SIGTERM, _stop)

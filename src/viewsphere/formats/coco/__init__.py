@@ -27,55 +27,54 @@ rotated by their EXIF tag and stored as PNG without it, unless the file's width 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewsphere.errors import UserError
-from viewsphere.formats.coco.categories import keeps_ids, notes
-from viewsphere.formats.coco.entries import Entries, Entry, files, seen
-from viewsphere.formats.coco.instances import instances
+from viewsphere.formats.coco.categories import notes
 from viewsphere.formats.coco.options import Options
-from viewsphere.formats.coco.proving import verify
-from viewsphere.formats.coco.reading import read
-from viewsphere.formats.shared.export_files import put
-from viewsphere.model.channel import missing
-from viewsphere.model.sample import Sample
-from viewsphere.plugins.format import FormatSpec
+from viewsphere.plugins.format import FormatSpec, Remark
 
 if TYPE_CHECKING:
-    from viewsphere.store import Dataset
+    from collections.abc import Collection
 
-CHANNELS = ("rgb",)
+    from viewsphere.formats.coco.entries import Entry
+    from viewsphere.model.sample import Sample
+    from viewsphere.store import Dataset
+    from viewsphere.store.foreign import ForeignDataset
+
+# Plans read no more than the options, so each function imports its code when it is called.
+
+
+def writer(
+    dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
+) -> AbstractContextManager[Callable[[Entry], None]]:
+    """Write the instances JSON of each split, and models."""
+    from viewsphere.formats.coco.writing import writer
+
+    return writer(dataset, folder, note, options)
 
 
 def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], Entry]:
     """Puts a sample's images and masks in place, and makes its entries of the instances JSON."""
-    entries = Entries(dataset, options)
+    from viewsphere.formats.coco.writing import preparer
 
-    def prepare(sample: Sample) -> Entry:
-        masks = seen(sample)
-        for _, name, content in files(dataset, sample, masks, options):
-            put(dataset, content, folder / name)
-        return entries.of(sample, masks)
-
-    return prepare
+    return preparer(dataset, folder, options)
 
 
-@contextmanager
-def writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options) -> Generator[Callable[[Entry], None]]:
-    """Write the instances JSON of each split, and models.
+def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
+    """Every fault of an export."""
+    from viewsphere.formats.coco.proving import verify
 
-    Raises UserError if the data set has no picture: channel `rgb`, or else `rgba`.
-    """
-    if missing(CHANNELS, dataset.plan.channels):
-        raise UserError(f"{dataset.root}: format coco: expected channel rgb, found none: add it to the recipe's channels")
-    for line in () if keeps_ids(dataset) else notes(dataset.categories, options):
-        note(f"note: {line}")
-    with instances(dataset, folder / "annotations", options) as append:
-        yield append
-    dataset.link_models(folder / "MODELS")
+    return verify(dataset, folder, sampled, options)
+
+
+def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+    """A COCO data set that was made elsewhere."""
+    from viewsphere.formats.coco.reading import read
+
+    return read(path, keep_going=keep_going)
 
 
 FORMAT = FormatSpec(
@@ -83,7 +82,7 @@ FORMAT = FormatSpec(
     holds=("boxes", "masks", "keypoints", "captions", "poses", "3D boxes"),
     read_by=("pycocotools", "torchvision", "datumaro", "supervision", "FiftyOne"),
     options=Options,
-    channels=CHANNELS,
+    channels=("rgb",),
     notes=notes,
     writer=writer,
     preparer=preparer,

@@ -10,20 +10,24 @@ key. If a pose has several frames, or a frame several objects, the numbers of th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from viewsphere.formats import Scope
-from viewsphere.formats.native.entries import Entry, entries_of, files
-from viewsphere.formats.native.poses import poses
-from viewsphere.formats.native.proving import verify
-from viewsphere.formats.native.reading import read
-from viewsphere.formats.shared.export_files import put
 from viewsphere.formats.shared.refusals import any_view
-from viewsphere.model.sample import Sample
-from viewsphere.plugins.format import FormatSpec
-from viewsphere.store import Dataset
+from viewsphere.plugins.format import FormatSpec, Remark
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from viewsphere.formats.native.entries import Entry
+    from viewsphere.model.sample import Sample
+    from viewsphere.store import Dataset
+    from viewsphere.store.foreign import ForeignDataset
+
+# Plans call none of these functions but `refuses`, so each imports its code when it is called.
 
 
 def refuses(scope: Scope) -> Iterator[str]:
@@ -31,23 +35,34 @@ def refuses(scope: Scope) -> Iterator[str]:
     yield from any_view(scope)
 
 
+def writer(
+    dataset: Dataset, folder: Path, note: Callable[[str], None]
+) -> AbstractContextManager[Callable[[list[Entry]], None]]:
+    """Write `dataset1.json`, and models."""
+    from viewsphere.formats.native.writing import writer
+
+    return writer(dataset, folder, note)
+
+
 def preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[Entry]]:
     """Puts a sample's picture, masks and depth in place, and makes its entries of `dataset1.json`."""
+    from viewsphere.formats.native.writing import preparer
 
-    def prepare(sample: Sample) -> list[Entry]:
-        for _, name, content in files(dataset, sample):
-            put(dataset, content, folder / name)
-        return entries_of(dataset, sample)
-
-    return prepare
+    return preparer(dataset, folder)
 
 
-@contextmanager
-def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[list[Entry]], None]]:
-    """Write `dataset1.json`, and models."""
-    with poses(dataset, folder) as append:
-        yield append
-    dataset.link_models(folder / "MODELS")
+def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
+    """Every fault of an export."""
+    from viewsphere.formats.native.proving import verify
+
+    return verify(dataset, folder, sampled)
+
+
+def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+    """A data set in the layout of the paper's own tool."""
+    from viewsphere.formats.native.reading import read
+
+    return read(path, keep_going=keep_going)
 
 
 FORMAT = FormatSpec(
