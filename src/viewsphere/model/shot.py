@@ -52,6 +52,7 @@ class Shot(Frozen):
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
     shutter: float = Field(default=0.0, ge=0, le=1)
     exposures: tuple[Exposure | None, ...] = ()  # None: nothing moves, or the instant is not recorded
+    optional: dict[str, JsonValue] = Field(default_factory=dict)  # facts by name: readers ignore names of later versions
 
     @model_validator(mode="after")
     def _as_many_poses_as_instants(self) -> Shot:
@@ -183,7 +184,7 @@ class Shot(Frozen):
             for thing in self.things
         )
         alike = {"key": "", "first": 0, "sequence": "", "tracks": None, "instants": (), "things": things, "exposures": ()}
-        return self.model_copy(update=alike).model_dump_json()
+        return self.model_copy(update=alike | {"optional": {}}).model_dump_json()
 
 
 def _held(sweep: Sweep, moment: float) -> Motion:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
+from pydantic import ConfigDict, JsonValue, PlainValidator, TypeAdapter, ValidationError
 
 from viewsphere.model.classes import SemanticClass, classes_of
 from viewsphere.model.credit import Credit
@@ -113,6 +113,7 @@ class ModelInfo:
     body_parts: tuple[str, ...] = ()
     looks: Looks | None = None
     faces: Literal["as_file"] | None = None  # see `ModelSpec.faces`
+    optional: dict[str, JsonValue] = field(default_factory=dict[str, JsonValue])  # as of a shot
 
     @property
     def node(self) -> str | None:
@@ -148,6 +149,8 @@ class ModelInfo:
             del value["materials"]
         if not self.body_parts:
             del value["body_parts"]
+        if not self.optional:
+            del value["optional"]
         for name in ("symmetries", "keypoints", "looks"):
             value[name] = value[name] and value[name].model_dump(mode="json")
         for name in ("credit", "diameter", "symmetries", "keypoints", "looks", "faces"):
@@ -194,6 +197,7 @@ class Part:
     pose_names: str | None = None
     dealt_splits: dict[str, str] = field(default_factory=dict[str, str])
     merged: bool = False
+    optional: dict[str, JsonValue] = field(default_factory=dict[str, JsonValue])  # as of a shot
     __pydantic_config__ = _STRICTLY
 
     @property
