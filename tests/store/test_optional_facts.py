@@ -5,7 +5,7 @@ import pytest
 from small import small_recipe
 from viewsphere import Dataset, generate
 from viewsphere.errors import StoreError
-from viewsphere.run.merging import merge
+from viewsphere.run.datasets.merging import merge
 from viewsphere.store.shots import folder as shots
 from viewsphere.store.shots.folder import Store
 from viewsphere.store.shots.records import ModelInfo, PlanRecord
