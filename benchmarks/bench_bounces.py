@@ -88,7 +88,7 @@ def room_shot(how: str, azimuth_deg: float, roughness: float) -> tuple[Shot, dic
     lens = Intrinsics(width=640, height=480, fx=focal, fy=focal, cx=320, cy=240)
     x, y, z, w = (tuple(row) for row in pose.tolist())
     instant = Instant(index=0, world_from_rig=(x, y, z, w), focus=(3.0, 1.0, 0.0))
-    scene = Scene(sun=Sun(azimuth_deg=azimuth_deg, elevation_deg=38, strength=40), sky=Sky(strength=3.0))
+    scene = Scene(sun=Sun(azimuth=azimuth_deg, elevation=38, strength=40), sky=Sky(strength=3.0))
     more = {"channels": ("rgb",), "engine_options": {"bounces": how}}
     return Shot(key="room", things=things, rig=Rig.of(lens), instants=(instant,), scene=scene, **more), meshes
 

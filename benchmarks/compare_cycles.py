@@ -82,7 +82,7 @@ def add_light(scene, light, centre):
     node = bpy.data.objects.new(kind, data)
     if kind == "sun":
         data.energy, data.angle = light["strength"], math.radians(light["angle_deg"])
-        a, e = math.radians(light["azimuth_deg"]), math.radians(light["elevation_deg"])
+        a, e = math.radians(light["azimuth"]), math.radians(light["elevation"])
         away = (math.cos(e) * math.sin(a), -math.cos(e) * math.cos(a), math.sin(e))
         node.matrix_world = facing(away, (0, 0, 0))
     else:

@@ -71,7 +71,7 @@ def recipe(case: Case) -> Recipe:
         scene={
             "place": {"source": case.place, "draw": "per_model"},
             "sky": {"daylight": {"turbidity": 3}},
-            "sun": {"azimuth_deg": 40, "elevation_deg": 40},
+            "sun": {"azimuth": 40, "elevation": 40},
             "view": {"exposure": case.exposure, "transform": "standard"},
             **case.scene,
         },

@@ -206,7 +206,7 @@ def recipe(kind: str, frames: int, folder: Path) -> vs.Recipe:
         "camera": {"size": [64, 48], "fov_deg": 50},
         "scene": {
             "ground": {"uniform": ["#303030", "#c0b0a0"]},
-            "sun": {"azimuth_deg": [0, 360], "elevation_deg": [20, 70]},
+            "sun": {"azimuth": [0, 360], "elevation": [20, 70]},
             "effects": {"blur": [0, 0.1], "jpeg": [0, 0.3]},
         },
         "channels": ["rgb", "depth", "instances", "normals"],

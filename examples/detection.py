@@ -77,7 +77,7 @@ def recipe(pictures: int, models: int) -> vs.Recipe:
             "camera": {"size": list(SIZE), "fov_deg": 50},
             "scene": {
                 "ground": {"color": {"choice": grounds}},
-                "sun": {"azimuth_deg": [0, 360], "elevation_deg": [20, 70]},
+                "sun": {"azimuth": [0, 360], "elevation": [20, 70]},
                 "sky": {"daylight": {"turbidity": [2, 6]}},
                 "view": {"exposure": [-0.5, 0.5]},
             },

@@ -473,7 +473,7 @@ def place(name: str, model: str, distance: tuple[float, float], elevation: float
             scene={
                 "place": f"zoo:{name}",
                 "sky": {"daylight": {"turbidity": 2.5}},
-                "sun": {"azimuth_deg": 60, "elevation_deg": 38},
+                "sun": {"azimuth": 60, "elevation": 38},
                 "view": {"exposure": exposure, "transform": "filmic"},
             },
         )
@@ -483,7 +483,7 @@ def place(name: str, model: str, distance: tuple[float, float], elevation: float
 
 def conditions() -> None:
     """Each place under four conditions: one shot a row, whose labels are the same in all."""
-    low, high = {"azimuth_deg": 60, "elevation_deg": 14}, {"azimuth_deg": 75, "elevation_deg": 42}
+    low, high = {"azimuth": 60, "elevation": 14}, {"azimuth": 75, "elevation": 42}
     day: dict[str, Any] = {"sky": {"daylight": {"turbidity": 2.5}}}
     out = {"morning": {"sun": low}, "rain": {"rain": 30}, "fog": {"fog": 60}, "night": {"sky": "night", "sun": "auto"}}
     clouds = {"sky": {"daylight": {"clouds": 1}}}
@@ -532,7 +532,7 @@ def materials() -> None:
                 models=[{"source": "zoo:chair"}],
                 viewpoints={"azimuth": 30, "elevation": 22, "distance": {"fill": 0.85}},
                 camera={"size": [320, 240], "fov_deg": 30},
-                scene={"sun": {"azimuth_deg": 100, "elevation_deg": 55}, **scene},
+                scene={"sun": {"azimuth": 100, "elevation": 55}, **scene},
             )
             picture = Image.fromarray(next(iter(render(made_of))).rgb)
             if len(tiles) % 2 == 0:

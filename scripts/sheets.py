@@ -61,8 +61,8 @@ def scenes(size: float) -> tuple[Scene, ...]:
         ),
     )
     return (
-        Scene(sun=Sun(azimuth_deg=-20), ground=CONCRETE),
-        Scene(sun=Sun(azimuth_deg=-50, elevation_deg=8), sky=Daylight(turbidity=2.5), ground=CONCRETE),
+        Scene(sun=Sun(azimuth=-20), ground=CONCRETE),
+        Scene(sun=Sun(azimuth=-50, elevation=8), sky=Daylight(turbidity=2.5), ground=CONCRETE),
         Scene(sun=Sun(), sky=Daylight(clouds=1.0), ground=CONCRETE),
         Scene(sun=None, sky=dark, lights=lamps, ground=CONCRETE),
     )
@@ -74,7 +74,7 @@ def extra_scenes(hdri: Path | None, photo: Path | None) -> Iterator[Scene]:
         yield Scene(sun=None, sky=Environment(file=str(hdri.resolve())), ground=CONCRETE)
     if photo:
         finish = Finish(background=Background(image=str(photo.resolve())))
-        yield Scene(sun=Sun(azimuth_deg=-20), ground=Ground(catcher=True), finish=finish)
+        yield Scene(sun=Sun(azimuth=-20), ground=Ground(catcher=True), finish=finish)
 
 
 def models(files: Sequence[Path], families: Sequence[str]) -> Iterator[tuple[str, Mesh]]:

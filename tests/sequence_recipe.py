@@ -41,7 +41,7 @@ def eventful_recipe(frames: int = 100, **changes) -> Recipe:
         "tracks": {"count": 12, "on": "all", "at": [0, frames // 4, frames // 2, frames - 1]},
         "scene": {
             "ground": True,
-            "sun": {"azimuth_deg": {"uniform": [0, 360]}, "elevation_deg": {"uniform": [30, 60]}},
+            "sun": {"azimuth": {"uniform": [0, 360]}, "elevation": {"uniform": [30, 60]}},
             "company": {"count": 1, "draw": "per_sequence",
                         "motion": {"kind": "random", "position": [0.2, 0.2, 0], "rotation_deg": [0, 0, 30], "highest_hz": 1}},
         },

@@ -17,7 +17,7 @@ def test_every_shot_is_planned_under_every_condition():
     assert [subject.rpartition("-")[2] for subject in planned.taken] == NAMES
     assert planned.frames == 6 and planned.factors.endswith("x 6 variations") and not planned.warnings
     scenes = {name: planned._under[name].scene(planned.subjects[0], "") for name in NAMES}
-    assert 5 < scenes["morning"].sun.elevation_deg < 25 and scenes["night"].lamps
+    assert 5 < scenes["morning"].sun.elevation < 25 and scenes["night"].lamps
     assert scenes["fog"].fog.visibility == 80 and scenes["rain"].wet
     assert scenes["rain"].rain.seed != scenes["snow"].snow.seed  # what a variation sets, it draws on its own
     assert scenes["overcast"].weather is False

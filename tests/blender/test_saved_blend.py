@@ -198,7 +198,7 @@ def test_a_scene_a_file_without_sources_without_background(blender, tmp_path):
     import trimesh
 
     trimesh.creation.icosphere(1, 0.4).export(tmp_path / "ball.glb")
-    sun = {"azimuth_deg": {"uniform": [0, 360]}}
+    sun = {"azimuth": {"uniform": [0, 360]}}
     recipe = recipe_of(
         models=[{"source": str(tmp_path / "ball.glb"), "category": "ball"}],
         scene={"draw": "per_frame", "sun": sun, "background": "transparent", "ground": False},

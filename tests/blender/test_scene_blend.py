@@ -156,7 +156,7 @@ def met_by_cycles(recipe):
 def test_places_turns_and_units_of_a_file_do_not_matter(made):
     """The same street in feet, elsewhere and turned, gives the same pictures and labels around its spot."""
     engine = ENGINE | {"samples": 16}
-    lamps = [{"kind": "point", "at": {"azimuth_deg": 20, "elevation_deg": 40, "distance": 2}, "strength": 4}]
+    lamps = [{"kind": "point", "at": {"azimuth": 20, "elevation": 40, "distance": 2}, "strength": 4}]
     pairs = zip(
         render(street(made, engine=engine, scene={"lights": lamps})),
         render(street(made, "feet", engine=engine, scene={"lights": lamps})),

@@ -28,7 +28,7 @@ from viewsphere.store.shots.manifest import sealed, unsealed
 
 RECIPE = {
     "channels": ["rgb", "depth", "instances", "semantic"],
-    "scene": {"ground": True, "sun": {"azimuth_deg": [0, 360]}},
+    "scene": {"ground": True, "sun": {"azimuth": [0, 360]}},
     "annotations": ["keypoints"],
     "formats": [],
     "splits": {"train": 0.5, "val": 0.5},

@@ -115,7 +115,7 @@ def test_jitter_comes_on_top_and_its_distance_is_a_factor():
     turned = recipe_of(
         ("zoo:chair",),
         viewpoints=still.viewpoints,
-        scene={"ground": "off", "jitter": {"azimuth_deg": [5, 40], "elevation_deg": 12}},
+        scene={"ground": "off", "jitter": {"azimuth": [5, 40], "elevation": 12}},
     )
     farther = recipe_of(("zoo:chair",), viewpoints=still.viewpoints, scene={"ground": "off", "jitter": {"distance": 0.5}})
     assert [label_fill(sample) for sample in vs.render(turned)] == pytest.approx([0.5, 0.5], rel=1e-8)

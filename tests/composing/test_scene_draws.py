@@ -83,7 +83,7 @@ def test_a_recipe_without_a_word_on_its_scene_has_the_default_one():
 CONCRETE = [
     ({"sun": "off"}, {"sun": None}),
     ({"sun": "on"}, {"sun": Sun()}),
-    ({"sun": {"azimuth_deg": 10, "strength": 2, "color": "white"}}, {"sun": Sun(azimuth_deg=10, strength=2, color=(1, 1, 1))}),
+    ({"sun": {"azimuth": 10, "strength": 2, "color": "white"}}, {"sun": Sun(azimuth=10, strength=2, color=(1, 1, 1))}),
     ({"sky": {"zenith": [1, 2, 3]}}, {"sky": Sky(zenith=(1, 2, 3))}),
     ({"sky": "daylight"}, {"sky": Daylight()}),
     ({"sky": {"daylight": {"clouds": 1}}}, {"sky": Daylight(clouds=1)}),
@@ -157,7 +157,7 @@ def test_a_wrong_exposure_is_told_once(exposure, said):
 
 
 def test_lamps_stand_where_cameras_of_their_angles_would():
-    at = {"azimuth_deg": 90, "elevation_deg": 30, "distance": 2}
+    at = {"azimuth": 90, "elevation": 30, "distance": 2}
     (lamp,) = scene_of({"lights": {"at": at, "strength": 1}}).lights
     assert lamp.position == pytest.approx((2 * math.cos(math.radians(30)), 0, 1))
 
@@ -165,9 +165,9 @@ def test_lamps_stand_where_cameras_of_their_angles_would():
 def test_a_sun_by_date_time_and_place_stands_in_its_part_of_the_world():
     where = {"date": "2024-06-20", "latitude": 51.5, "longitude": 0}
     noon = scene_of({"sun": {**where, "time": "14:02+02:00", "strength": 5}}).sun
-    assert noon.azimuth_deg == pytest.approx(360, abs=0.5)  # in the south, -Y
-    assert (noon.elevation_deg, noon.strength) == (pytest.approx(61.94, abs=0.05), 5)
-    assert 60 < scene_of({"sun": {**where, "time": "07:00Z"}}).sun.azimuth_deg < 120  # in the east, +X
+    assert noon.azimuth == pytest.approx(360, abs=0.5)  # in the south, -Y
+    assert (noon.elevation, noon.strength) == (pytest.approx(61.94, abs=0.05), 5)
+    assert 60 < scene_of({"sun": {**where, "time": "07:00Z"}}).sun.azimuth < 120  # in the east, +X
     night = planned({"sun": {**where, "time": "23:00Z"}})
     assert night.shot(0, box_of).scene.sun is None
     assert any("below the horizon" in warning for warning in night.warnings)
@@ -229,7 +229,7 @@ def test_a_large_picture_is_no_reason_for_a_warning(tmp_path, recwarn):
 
 
 RANDOM = {
-    "sun": {"azimuth_deg": [0, 360], "elevation_deg": {"normal": [40, 20]}, "color": {"uniform": [[0.8, 0.8, 0.8], [1, 1, 1]]}},
+    "sun": {"azimuth": [0, 360], "elevation": {"normal": [40, 20]}, "color": {"uniform": [[0.8, 0.8, 0.8], [1, 1, 1]]}},
     "sky": {"strength": {"log_uniform": [0.5, 2]}},
     "lights": [{"position": [[-2, 2], [-2, 2], 3], "strength": [1, 2], "count": {"uniform": [1, 3]}}],
     "ground": {"color": {"uniform": ["#333333", "#dddddd"]}, "roughness": [0.2, 1]},
@@ -271,8 +271,8 @@ def test_more_models_poses_and_fields_change_nobody_else_s_draw():
     lights = [{**RANDOM["lights"][0], "color": {"choice": ["red", "blue"]}}, {"kind": "hemisphere", "strength": [0, 1]}]
     other = scenes(scene={**RANDOM, "sun": sun, "lights": lights, "materials": [{"roughness": [0, 1]}]})
     for key, scene in few.items():
-        assert other[key].sun.azimuth_deg == scene.sun.azimuth_deg
-        assert other[key].sun.elevation_deg == scene.sun.elevation_deg
+        assert other[key].sun.azimuth == scene.sun.azimuth
+        assert other[key].sun.elevation == scene.sun.elevation
         assert other[key].ground == scene.ground
         assert [lamp.position for lamp in other[key].lights[:-1]] == [lamp.position for lamp in scene.lights]
 
@@ -286,8 +286,8 @@ def test_each_of_several_lamps_is_drawn_by_itself():
 
 @pytest.mark.slow
 def test_statistics_of_a_field_over_models():
-    found = planned({"sun": {"elevation_deg": [10, 70]}}, models=[{"source": "zoo:car", "count": 1000}])
-    heights = np.array([found.shot(i, box_of).scene.sun.elevation_deg for i in range(found.shot_count)])
+    found = planned({"sun": {"elevation": [10, 70]}}, models=[{"source": "zoo:car", "count": 1000}])
+    heights = np.array([found.shot(i, box_of).scene.sun.elevation for i in range(found.shot_count)])
     assert 10 <= heights.min() < 11
     assert 69 < heights.max() <= 70
     assert abs(heights.mean() - 40) < 4 * 60 / math.sqrt(12 * 1000)
@@ -363,9 +363,7 @@ def test_company_is_painted_too_and_looks_alike_beside_others():
 
 
 def test_jitter_moves_every_pose_a_little_and_keeps_its_index_and_name():
-    scene = {
-        "jitter": {"azimuth_deg": {"normal": [0, 3]}, "elevation_deg": [-5, 5], "distance": [-0.1, 0.1], "tilt_deg": [-2, 2]}
-    }
+    scene = {"jitter": {"azimuth": {"normal": [0, 3]}, "elevation": [-5, 5], "distance": [-0.1, 0.1], "tilt": [-2, 2]}}
     frames = [f for s in planned(scene).shots(box_of) for f in s.instants]
     nominal = [f for s in planned({}).shots(box_of) for f in s.instants]
     assert [(f.index, f.viewpoint.index, f.split) for f in frames] == [(f.index, f.viewpoint.index, f.split) for f in nominal]
@@ -382,9 +380,9 @@ def test_jitter_moves_every_pose_a_little_and_keeps_its_index_and_name():
 
 
 def test_jitter_names_the_side_that_the_camera_truly_sees_and_stops_at_the_pole():
-    (frame, *_) = planned({"jitter": {"azimuth_deg": 30, "elevation_deg": 80}}).shot(0, box_of).instants
+    (frame, *_) = planned({"jitter": {"azimuth": 30, "elevation": 80}}).shot(0, box_of).instants
     assert (frame.viewpoint.azimuth_deg, frame.viewpoint.elevation_deg, frame.viewpoint.category) == (30, 90, "top")
-    (frame, *_) = planned({"jitter": {"azimuth_deg": 30}}).shot(0, box_of).instants
+    (frame, *_) = planned({"jitter": {"azimuth": 30}}).shot(0, box_of).instants
     assert frame.viewpoint.category == "front-left"
 
 

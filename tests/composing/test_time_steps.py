@@ -100,7 +100,7 @@ def test_models_of_other_time_steps_and_none_stand_side_by_side():
 
 
 def test_all_time_steps_of_a_model_share_a_split_a_scene_and_a_camera():
-    scene = {"sun": {"azimuth_deg": {"uniform": [0, 360]}}, "jitter": {"azimuth_deg": {"uniform": [-5, 5]}}}
+    scene = {"sun": {"azimuth": {"uniform": [0, 360]}}, "jitter": {"azimuth": {"uniform": [-5, 5]}}}
     for by in ("model", "pose"):
         splits = {"train": 0.5, "val": 0.5, "by": by}
         planned = plan(recipe(walker(), {"source": "run.fbx", "category": "x", "frames": "all"}, scene=scene, splits=splits))
@@ -110,7 +110,7 @@ def test_all_time_steps_of_a_model_share_a_split_a_scene_and_a_camera():
             groups.setdefault((track, number % 3), set()).add((frame.split, frame.viewpoint.azimuth_deg))
         assert all(len(found) == 1 for found in groups.values())
         assert sum(planned.split_counts.values()) == planned.frames == 3 * (4 + 24)
-    suns = {(s.things[0].model.key, s.scene.sun.azimuth_deg) for s in planned.shots(box_of)}
+    suns = {(s.things[0].model.key, s.scene.sun.azimuth) for s in planned.shots(box_of)}
     assert len(suns) == 2
 
 

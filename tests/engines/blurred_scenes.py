@@ -102,7 +102,7 @@ def panning_camera(pixels: float):
 
 def shot_of(both, view, focus, moves=True):
     things, sweeps = zip(*both, strict=True)
-    scene = Scene(ground=Ground(), sun=Sun(azimuth_deg=-40, elevation_deg=42, angle_deg=0.6), floor=0.0)
+    scene = Scene(ground=Ground(), sun=Sun(azimuth=-40, elevation=42, angle_deg=0.6), floor=0.0)
     exposed = {"shutter": SHUTTER, "exposures": (Exposure(things=sweeps),)} if moves else {}
     return still_shot(things, LENS, [view], focus, scene=scene, finish=FINISH, sequence="s", **exposed)
 

@@ -118,7 +118,7 @@ def test_a_closed_box_that_glows_faintly_beside_a_sunlit_wall():
     low, high, apart = (-1.0, -0.8, -0.6), (1.0, 0.8, 0.6), np.array([2.5, 0, 0])
     dim, white = matt(0.8, 0.01), matt(0.8)
     mesh = painted_mesh((inside_out(box(low, high)), dim), (box(low + apart, high + apart), white))
-    stage = stage_of(mesh, Scene(sun=Sun(azimuth_deg=0, elevation_deg=40), sky=DARK))
+    stage = stage_of(mesh, Scene(sun=Sun(azimuth=0, elevation=40), sky=DARK))
     places, normals = walls(low, high)
     light = probed(stage, places.reshape(-1, 3), normals.reshape(-1, 3))
     np.testing.assert_allclose(light, 0.05, rtol=0.02)
@@ -127,7 +127,7 @@ def test_a_closed_box_that_glows_faintly_beside_a_sunlit_wall():
 def test_further_bounces_are_foretold_where_two_walls_take_turns(monkeypatch):
     """A sunlit wall and a shaded one: of each patch, light is what it is when all bounces are followed."""
     walls = (box((-1, -1, 0), (1, 1, 1)), matt(0.6)), (box((1.5, -1, 0), (2.5, 1, 2)), matt(0.9))
-    stages = [stage_of(painted_mesh(*walls), Scene(sun=Sun(azimuth_deg=20, elevation_deg=40), sky=EVEN)) for _ in range(2)]
+    stages = [stage_of(painted_mesh(*walls), Scene(sun=Sun(azimuth=20, elevation=40), sky=EVEN)) for _ in range(2)]
     foretold = stages[0].baked(0).bounces.sent.light
     baking._bake.cache_clear()
     monkeypatch.setattr(baking, "UNCHANGED", -1.0)
@@ -324,7 +324,7 @@ def test_a_dark_room_beside_a_lit_one_stays_dark(window, monkeypatch):
     """A partition of 10 cm, less than half of what lies between probes; without a window a lamp stands in the first room."""
     monkeypatch.setattr(lightmaps, "CELL", 0.1)
     lamp = PointLight(position=(-2.6, 0.4, 0.6), strength=1.0)  # from the small thing's middle
-    sun = Sun(azimuth_deg=-10, elevation_deg=40, strength=5.0) if window else None
+    sun = Sun(azimuth=-10, elevation=40, strength=5.0) if window else None
     small = mesh_of(box((3.1, 1.0, 0.5), (3.3, 1.2, 0.7)), matt(0.5))
     scene = Scene(sun=sun, sky=EVEN if window else DARK, lights=() if window else (lamp,))
     stage = stage_of(small, scene, room(0.7, window, partition=True))
@@ -341,7 +341,7 @@ def test_a_dark_room_beside_a_lit_one_stays_dark(window, monkeypatch):
 def test_the_same_bytes_whatever_was_baked_before():
     """Also with another target, which is not part of a place's light."""
     view = camera(60, 45, 40, 20, 20, 1.6, (1.5, 1.5, 1.0))
-    scene = Scene(sun=Sun(azimuth_deg=-10, elevation_deg=40), sky=EVEN, finish=OUT)
+    scene = Scene(sun=Sun(azimuth=-10, elevation=40), sky=EVEN, finish=OUT)
     place = room(0.6)
     first, second = (mesh_of(box((1, 1, 0), (1.5, 1.5, h)), matt(0.5)) for h in (0.4, 0.8))
     once = painted(stage_of(first, scene, place), view)
@@ -431,7 +431,7 @@ def test_workers_of_a_place_find_these_kernels_compiled():
 
 def test_a_green_ball_colours_the_ground_and_its_neighbour():
     green = replace(ball(0.4, (0, 0, 0.4)), materials=(replace(matt(0.5), base_color=(0.05, 0.6, 0.05, 1.0)),))
-    scene = Scene(sun=Sun(azimuth_deg=0, elevation_deg=50), sky=EVEN, ground=Ground(), finish=OUT)
+    scene = Scene(sun=Sun(azimuth=0, elevation=50), sky=EVEN, ground=Ground(), finish=OUT)
     view = camera(80, 60, 90, 0, 35, 2.0, (0, 0, 0.2))
     plain, bounced = (painted(stage_of(green, scene, bounces=b), view).astype(float) for b in ("off", "on"))
     floor = plain[..., 1] < 1.2 * plain[..., 0]

@@ -232,8 +232,8 @@ def card(folder, side=1.0):
 
 BLACK = {"zenith": [0, 0, 0], "horizon": [0, 0, 0]}
 LIGHTS = {
-    "sun": {"sun": {"azimuth_deg": 10, "elevation_deg": 35, "strength": 2.0}, "sky": BLACK},
-    "wide sun": {"sun": {"azimuth_deg": 10, "elevation_deg": 35, "strength": 2.0, "angle_deg": 20}, "sky": BLACK},
+    "sun": {"sun": {"azimuth": 10, "elevation": 35, "strength": 2.0}, "sky": BLACK},
+    "wide sun": {"sun": {"azimuth": 10, "elevation": 35, "strength": 2.0, "angle_deg": 20}, "sky": BLACK},
     "sky": {"sun": "off"},
     "daylight": {"sky": "daylight"},
     "point": {"sun": "off", "sky": BLACK, "lights": [{"kind": "point", "position": [1, -3, 1], "strength": 12.0}]},
@@ -275,7 +275,7 @@ def test_a_catcher_shows_the_shadow_over_what_is_there(background, tmp_path):
         Image.fromarray(np.full((60, 60, 3), (180, 150, 90), np.uint8)).save(tmp_path / "photo.png")
     photo = str(tmp_path / "photo.png")
     seen = {"colour": {"color": [0.7, 0.6, 0.35]}, "photo": {"image": photo}}.get(background)
-    scene = {"ground": "catcher", "sun": {"azimuth_deg": 60, "elevation_deg": 35, "strength": 4.0}}
+    scene = {"ground": "catcher", "sun": {"azimuth": 60, "elevation": 35, "strength": 4.0}}
     given = {
         "models": [card(tmp_path)],
         "viewpoints": {"azimuth": [0], "elevation": [35], "distance": 6.0},

@@ -98,7 +98,7 @@ def test_the_ground_and_the_sky_are_where_rasters_are(engine):
     assert np.ptp(raster[..., 3]) == 255
     assert np.abs(drawn[..., 3].astype(float) - raster[..., 3]).mean() < 3
     for sky in ("gradient", "daylight"):
-        scene = {} if sky == "gradient" else {"sky": "daylight", "sun": {"azimuth_deg": 170, "elevation_deg": 30}}
+        scene = {} if sky == "gradient" else {"sky": "daylight", "sun": {"azimuth": 170, "elevation": 30}}
         (drawn,), (raster,) = (pictures(engine=e, scene=scene, **given) for e in (engine, RASTER))
         is_sky = np.arange(96) < 10
         assert np.abs(drawn[is_sky].astype(float) - raster[is_sky]).mean() < 4
@@ -124,7 +124,7 @@ def model_of(path):
 BLACK = {"zenith": [0, 0, 0], "horizon": [0, 0, 0]}
 LAMPS_ALONE = {"sun": "off", "sky": BLACK}
 LIGHTS = {
-    "sun": {"sun": {"azimuth_deg": 10, "elevation_deg": 35, "strength": 2.0}, "sky": BLACK},
+    "sun": {"sun": {"azimuth": 10, "elevation": 35, "strength": 2.0}, "sky": BLACK},
     "sky": {"sun": "off"},
     "daylight": {"sky": "daylight"},
     "lamps": LAMPS_ALONE
@@ -175,7 +175,7 @@ def test_objects_are_as_bright_as_cycles_and_shadows_lie_where_they_do(card):
         "models": [model_of(card)],
         "viewpoints": {"azimuth": [0], "elevation": [35], "distance": 6.0},
         "camera": {"size": [64, 64], "fov_deg": 35},
-        "scene": {"ground": "on", "sun": {"azimuth_deg": 60, "elevation_deg": 35, "strength": 4.0}},
+        "scene": {"ground": "on", "sun": {"azimuth": 60, "elevation": 35, "strength": 4.0}},
         "channels": ["rgb", "instances"],
     }
     traced, *drawn = (next(iter(render(recipe_of(engine, **given)))) for engine in (CYCLES, SHADOWED, WORKBENCH))

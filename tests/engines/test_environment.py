@@ -179,7 +179,7 @@ def test_photographed_sun_turns_with_its_sky(tmp_path):
 
 def test_ground_shines_with_what_it_receives():
     white = Sky(zenith=(1, 1, 1), horizon=(1, 1, 1))
-    (sun,) = sky_lights(white, Sun(elevation_deg=30, strength=math.pi, color=(1, 1, 1)), True)
+    (sun,) = sky_lights(white, Sun(elevation=30, strength=math.pi, color=(1, 1, 1)), True)
     surrounding = bake_surrounding(white, Sun(), np.array([0.5, 0.2, 0.1]), (sun,))
     assert surrounding.up == pytest.approx(1, abs=0.01)
     assert surrounding.below == pytest.approx(1.5 * np.array([0.5, 0.2, 0.1]), rel=0.01)
@@ -318,7 +318,7 @@ def test_background_of_rays_without_direction_of_covered_pixels_and_of_samples()
 
 
 def test_sun_stands_in_daylight():
-    sun = Sun(azimuth_deg=90, elevation_deg=20, angle_deg=3)
+    sun = Sun(azimuth=90, elevation=20, angle_deg=3)
     surrounding = bake_surrounding(Daylight(), sun, None)
     at = np.array([math.cos(math.radians(20)), 0, math.sin(math.radians(20))])  # azimuth 90: towards +X
     found = background(look(101, 101, 400.0, tuple(at)), surrounding, 101, 101)[..., 1]

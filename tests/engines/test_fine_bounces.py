@@ -76,7 +76,7 @@ def test_near_light_does_not_depend_on_what_was_painted_before():
     view = camera(40, 40, 40, 90, 10, 1.5, (0.0, 0.5, 0.0))
 
     def found(target):
-        return near_of(stage_of(target, Scene(sun=Sun(azimuth_deg=30, elevation_deg=40)), pebbles, bounces="fine"), view)
+        return near_of(stage_of(target, Scene(sun=Sun(azimuth=30, elevation=40)), pebbles, bounces="fine"), view)
 
     bounces._look.cache_clear()
     bounces._bake.cache_clear()

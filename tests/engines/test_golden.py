@@ -50,7 +50,7 @@ SCENES = {
         (-60, 20, 2.6),
         FISHEYE,
         Scene(
-            sun=Sun(azimuth_deg=200, elevation_deg=25),
+            sun=Sun(azimuth=200, elevation=25),
             sky=Daylight(turbidity=4, clouds=0.2),
             ground=Ground(color=(0.5, 0.45, 0.4), roughness=0.5),
             finish=Finish(view=ViewTransform(transform="agx", exposure=0.3)),

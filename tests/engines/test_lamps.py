@@ -111,7 +111,7 @@ def test_the_moon_stands_for_the_sun_at_night():
 
 
 @pytest.mark.parametrize(
-    "sun", [{"elevation_deg": 50.0}, {"date": "2026-06-21", "time": "12:00Z", "latitude": 48, "longitude": 11}]
+    "sun", [{"elevation": 50.0}, {"date": "2026-06-21", "time": "12:00Z", "latitude": 48, "longitude": 11}]
 )
 def test_no_sun_stands_above_the_horizon_at_night(sun):
     with pytest.raises(RecipeError, match=r"scene\.sun: expected auto, off, or a date and time of the night beside sky: night"):

@@ -172,7 +172,7 @@ def test_the_same_bytes_where_a_place_is_lit_anew_beside_another_target(monkeypa
         mesh_of(box((1, 1, 0), (1.5, 1.5, 0.4)), matt(0.5)),
         mesh_of(np.tile(box((1, 1, 0), (1.5, 1.5, 0.8)), (3, 1, 1))),
     )
-    lit, other = (Scene(sun=Sun(azimuth_deg=turn, elevation_deg=40), sky=EVEN) for turn in (-10, 5))
+    lit, other = (Scene(sun=Sun(azimuth=turn, elevation=40), sky=EVEN) for turn in (-10, 5))
     once = painted(stage_of(few, lit, place), view)
     forget = baking._bake.cache_clear, baking._look.cache_clear
     for f in forget:

@@ -53,7 +53,7 @@ def test_no_sky_is_purple(turbidity):
 def test_level_ground_is_seen_all_day(turbidity, clouds):
     sky, noon = Daylight(turbidity=turbidity, clouds=clouds), None
     for elevation in (60, 40, 20, 10, 5):
-        sun = Sun(elevation_deg=elevation)
+        sun = Sun(elevation=elevation)
         lights = sky_lights(sky, sun, True)
         up = bake_surrounding(sky, sun, np.full(3, 0.2), lights).up.mean()
         up += sum(np.mean(d.irradiance) * d.direction[2] / math.pi for d in lights)
@@ -64,7 +64,7 @@ def test_level_ground_is_seen_all_day(turbidity, clouds):
 
 def test_lens_opens_for_sun_and_sky_alike_and_not_for_strength():
     for elevation in (70, 30, 6):
-        sky, sun = Daylight(turbidity=2.5), Sun(elevation_deg=elevation)
+        sky, sun = Daylight(turbidity=2.5), Sun(elevation=elevation)
         factor = opening(elevation, sky)
         (light,) = sky_lights(sky, sun, False)
         expected = factor * air(elevation, sky) * sun.strength * np.array(sun.color)
@@ -80,7 +80,7 @@ def test_lens_opens_for_sun_and_sky_alike_and_not_for_strength():
 @pytest.mark.parametrize("shade", [0.95, 0.5, 0.1])
 def test_no_dark_line_where_ground_and_sky_meet(sky, shade):
     """Down a column without an object: between the sky's level and the ground's, never darker than both."""
-    scene = Scene(sun=Sun(azimuth_deg=30), sky=sky, ground=Ground(pattern="plain", color=(shade, shade, shade)))
+    scene = Scene(sun=Sun(azimuth=30), sky=sky, ground=Ground(pattern="plain", color=(shade, shade, shade)))
     found = picture(flat(cuboid((-0.4, -0.4, -0.2), (0.4, 0.4, 0.2))), scene, 8, 100, 200)[:, :10].mean(axis=(1, 2))
     horizon = int(100 - 160 * math.tan(math.radians(8)))
     above, ground = found[:horizon], found[-30:].mean()

@@ -81,7 +81,7 @@ def drive(count: int) -> Shot:
     own = Thing(id=1, model=spec, motion=Motion(poses=tuple(where(t) for t in range(count))))
     other, _ = thing(2, "other", [IDENTITY])
     views = [Viewpoint(index=i, azimuth_deg=20 + 2 * i, elevation_deg=20, distance=5) for i in range(count)]
-    scene = Scene(ground=Ground(), sun=Sun(azimuth_deg=60, elevation_deg=40), floor=-1.0)
+    scene = Scene(ground=Ground(), sun=Sun(azimuth=60, elevation=40), floor=-1.0)
     shot = still_shot([own, other], SMALL, views, (0, 0, 0.5), scene=scene, sequence="s")
     moments = tuple((nodes * shutter).tolist())
     exposures = []

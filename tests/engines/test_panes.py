@@ -70,7 +70,7 @@ def light(parts, scene: Scene, how: str = "on", panes: bool = True):
 
 
 def sun(azimuth: float = 20.0) -> Sun:
-    return Sun(azimuth_deg=azimuth, elevation_deg=35, strength=1.0, angle_deg=0.0)
+    return Sun(azimuth=azimuth, elevation=35, strength=1.0, angle_deg=0.0)
 
 
 def plate(roughness: float = 0.02):

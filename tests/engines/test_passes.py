@@ -29,7 +29,7 @@ from viewsphere.truth.raster.visibility import rasterize
 
 ALL = (*LIGHT_PASSES, *MATERIAL_PASSES)
 COLOR = np.array([0.8, 0.5, 0.3])
-SUN = Sun(azimuth_deg=60, elevation_deg=40, strength=2.0, color=(1.0, 0.7, 0.4), angle_deg=0.0)
+SUN = Sun(azimuth=60, elevation=40, strength=2.0, color=(1.0, 0.7, 0.4), angle_deg=0.0)
 
 
 def passes(stage, view, names=ALL, finish=None):

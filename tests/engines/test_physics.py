@@ -78,7 +78,7 @@ def places(view: Camera, z: float) -> np.ndarray:
 
 
 def toward_sun(sun: Sun) -> np.ndarray:
-    return orbit_center(math.radians(sun.azimuth_deg), math.radians(sun.elevation_deg), 1.0)
+    return orbit_center(math.radians(sun.azimuth), math.radians(sun.elevation), 1.0)
 
 
 def sky_file(path, pixels: np.ndarray) -> Environment:
@@ -154,7 +154,7 @@ def test_white_furnace_of_a_car(even, material):
 @pytest.mark.parametrize("elevation", [5, 20, 45, 70, 90])
 @pytest.mark.parametrize("what", ["ground", "mesh"])
 def test_lambert(elevation, what):
-    sun = Sun(azimuth_deg=70, elevation_deg=elevation, strength=2.0, color=(1.0, 0.7, 0.4), angle_deg=0.5)
+    sun = Sun(azimuth=70, elevation=elevation, strength=2.0, color=(1.0, 0.7, 0.4), angle_deg=0.5)
     color = (0.8, 0.5, 0.3)
     expected = np.array(color) * np.array(sun.color) * sun.strength * math.sin(math.radians(elevation)) / math.pi
     if what == "ground":
@@ -195,7 +195,7 @@ def lost_light(normal_view, alpha, n=500):
 @pytest.mark.parametrize(("elevation", "azimuth"), [(60, 180), (60, 120), (35, 180), (80, 10)])
 def test_ggx_highlight_of_a_metal_plate(even, rough, elevation, azimuth):
     """Every pixel of a plate seen at 45 degrees; light that bounces twice between facets counts as Turquin 2019 has it."""
-    sun = Sun(azimuth_deg=azimuth, elevation_deg=elevation, strength=1.0, color=(1, 1, 1), angle_deg=0)
+    sun = Sun(azimuth=azimuth, elevation=elevation, strength=1.0, color=(1, 1, 1), angle_deg=0)
     color = np.array([0.95, 0.6, 0.25])
     plate = flat(quad((-4, -4, 0), (8, 0, 0), (0, 8, 0)), Material(base_color=(*color, 1.0), metallic=1.0, roughness=rough))
     view = camera(24, 24, 30, 0, 45, 4)
@@ -251,7 +251,7 @@ def test_a_mirror_ball_shows_the_sky_where_the_reflected_ray_goes(directions, tu
 @pytest.mark.parametrize(("azimuth", "elevation"), [(0, 30), (40, 50), (135, 20), (250, 70)])
 def test_shadow_of_a_pole(azimuth, elevation):
     """From above: the shadow is the strip from the pole's foot, as long as its height over the sun's tangent."""
-    sun = Sun(azimuth_deg=azimuth, elevation_deg=elevation, angle_deg=0.0)
+    sun = Sun(azimuth=azimuth, elevation=elevation, angle_deg=0.0)
     pole = flat(cuboid((-0.03, -0.03, 0), (0.03, 0.03, 1)))
     reach = 1 / math.tan(math.radians(elevation))
     away = -toward_sun(sun)[:2] / np.linalg.norm(toward_sun(sun)[:2])
@@ -300,7 +300,7 @@ def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevatio
     mesh = build(kind, np.random.default_rng(2))
     mesh = flat(mesh.vertices[mesh.triangles], Material(roughness=1.0))  # facets: lit as their rays are
     size = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
-    sun = Sun(azimuth_deg=azimuth, elevation_deg=elevation, angle_deg=0.53)
+    sun = Sun(azimuth=azimuth, elevation=elevation, angle_deg=0.53)
     view = camera(320, 240, 300, azimuth - 60, 28, 1.5 * size, mesh.bounds.mean(axis=0))
     stage = stage_of(
         [mesh], Scene(sun=sun, sky=DARK, ground=Ground(pattern="plain", color=(0.05, 0.05, 0.05)))
@@ -438,13 +438,13 @@ def test_a_catcher_darkens_as_the_ground_does(lit):
     even = Sky(zenith=(0.5, 0.5, 0.5), horizon=(0.5, 0.5, 0.5))
     scene = {
         "sun": Scene(sun=Sun(color=(1, 1, 1), angle_deg=3.0), sky=even),
-        "low sun": Scene(sun=Sun(color=(1, 1, 1), elevation_deg=20), sky=even),
+        "low sun": Scene(sun=Sun(color=(1, 1, 1), elevation=20), sky=even),
         "sky": Scene(sun=None, sky=even),
     }[lit]
     view = camera(120, 90, 250, 20, 40, 4, (0, 0, 0.3))
     ground = Ground(pattern="plain", color=(0.5, 0.5, 0.5))
     plain = picture(box, scene.model_copy(update={"ground": ground, "finish": Finish(view=AS_IT_IS)}), view)
-    irradiance = scene.sun.strength * math.sin(math.radians(scene.sun.elevation_deg)) if scene.sun else 0.0
+    irradiance = scene.sun.strength * math.sin(math.radians(scene.sun.elevation)) if scene.sun else 0.0
     colour = encoded(linear(np.full(3, 0.5)) * (0.5 + irradiance / math.pi))
     over = Finish(view=AS_IT_IS, background=Background(color=tuple(colour.tolist())))
     caught_scene = scene.model_copy(update={"ground": ground.model_copy(update={"catcher": True}), "finish": over})

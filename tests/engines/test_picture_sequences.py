@@ -19,7 +19,7 @@ from viewsphere.truth.raster.visibility import rasterize
 
 COUNT = 5
 LENS = Intrinsics(width=128, height=96, fx=120, fy=120, cx=64, cy=48)
-SUN = Sun(azimuth_deg=60, elevation_deg=40, angle_deg=1.0)
+SUN = Sun(azimuth=60, elevation=40, angle_deg=1.0)
 GLASS = Material("glass", (0.2, 0.8, 0.3, 0.4), alpha_mode="BLEND")
 MESHES = {
     "tall": mesh_of(box((-0.3, -0.3, -0.5), (0.3, 0.3, 0.5))),
@@ -162,7 +162,7 @@ def test_what_is_in_no_picture_has_no_rows_but_casts_shadows():
     """A wall behind the camera, which shades the ground before it, beside one that is looked at."""
     behind = Motion.still(((1, 0, 0, 0.0), (0, 1, 0, -8.0), (0, 0, 3, 1.0), (0, 0, 0, 1)))
     shot = sequence_of("sun", has_scenery=True)
-    low = SUN.model_copy(update={"azimuth_deg": 0.0, "elevation_deg": 20.0})
+    low = SUN.model_copy(update={"azimuth": 0.0, "elevation": 20.0})
     scene = shot.scene.model_copy(update={"sun": low})
     shot = shot.model_copy(update={"things": (*shot.things, thing(0, "wall", behind, scenery=True)), "scene": scene})
     stage = stage_of(shot)

@@ -183,7 +183,7 @@ def test_unlit_factor_and_vertex_colour_are_exact():
 def test_lambert_plane(sun_elevation):
     """A white rough plane from above: irradiance times cosine over pi."""
     mesh = mesh_of(rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0)), Material(roughness=1.0, ior=1.0))
-    sun = Sun(azimuth_deg=200, elevation_deg=sun_elevation, strength=2.0, color=(1.0, 0.5, 0.25))
+    sun = Sun(azimuth=200, elevation=sun_elevation, strength=2.0, color=(1.0, 0.5, 0.25))
     seen = picture(mesh, Scene(sun=sun, sky=DARK, finish=Finish(background=BLACK)), camera(8, 8, 10.0, elevation=90))
     cosine = math.sin(math.radians(sun_elevation))
     expected = as_bytes([displayed(2.0 * c * cosine / math.pi) for c in sun.color])
@@ -203,17 +203,17 @@ def test_uniform_sky_lights_a_white_plane_as_itself():
 
 def test_white_plane_in_the_default_light_does_not_clip():
     sun = Sun()
-    azimuth, elevation = math.radians(sun.azimuth_deg), math.radians(sun.elevation_deg)
+    azimuth, elevation = math.radians(sun.azimuth), math.radians(sun.elevation)
     toward, right = orbit_center(azimuth, elevation, 1.0), orbit_rotation(azimuth, elevation)[0]
     up = np.cross(toward, right)
     plane = mesh_of(rectangle(-right - up, 2 * right, 2 * up), Material(roughness=1.0))
-    seen = picture(plane, Scene(finish=Finish(background=BLACK)), camera(8, 8, 10.0, sun.azimuth_deg, sun.elevation_deg))
+    seen = picture(plane, Scene(finish=Finish(background=BLACK)), camera(8, 8, 10.0, sun.azimuth, sun.elevation))
     assert 200 < seen.min() <= seen.max() < 250
 
 
 def test_exposure_is_in_stops():
     mesh = mesh_of(rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0)), Material(roughness=1.0, ior=1.0))
-    scene = Scene(sun=Sun(elevation_deg=90, strength=0.5, color=(1, 1, 1)), sky=DARK, finish=Finish(background=BLACK))
+    scene = Scene(sun=Sun(elevation=90, strength=0.5, color=(1, 1, 1)), sky=DARK, finish=Finish(background=BLACK))
     view = camera(8, 8, 10.0, elevation=90)
     finishes = (Finish(background=BLACK, view=ViewTransform(exposure=e)) for e in (0, 1))
     plain, brighter = (picture(mesh, scene.model_copy(update={"finish": f}), view) for f in finishes)
@@ -245,7 +245,7 @@ def test_image_background_covers_the_frame(tmp_path):
 
 def test_sky_is_brighter_low_and_near_the_sun():
     empty = mesh_of(card(0.001, 0.001, y=-100.0))
-    scene = Scene(sun=Sun(azimuth_deg=180, elevation_deg=30))
+    scene = Scene(sun=Sun(azimuth=180, elevation=30))
     toward = picture(empty, scene, camera(32, 32, 16.0)).astype(int)
     away = picture(empty, scene, camera(32, 32, 16.0, azimuth=180)).astype(int)
     assert (toward[:15].sum() > away[:15].sum()) and (np.diff(away[:16, :, 0].mean(axis=1)) >= 0).all()
@@ -253,7 +253,7 @@ def test_sky_is_brighter_low_and_near_the_sun():
 
 BOX = box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))
 GROUND_SCENE = Scene(
-    sun=Sun(azimuth_deg=90, elevation_deg=45, strength=3.0),
+    sun=Sun(azimuth=90, elevation=45, strength=3.0),
     sky=DARK,
     ground=Ground(pattern="plain", color=(0.8, 0.8, 0.8)),
     finish=Finish(background=BLACK),
@@ -312,7 +312,7 @@ def test_cutout_casts_its_shape():
     foot = rectangle((5, 0, 0), (0.01, 0, 0), (0, 0.01, 0))
     uv = np.concatenate([CARD_UV, CARD_UV * 0])
     mesh = mesh_of(np.concatenate([flat, foot]), holed, uv0=uv, images=(Image("hole", pixels),))
-    scene = GROUND_SCENE.model_copy(update={"sun": Sun(azimuth_deg=90, elevation_deg=45)})
+    scene = GROUND_SCENE.model_copy(update={"sun": Sun(azimuth=90, elevation=45)})
     seen = picture(mesh, scene, camera(64, 64, 64.0, elevation=90, distance=10.0), antialias=1).astype(int).sum(axis=2)
     column = 32 + 64 * np.array([-1.6, -1.2, -0.65]) / 10  # shadow, hole's middle (x = -1), hole
     assert seen[32, int(column[0])] == 0

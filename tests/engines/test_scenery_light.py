@@ -14,7 +14,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Scene, Sky, Sun
 from viewsphere.model.thing import Motion, Thing
 
-SUN = Sun(azimuth_deg=90, elevation_deg=45, strength=3.0)
+SUN = Sun(azimuth=90, elevation=45, strength=3.0)
 SCENE = Scene(sun=SUN, sky=DARK, finish=Finish(background=BLACK))
 FLOOR = Material("floor", (0.5, 0.5, 0.5, 1.0), roughness=1.0, specular=0.0)
 SIDE = 400.0
@@ -131,7 +131,7 @@ def test_the_next_target_is_lit_by_the_same_place_and_another_sun_by_another():
     first = stage_of(BOX, place)
     second = stage_of(mesh_of(box((-0.4, -0.6, 0), (0.4, 0.6, 0.9))), place)
     assert first.baked(0).lights.views.depth.size == second.baked(0).lights.views.depth.size
-    west = stage_of(BOX, place, SCENE.model_copy(update={"sun": Sun(azimuth_deg=270, elevation_deg=45)}))
+    west = stage_of(BOX, place, SCENE.model_copy(update={"sun": Sun(azimuth=270, elevation=45)}))
     for stage, shaded, lit in ((second, 13, 27), (west, 27, 13)):
         seen, x, _ = from_above(stage, 20, 0, 4)
         at = [int(np.abs(x[0] - v).argmin()) for v in (shaded, lit)]
@@ -148,7 +148,7 @@ def test_without_scenery_there_are_no_wide_maps():
 def test_no_corner_of_a_place_is_beyond_its_shadow_map():
     """A sun that looks along a diagonal sees corners far from the middle of its map: what lies in a closed hall stays dark."""
     hall = mesh_of(box((-8, -8, -0.2), (8, 8, 4)))
-    sun = Sun(azimuth_deg=45, elevation_deg=30, strength=3.0)
+    sun = Sun(azimuth=45, elevation=30, strength=3.0)
     small = mesh_of(box((0, 0, 0), (0.3, 0.3, 0.3)))
     baked = stage_of(small, [(hall, moved(0, 0))], Scene(sun=sun, sky=DARK)).baked(0)
     x, y = np.meshgrid(np.linspace(-7.4, 7.4, 40), np.linspace(-7.4, 7.4, 40))

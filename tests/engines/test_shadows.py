@@ -347,7 +347,7 @@ def test_a_rectangle_s_irradiance_near_and_far(crumb):
 
 
 def test_distant_lights_arrive_everywhere_alike(crumb):
-    sun = Sun(azimuth_deg=200, elevation_deg=30, strength=2.0, color=(1.0, 0.5, 0.25), angle_deg=2)
+    sun = Sun(azimuth=200, elevation=30, strength=2.0, color=(1.0, 0.5, 0.25), angle_deg=2)
     lights = crumb.lights([distant_sun(sun)])
     found = crumb.arrives(lights, 0, points([[0, 0, 0], [40, -7, 2]], (0, 0, 1)))
     toward = orbit_center(math.radians(200), math.radians(30), 1.0)

@@ -60,7 +60,7 @@ def test_a_larger_camera_sees_the_same_in_finer_pixels(lens):
 
 
 def test_parts_of_light_are_means_of_those_of_finer_pixels():
-    scene = Scene(sun=Sun(azimuth_deg=60, elevation_deg=40))
+    scene = Scene(sun=Sun(azimuth=60, elevation=40))
     mesh, view = mesh_of(turned(card(1.3, 1.7), 17)), view_of(None)
 
     def parts_of(view, antialias):

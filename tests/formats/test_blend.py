@@ -56,7 +56,7 @@ def test_frames_of_one_scene_share_a_file(asked, small_run, tmp_path):
 
 @pytest.mark.slow
 def test_frames_of_other_scenes_have_other_files(asked, tmp_path):
-    scene = {"draw": "per_frame", "sun": {"azimuth_deg": {"uniform": [0, 360]}}}
+    scene = {"draw": "per_frame", "sun": {"azimuth": {"uniform": [0, 360]}}}
     generate(small_recipe(scene=scene), tmp_path / "out")
     export(tmp_path / "out", ["blend"])
     samples = list(Dataset(tmp_path / "out"))

@@ -193,7 +193,7 @@ class World:
             return "", []
         clouds = scene.sky.clouds
         word = "clear" if clouds < 0.2 else "partly cloudy" if clouds < 0.6 else "overcast"
-        low = scene.sun is not None and scene.sun.elevation_deg < 20 and word != "overcast"
+        low = scene.sun is not None and scene.sun.elevation < 20 and word != "overcast"
         return word, [f"The sky is {word}.", *["The sun is low."] * low]
 
     def surroundings(self):
@@ -552,7 +552,7 @@ def made(out, models, captions, **changes):
         "models": models,
         "viewpoints": {"kind": "sphere", "count": 2, "distance": [3, 7], "elevation": [3, 85], "tilt": [-10, 10]},
         "camera": {"size": [96, 72], "fov_deg": 45},
-        "scene": {"sky": {"daylight": {"clouds": [0, 1]}}, "sun": {"elevation_deg": [5, 60]}},
+        "scene": {"sky": {"daylight": {"clouds": [0, 1]}}, "sun": {"elevation": [5, 60]}},
         "channels": ["instances", "semantic"],
         "annotations": ["captions", "referring", "looks"],
         "labels": {"captions": captions, "referring": {k: v for k, v in captions.items() if k == "min_visibility"}},

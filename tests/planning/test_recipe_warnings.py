@@ -165,9 +165,9 @@ def test_a_wide_lens_sees_more():
 
 
 def test_jitter_below_the_ground_is_said():
-    (said,) = warnings({"jitter": {"elevation_deg": [-30, 30]}})
+    (said,) = warnings({"jitter": {"elevation": [-30, 30]}})
     assert said.startswith("elevations go down to -20")
-    assert warnings({"jitter": {"elevation_deg": [-30, 30]}, "ground": "off"}) == ()
+    assert warnings({"jitter": {"elevation": [-30, 30]}, "ground": "off"}) == ()
 
 
 def test_warnings_name_the_line(tmp_path):

@@ -69,7 +69,7 @@ def test_a_number_is_short_for_so_many_scenes():
 )
 def test_a_scene_is_the_same_however_many_there_are(by, views):
     more = {"splits": {"by": by, "train": 0.5, "val": 0.5}, "scenes": {"views": views}}
-    more |= {"scene": {"place": {"source": "zoo:neighbourhood", "draw": "per_model"}, "sun": {"azimuth_deg": [0, 360]}}}
+    more |= {"scene": {"place": {"source": "zoo:neighbourhood", "draw": "per_model"}, "sun": {"azimuth": [0, 360]}}}
     few, many = (shots(vs.plan(recipe(count, **more))) for count in (5, 12))
     assert few.keys() < many.keys()
     assert {key: described(shot) for key, shot in few.items()} == {key: described(many[key]) for key in few}

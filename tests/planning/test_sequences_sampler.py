@@ -37,9 +37,9 @@ def instants(planned, *but):
 
 RANDOM = {
     "background": {"color": {"uniform": [[0, 0, 0], [1, 1, 1]]}},
-    "jitter": {"azimuth_deg": [-5, 5]},
+    "jitter": {"azimuth": [-5, 5]},
     "company": {"count": 1, "draw": "per_sequence"},
-    "sun": {"azimuth_deg": [0, 360]},
+    "sun": {"azimuth": [0, 360]},
     "effects": {"read_noise": 0.1},
 }
 
@@ -79,7 +79,7 @@ def test_all_that_is_drawn_is_drawn_once_a_sequence():
 
 def test_what_is_asked_for_flickers(tmp_path):
     scene = {"background": {"color": {"uniform": [[0, 0, 0], [1, 1, 1]]}, "draw": "per_frame"}}
-    made = recipe(shot_frames=10, scene=scene | {"jitter": {"azimuth_deg": [-5, 5], "draw": "per_frame"}})
+    made = recipe(shot_frames=10, scene=scene | {"jitter": {"azimuth": [-5, 5], "draw": "per_frame"}})
     (tmp_path / "recipe.yaml").write_text(made.to_yaml())
     for one in (made, vs.Recipe.model_validate(made.model_dump(mode="json")), vs.Recipe.load(tmp_path / "recipe.yaml")):
         shot = vs.plan(one).shot(0, box_of)

@@ -222,13 +222,13 @@ def test_what_could_be_drawn_beyond_the_limits_is_refused_where_it_stands(fields
 def test_a_mistake_in_a_distribution_has_its_line(tmp_path):
     file = tmp_path / "recipe.yaml"
     file.write_text(
-        "models: [{source: zoo:car}]\nviewpoints: {distance: 5}\nscene:\n  sun:\n    elevation_deg:\n      uniform:\n"
+        "models: [{source: zoo:car}]\nviewpoints: {distance: 5}\nscene:\n  sun:\n    elevation:\n      uniform:\n"
         "        - 10\n        - 95\n  effects: {jpeg: {uniform: [0, 2]}}\n"
     )
     with pytest.raises(RecipeError) as caught:
         Recipe.load(file)
     assert str(caught.value).splitlines() == [
-        f"{file}:8: scene.sun.elevation_deg.uniform[1]: expected a number less than or equal to 90; found 95",
+        f"{file}:8: scene.sun.elevation.uniform[1]: expected a number less than or equal to 90; found 95",
         f"{file}:9: scene.effects.jpeg.uniform[1]: expected a number less than or equal to 1; found 2",
     ]
 
@@ -237,13 +237,13 @@ def test_extended_recipes_replace_distributions_whole_and_keep_their_paths(tmp_p
     (tmp_path / "lib").mkdir()
     (tmp_path / "lib" / "base.yaml").write_text(
         "models: [{source: zoo:car}]\nviewpoints: {distance: 5}\n"
-        "scene:\n  sun: {strength: {uniform: [1, 2]}, elevation_deg: [10, 20]}\n"
+        "scene:\n  sun: {strength: {uniform: [1, 2]}, elevation: [10, 20]}\n"
         "  sky: {choice: [a.exr, {hdri: {choice: [b.hdr, skies]}}, daylight]}\n  ground: {image: stone.png}\n"
     )
     own = tmp_path / "own.yaml"
     own.write_text("extends: lib/base.yaml\nscene: {sun: {strength: {choice: [3, 4]}}}\n")
     scene = assemble(own, {"scene.sun.angle_deg": [1, 2]})[0]["scene"]
-    assert scene["sun"] == {"strength": {"choice": [3, 4]}, "elevation_deg": [10, 20], "angle_deg": [1, 2]}
+    assert scene["sun"] == {"strength": {"choice": [3, 4]}, "elevation": [10, 20], "angle_deg": [1, 2]}
     assert scene["sky"] == {"choice": ["lib/a.exr", {"hdri": {"choice": ["lib/b.hdr", "lib/skies"]}}, "daylight"]}
     assert scene["ground"] == {"image": "lib/stone.png"}
     loaded = Recipe.load(own)

@@ -86,7 +86,7 @@ def test_defaults_are_the_scene_s():
 
 def test_an_optional_field_tells_the_default_that_it_has_in_the_scene():
     told = properties(light.SunEntry)
-    assert told["azimuth_deg"]["description"] == "azimuth, degrees, as for cameras; default 40"
+    assert told["azimuth"]["description"] == "azimuth, degrees, as for cameras; default 40"
     assert properties(surface.GroundEntry)["color"]["description"].endswith("; default [0.62, 0.61, 0.59]")
     assert properties(HaloEntry)["width"]["description"] == "degrees"
 

@@ -23,7 +23,7 @@ viewpoints:
 camera: {size: [64, 48], fov_deg: 40}
 scene:
   background: sky
-  sun: {azimuth_deg: 10}
+  sun: {azimuth: 10}
 """
 
 
@@ -111,7 +111,7 @@ WRONG = [
     ("extends: nothing.yaml\n", r"own.yaml:1: extends: expected a recipe file; found none at .*nothing.yaml"),
     ("name: x\nextends: [3]\n", r"own.yaml:2: extends: expected the path of a recipe, or a list of them; found 3"),
     ("extends: own.yaml\n", r"own.yaml:1: extends: own.yaml extends itself, directly or through others"),
-    ("extends: base.yaml\nscene: {sun: {elevation_deg: 300}}\n", r"own.yaml:2: scene.sun.elevation_deg: expected a number"),
+    ("extends: base.yaml\nscene: {sun: {elevation: 300}}\n", r"own.yaml:2: scene.sun.elevation: expected a number"),
     ("extends: base.yaml\nviewpoints: {tilt: x}\n", r"own.yaml:2: viewpoints.tilt"),
 ]
 

@@ -190,11 +190,7 @@ MISTAKES = [
         "[2.0, 2.0, 2.0]: change this place or toward",
     ),
     (
-        {
-            "scene": {
-                "lights": [{"kind": "area", "at": {"elevation_deg": 90, "distance": 3}, "toward": [0, 0, 3], "strength": 1}]
-            }
-        },
+        {"scene": {"lights": [{"kind": "area", "at": {"elevation": 90, "distance": 3}, "toward": [0, 0, 3], "strength": 1}]}},
         "scene.lights[0].at: the lamp is at the point it is aimed at",
         "[0.0, 0.0, 3.0]: change this place or toward",
     ),
@@ -236,15 +232,15 @@ MISTAKES = [
         "; found 'of'; did you mean 'off'?",
     ),
     (
-        {"scene": {"sun": {"elevation": 3}}},
-        "scene.sun.elevation: 'elevation' is unknown; did you mean 'elevation_deg'? Valid: azimuth_deg",
+        {"scene": {"sun": {"elevaton": 3}}},
+        "scene.sun.elevaton: 'elevaton' is unknown; did you mean 'elevation'? Valid: azimuth",
         "",
     ),
     ({"scene": {"sun": 3}}, "scene.sun: expected auto, on, off or a mapping; found 3", ""),
     ({"scene": {"sun": {"date": "2026-06-21"}}}, "scene.sun: expected date, time, latitude, longitude together", "found date"),
     ({"scene": {"sun": {**NOON, "time": "12:30"}}}, "scene.sun.time: expected a time and its distance from UTC", "'12:30'"),
     ({"scene": {"sun": {**NOON, "date": "21.6.2026"}}}, "scene.sun.date: expected a date such as '2026-06-21'", ""),
-    ({"scene": {"sun": {**NOON, "elevation_deg": 4}}}, "scene.sun: expected angles or date, time and place, not both", ""),
+    ({"scene": {"sun": {**NOON, "elevation": 4}}}, "scene.sun: expected angles or date, time and place, not both", ""),
     (
         {"scene": {"sky": {"hdri": "a.exr", "zenith": [1, 1, 1]}}},
         "scene.sky.zenith: 'zenith' is unknown. Valid: hdri, stre",

@@ -14,7 +14,7 @@ ROOM = {
     "viewpoints": {"azimuth": [30], "elevation": [20], "distance": 1.0},
     "camera": {"size": [48, 32], "fov_deg": 40},
     "engine": {"name": "raster", "bounces": "on"},
-    "scene": {"sky": SKY, "sun": {"azimuth_deg": 75, "elevation_deg": 42}, "ground": True},
+    "scene": {"sky": SKY, "sun": {"azimuth": 75, "elevation": 42}, "ground": True},
     "channels": ["rgb", "depth", "instances"],
     "formats": ["native"],
 }

@@ -46,7 +46,7 @@ def scene(folder, **changes):
         {"kind": "hemisphere", "strength": 0.1, "below": "#403020"},
     ]
     values = {
-        "sun": {"azimuth_deg": [0, 360], "elevation_deg": {"normal": {"mean": 40, "deviation": 10, "min": 10}}, "angle_deg": 2},
+        "sun": {"azimuth": [0, 360], "elevation": {"normal": {"mean": 40, "deviation": 10, "min": 10}}, "angle_deg": 2},
         "sky": {"hdri": str(folder / "skies"), "strength": {"log_uniform": [0.3, 1]}, "rotation_deg": [0, 360]},
         "lights": lamps,
         "ground": {
@@ -69,7 +69,7 @@ def scene(folder, **changes):
             },
             "motion_angle_deg": [0, 360],
         },
-        "jitter": {"azimuth_deg": {"normal": [0, 3]}, "distance": [-0.1, 0.1]},
+        "jitter": {"azimuth": {"normal": [0, 3]}, "distance": [-0.1, 0.1]},
     }  # fmt: skip
     return {**values, **changes}
 

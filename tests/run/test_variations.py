@@ -17,7 +17,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.planning.plan import plan
 
 BOX = box_vertices((-0.1, -0.1, 0), (0.1, 0.1, 0.3))
-DARK = {"sun": {"elevation_deg": 12, "strength": 1.0}, "effects": {"read_noise": 0.3}}
+DARK = {"sun": {"elevation": 12, "strength": 1.0}, "effects": {"read_noise": 0.3}}
 BOTH = {"day": {"effects": {"read_noise": 0.3}}, "dark": DARK}
 LABELS = [name for name in still_channels() if name not in PICTURES]
 MODEL = {"source": "zoo:post_box", "category": "post box", "count": 2, "scale": {"length": 0.18}}
@@ -30,7 +30,7 @@ VIDEO = {
 
 
 def recipe(**changes):
-    sun = {"azimuth_deg": {"uniform": [0, 360]}, "elevation_deg": {"uniform": [30, 60]}}
+    sun = {"azimuth": {"uniform": [0, 360]}, "elevation": {"uniform": [30, 60]}}
     same = {"scene": {"ground": True, "sun": sun}, "variations": BOTH, "camera": {"size": [48, 36], "fov_deg": 35}}
     return small_recipe(**{**same, "formats": ["coco"], **changes})
 
@@ -79,7 +79,7 @@ def test_noise_of_one_shot_differs_between_variations() -> None:
     assert 0.3 < np.abs(one - other).mean() < 10
 
 
-SUN = {"sun": {"azimuth_deg": {"uniform": [0, 360]}, "elevation_deg": 40}}
+SUN = {"sun": {"azimuth": {"uniform": [0, 360]}, "elevation": 40}}
 RAIN = {"rain": {"rate": {"uniform": [10, 50]}}}
 
 
@@ -134,7 +134,7 @@ def test_a_further_variation_is_appended_and_nothing_else_is_touched(made: Datas
     out = tmp_path / "out"
     generate(recipe(), out)
     before = {path: path.read_bytes() for path in (out / "store").rglob("*.png")}
-    generate(recipe(variations={**BOTH, "low": {"sun": {"elevation_deg": 5}}}), out, append=True)
+    generate(recipe(variations={**BOTH, "low": {"sun": {"elevation": 5}}}), out, append=True)
     grown = Dataset(out)
     assert [sum(s.variation == name for s in grown) for name in ("day", "dark", "low")] == [12, 12, 12]
     assert all(path.read_bytes() == content for path, content in before.items())

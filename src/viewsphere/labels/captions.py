@@ -157,7 +157,7 @@ def _weather(around: Around) -> tuple[str, bool]:
         return "", False
     clouds = scene.sky.clouds
     weather = "clear" if clouds < CLEAR else "partly cloudy" if clouds < CLOUDY else "overcast"
-    return weather, clouds < CLOUDY and scene.sun is not None and scene.sun.elevation_deg < LOW_DEG
+    return weather, clouds < CLOUDY and scene.sun is not None and scene.sun.elevation < LOW_DEG
 
 
 def _air(around: Around) -> tuple[str, ...]:

@@ -41,6 +41,7 @@ class Marks:
 
     file: str = field(default="", compare=False)
     places: Mapping[Path, Place] = field(default_factory=dict[Path, Place], compare=False)
+    warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def place(self, path: Path) -> Place:
         """Place of the value at `path`, or, if the value was not written, of the innermost written value around it."""

@@ -36,8 +36,8 @@ WHITE: Color = (1.0, 1.0, 1.0)
 class Sun(Frozen):
     """A distant light. Azimuth and elevation are those of the direction it stands in, as for cameras."""
 
-    azimuth_deg: Number = Field(default=40.0, description="azimuth, degrees, as for cameras")
-    elevation_deg: float = Field(default=50.0, gt=0, le=90, description="degrees above the horizon")
+    azimuth: Number = Field(default=40.0, description="azimuth, degrees, as for cameras")
+    elevation: float = Field(default=50.0, gt=0, le=90, description="degrees above the horizon")
     strength: Strength = Field(default=3.0, description="irradiance on a surface that faces it, in the sky's units")
     color: Color = Field(default=(1.0, 0.96, 0.9), description="linear [r, g, b]")
     angle_deg: float = Field(default=0.53, ge=0, le=60, description="angular width; wider means softer shadows")

@@ -172,7 +172,7 @@ class Plan(Shown, Stock):
             if count == 0
         ]
         scene = self.recipe.scene
-        lowest = self.pose_list.lowest_elevation + min(span(scene.jitter.elevation_deg)[0], 0.0)
+        lowest = self.pose_list.lowest_elevation + min(span(scene.jitter.elevation)[0], 0.0)
         if lowest < 0 and (scene.has_ground or scene.place is not None):
             found.append(
                 f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
@@ -187,7 +187,7 @@ class Plan(Shown, Stock):
         if self.blend is not None:
             found += self.blend.warnings
         found += left_out(self.recipe)
-        return tuple(map(self.recipe.locate, (*found, *doubts)))
+        return tuple(map(self.recipe.locate, (*self.recipe.warnings, *found, *doubts)))
 
     @property
     def notes(self) -> tuple[str, ...]:

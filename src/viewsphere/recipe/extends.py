@@ -17,6 +17,7 @@ from viewsphere.model.scene import Background, Ground
 from viewsphere.recipe.draws import KINDS
 from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.file import parse, read
+from viewsphere.recipe.former_names import present, with_present_names
 from viewsphere.recipe.models import ZOO
 
 PATHS: tuple[tuple[str, ...], ...] = (
@@ -92,7 +93,8 @@ def _extended(path: Path, above: tuple[Path, ...], known: dict[str, _Layer]) -> 
 
 def _joined(path: Path, above: tuple[Path, ...], known: dict[str, _Layer]) -> _Layer:
     data, marks = read(path)
-    layer = _Layer(cast(dict[str, Any], data), dict(marks.places))
+    places = {new: place for steps, place in marks.places.items() for new in {steps, present(steps)}}
+    layer = _Layer(with_present_names(data), places)
     names = layer.data.pop("extends", ())
     where = marks.place(("extends",))
     chain = (*above, path.resolve())
@@ -170,10 +172,11 @@ def _forget(places: dict[Steps, Place], steps: Steps) -> None:
 def _set(layer: _Layer, name: str, value: Any) -> _Layer:
     """The layer with one field set to another value."""
     where = f"--set {name}"
-    steps = _steps(name, where)
+    written = _steps(name, where)
+    steps = present(written)
     places = dict(layer.places)
     _forget(places, steps)
-    places[steps] = Place("--set", 0)
+    places |= {written: Place("--set", 0), steps: Place("--set", 0)}
     return _Layer(cast(dict[str, Any], _replaced(layer.data, steps, value, where)), places)
 
 

@@ -113,12 +113,12 @@ class EffectsEntry(entry_of(Effects, without=("seed",)), PerFrame):
 class JitterEntry(PerFrame):
     """Random offsets added to every viewpoint."""
 
-    azimuth_deg: Coordinate = Field(default=0.0, description="degrees")
-    elevation_deg: Coordinate = Field(default=0.0, description="degrees, not beyond the poles")
+    azimuth: Coordinate = Field(default=0.0, description="degrees")
+    elevation: Coordinate = Field(default=0.0, description="degrees, not beyond the poles")
     distance: Drawn[Annotated[float, Field(strict=True, ge=-0.9, le=10)]] = Field(
         default=0.0, description="as a share: 0.1 is a tenth farther away"
     )
-    tilt_deg: Coordinate = Field(default=0.0, description="degrees")
+    tilt: Coordinate = Field(default=0.0, description="degrees")
     target: PointDrawn = Field(default=(0.0, 0.0, 0.0), description="metres, [x, y, z]: added to the camera's target")
     off_center: Drawn[tuple[Coordinate, Coordinate]] = Field(
         default=(0.0, 0.0),

@@ -60,7 +60,7 @@ def _hours(value: Any) -> Any:
 
 Day = Annotated[str, AfterValidator(_day)]
 Hours = Annotated[float, Field(strict=True, ge=-24, le=48), BeforeValidator(_hours), OrShort({"type": "string"})]
-ANGLES = ("azimuth_deg", "elevation_deg")
+ANGLES = ("azimuth", "elevation")
 
 
 class SunEntry(entry_of(Sun, optional=ANGLES)):
@@ -118,8 +118,8 @@ class NightEntry(Frozen):
     """A sky without the sun, as a long exposure shows it."""
 
     moon: Drawn[Strength] = Field(default=0.1, description="irradiance on a surface that faces the moon, in the sky's units")
-    azimuth_deg: Drawn[Number] = Field(default=-60.0, description="azimuth of the moon, degrees, as for cameras")
-    elevation_deg: Drawn[Annotated[float, Field(strict=True, gt=0, le=90)]] = Field(
+    azimuth: Drawn[Number] = Field(default=-60.0, description="azimuth of the moon, degrees, as for cameras")
+    elevation: Drawn[Annotated[float, Field(strict=True, gt=0, le=90)]] = Field(
         default=45.0, description="degrees above the horizon"
     )
     glow: Drawn[Strength] = Field(default=0.05, description="radiance of town lights at the horizon")
@@ -179,8 +179,8 @@ SkyField = Annotated[
 class At(Frozen):
     """A direction and a distance, as cameras stand."""
 
-    azimuth_deg: Coordinate = Field(default=0.0, description="degrees, as for cameras")
-    elevation_deg: Drawn[Annotated[float, Field(strict=True, ge=-90, le=90)]] = Field(
+    azimuth: Coordinate = Field(default=0.0, description="degrees, as for cameras")
+    elevation: Drawn[Annotated[float, Field(strict=True, ge=-90, le=90)]] = Field(
         default=45.0, description="degrees above the horizon"
     )
     distance: Drawn[Length] = Field(description="metres")
@@ -193,7 +193,7 @@ class _Lamp(entry_of(Light)):
 
 
 class _Placed(entry_of(PlacedLight, optional=("position",)), _Lamp):
-    at: At | None = Field(default=None, description="or {azimuth_deg, elevation_deg, distance} from there, as for cameras")
+    at: At | None = Field(default=None, description="or {azimuth, elevation, distance} from there, as for cameras")
 
     @model_validator(mode="after")
     def _placed(self) -> _Placed:
@@ -220,7 +220,7 @@ def _standing(at: At) -> Any:
     """The point (x, y, z) that `at` means, metres; None if `at` contains distributions."""
     if is_random(at):
         return None
-    direction = orbit_center(math.radians(at.azimuth_deg), math.radians(at.elevation_deg), at.distance)
+    direction = orbit_center(math.radians(at.azimuth), math.radians(at.elevation), at.distance)
     return tuple(round(x, 9) + 0.0 for x in direction.tolist())
 
 

@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -38,6 +39,7 @@ from viewsphere.model.mistakes import Marks, at, report, shown
 from viewsphere.model.notebook import Shown
 from viewsphere.model.numbers import Count, Natural, Number
 from viewsphere.recipe.formats import FormatEntry, FormatField
+from viewsphere.recipe.former_names import former_paths, is_former, renamed, with_present_names
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.rig import RigField, SensorList
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
@@ -156,7 +158,7 @@ class Recipe(Shown, Frozen):
         default=None,
         description="conditions, such as weather; every shot is rendered under each, with the same labels. Each name has "
         "the fields of scene that it changes, drawn separately unless paired: true: {morning: {sun: "
-        "{elevation_deg: 9}}, overcast: {sky: {daylight: {clouds: 1}}}}",
+        "{elevation: 9}}, overcast: {sky: {daylight: {clouds: 1}}}}",
     )
     min_visibility: Annotated[Number, Field(gt=0, le=1)] | None = Field(
         default=None,
@@ -211,16 +213,20 @@ class Recipe(Shown, Frozen):
     @model_validator(mode="before")
     @classmethod
     def _plain(cls, data: Any) -> Any:
-        return _plain(data)
+        return with_present_names(_plain(data))
 
     @model_validator(mode="wrap")
     @classmethod
     def _report(cls, data: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:
         marks: Marks | None = (info.context or {}).get("marks")
         try:
-            return handler(data)
+            recipe = handler(data)
         except ValidationError as error:
             raise RecipeError(report(error, data, marks)) from None
+        if not isinstance(data, Recipe):
+            written = filter(is_former, marks.places if marks else ())
+            recipe._marks = replace(recipe._marks, warnings=renamed(dict.fromkeys((*written, *former_paths(data)))))
+        return recipe
 
     @field_validator("channels")
     @classmethod
@@ -327,6 +333,11 @@ class Recipe(Shown, Frozen):
         timed = self.time is not None
         scenes = {name: varied(self.scene, change.over_time() if timed else change) for name, change in self.variations.items()}
         return {name: self.model_copy(update={"scene": scene, "variations": None}) for name, scene in scenes.items()}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings about fields that are written with a former name."""
+        return self._marks.warnings
 
     @property
     def is_new_each_frame(self) -> bool:

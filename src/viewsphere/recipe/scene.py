@@ -199,7 +199,7 @@ class SceneEntry(Frozen):
     planes: PlanesField = Field(default=(), description="upright planes with pictures")
     sun: Drawn[SunField] = Field(
         default="auto",
-        description="on, off, auto (on, but off under an hdri), or position and light: azimuth_deg, elevation_deg, "
+        description="on, off, auto (on, but off under an hdri), or position and light: azimuth, elevation, "
         "strength, color, angle_deg",
     )
     sky: Drawn[SkyField] = Field(

@@ -8,19 +8,19 @@ its name from `_UNCHANGED` to `_RENAMED`, with the old name on the right.
 from __future__ import annotations
 
 _UNCHANGED = """
-    amount angle_deg aside at azimuth_deg background bay begin below blend blur brightness chromatic_aberration clouds
-    color company contrast count date daylight density depth_of_field distance distractors drop edge_highlight effects
-    elevation_deg enter exposure fit flip focal_mm focal_px focus fog fov_deg friction glow ground hdri height high
-    highest_hz horizon hue image jitter jpeg kerb keys kind lamps lane latitude leave length lights longitude mass
-    material materials metallic moon most motion motion_angle_deg motion_blur night normal_image objects off_center offset
-    parked pattern pavement period phase_deg place planes points position principal_point puddles radius rain rate reach
-    read_noise restitution rotation_deg roughness roughness_image saturation scale shot_noise side size sky smoother snow
-    speed spin_deg spread strength sun target temperature_k texture tile tilt_deg time tint toward transform turbidity
-    turn velocity view vignetting visibility walkers wet wind windows zenith zoom
+    amount angle_deg aside at background bay begin below blend blur brightness chromatic_aberration clouds color company
+    contrast count date daylight density depth_of_field distance distractors drop edge_highlight effects enter exposure
+    fit flip focal_mm focal_px focus fog fov_deg friction glow ground hdri height high highest_hz horizon hue image jitter
+    jpeg kerb keys kind lamps lane latitude leave length lights longitude mass material materials metallic moon most
+    motion motion_angle_deg motion_blur night normal_image objects off_center offset parked pattern pavement period
+    phase_deg place planes points position principal_point puddles radius rain rate reach read_noise restitution
+    rotation_deg roughness roughness_image saturation scale shot_noise side size sky smoother snow speed spin_deg spread
+    strength sun target temperature_k texture tile time tint toward transform turbidity turn velocity view vignetting
+    visibility walkers wet wind windows zenith zoom
 """
 """Fields that are still called what seeds them."""
 
-_RENAMED: dict[str, str] = {}
+_RENAMED = {"azimuth": "azimuth_deg", "elevation": "elevation_deg", "tilt": "tilt_deg"}
 """Fields with another name than the name that seeds them."""
 
 SEED_NAMES = {**{name: name for name in _UNCHANGED.split()}, **_RENAMED}

@@ -123,15 +123,15 @@ class Scenes:
     def jittered(self, pose: Viewpoint, model: str, name: str) -> Viewpoint:
         """The pose moved at random; it keeps its index. One without a target of its own keeps to the models' centre."""
         by = self.jitter(model, name)
-        azimuth = pose.azimuth_deg + by.azimuth_deg
-        elevation = min(max(pose.elevation_deg + by.elevation_deg, -90.0), 90.0)
+        azimuth = pose.azimuth_deg + by.azimuth
+        elevation = min(max(pose.elevation_deg + by.elevation, -90.0), 90.0)
         target = None if pose.target is None else tuple(a + b for a, b in zip(pose.target, by.target, strict=True))
         return pose.model_copy(
             update={
                 "azimuth_deg": azimuth,
                 "elevation_deg": elevation,
                 "distance": pose.distance * (1 + by.distance),
-                "tilt_deg": pose.tilt_deg + by.tilt_deg,
+                "tilt_deg": pose.tilt_deg + by.tilt,
                 "target": target,
                 "category": pose_category(azimuth, elevation, self.recipe.viewpoints.bins),
             }
@@ -267,7 +267,7 @@ def _sun(entry: Any, sky: AnySky) -> Sun | None:
     angles = _angles(entry)
     if angles is None:
         return concrete(entry)
-    return concrete(entry, azimuth_deg=angles[0], elevation_deg=angles[1]) if angles[1] > 0 else None
+    return concrete(entry, azimuth=angles[0], elevation=angles[1]) if angles[1] > 0 else None
 
 
 def _night(entry: NightEntry) -> Sky:
@@ -282,7 +282,7 @@ def _night(entry: NightEntry) -> Sky:
 def _moon(entry: NightEntry, sun: object) -> Sun | None:
     if sun == "off" or not entry.moon:
         return None
-    place = {"azimuth_deg": entry.azimuth_deg, "elevation_deg": entry.elevation_deg}
+    place = {"azimuth": entry.azimuth, "elevation": entry.elevation}
     return Sun(strength=entry.moon, color=(0.75, 0.87, 1.0), **place)
 
 
@@ -325,5 +325,5 @@ def _lights(entries: tuple[LampEntry, ...], rng_of: RngOf) -> tuple[AnyLight, ..
 
 
 def _spot(at: At) -> Vector:
-    x, y, z = orbit_center(math.radians(at.azimuth_deg), math.radians(at.elevation_deg), at.distance).tolist()
+    x, y, z = orbit_center(math.radians(at.azimuth), math.radians(at.elevation), at.distance).tolist()
     return x, y, z

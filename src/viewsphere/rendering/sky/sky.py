@@ -52,9 +52,9 @@ def sky_pictures(sky: AnySky, sun: Sun | None, lights: Sequence[AnyLight], has_g
     sine = np.sin((0.5 - (np.arange(HEIGHT) + 0.5) / HEIGHT) * np.pi)
     if isinstance(sky, Daylight):
         sun = sun or Sun()
-        factor = sky.strength * opening(sun.elevation_deg, sky)
-        picture = daylight_picture(sun.elevation_deg, sky, HEIGHT) * np.float32(factor)
-        turn_deg, seen = sun.azimuth_deg - 90, picture
+        factor = sky.strength * opening(sun.elevation, sky)
+        picture = daylight_picture(sun.elevation, sky, HEIGHT) * np.float32(factor)
+        turn_deg, seen = sun.azimuth - 90, picture
     else:
         picture = _gradient(sky, sine)
         turn_deg, seen = 0.0, picture + _halo(sun_light(sky, sun), sine)

@@ -21,7 +21,7 @@ class Distant:
 
 def distant_sun(sun: Sun) -> Distant:
     """A recipe's sun as a distant light."""
-    x, y, z = orbit_center(math.radians(sun.azimuth_deg), math.radians(sun.elevation_deg), 1.0).tolist()
+    x, y, z = orbit_center(math.radians(sun.azimuth), math.radians(sun.elevation), 1.0).tolist()
     r, g, b = (sun.strength * c for c in sun.color)
     return Distant((x, y, z), (r, g, b), sun.angle_deg)
 
@@ -32,6 +32,6 @@ def sun_light(sky: AnySky, sun: Sun | None) -> Distant | None:
         return None
     light = distant_sun(sun)
     if isinstance(sky, Daylight):
-        left = opening(sun.elevation_deg, sky) * air(sun.elevation_deg, sky) * light.irradiance
+        left = opening(sun.elevation, sky) * air(sun.elevation, sky) * light.irradiance
         light = Distant(light.direction, (float(left[0]), float(left[1]), float(left[2])), light.angle_deg)
     return light if max(light.irradiance) > 1e-6 else None

@@ -228,9 +228,9 @@ def _sky_parts(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[_Maps, F
         return maps, np.full(3, sky.strength), np.zeros(3), _turn(sky.rotation_deg)
     if isinstance(sky, Daylight):
         sun = sun or Sun()
-        maps = _daylight_maps(sky.turbidity, sky.clouds, sun.elevation_deg)
-        strength = sky.strength * opening(sun.elevation_deg, sky)
-        return maps, np.full(3, strength), np.zeros(3), _turn(sun.azimuth_deg - 90)
+        maps = _daylight_maps(sky.turbidity, sky.clouds, sun.elevation)
+        strength = sky.strength * opening(sun.elevation, sky)
+        return maps, np.full(3, strength), np.zeros(3), _turn(sun.azimuth - 90)
     zenith, horizon = (sky.strength * np.array(c) for c in (sky.zenith, sky.horizon))
     return _gradient_maps(), zenith - horizon, horizon, (1.0, 0.0)
 
