@@ -89,20 +89,20 @@ def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
 
 
 def test_speed_is_measured_in_a_second_once_kernels_are_there(monkeypatch):
-    from viewsphere.run import speed
+    from viewsphere.run.estimate import REFERENCE_MS, SPEED_RECIPE, measure_speed
     from viewsphere.run.shots import precompile as warm
 
-    monkeypatch.setattr(speed, "is_precompiled", lambda shot: False)
-    assert speed.measure_speed() is None
+    monkeypatch.setattr("viewsphere.run.estimate.is_precompiled", lambda shot: False)
+    assert measure_speed() is None
     assert "speed        not measured" in doctor().stdout
-    monkeypatch.setattr(speed, "is_precompiled", lambda shot: True)
-    monkeypatch.setattr(speed, "render", lambda recipe: iter(range(5)))
+    monkeypatch.setattr("viewsphere.run.estimate.is_precompiled", lambda shot: True)
+    monkeypatch.setattr("viewsphere.run.estimate.render", lambda recipe: iter(range(5)))
     clock = iter([0.0, 0.020, 0.050, 0.070, 0.090])
-    monkeypatch.setattr(speed.time, "process_time", lambda: next(clock))
-    found = speed.measure_speed()
+    monkeypatch.setattr("time.process_time", lambda: next(clock))
+    found = measure_speed()
     assert found is not None and found.frame_ms == pytest.approx(20)
-    assert found.relative == pytest.approx(speed.REFERENCE_MS / 20)
-    assert warm.sketched(speed.RECIPE).objects
+    assert found.relative == pytest.approx(REFERENCE_MS / 20)
+    assert warm.sketched(SPEED_RECIPE).objects
 
 
 @pytest.mark.slow

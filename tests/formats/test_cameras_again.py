@@ -19,8 +19,7 @@ from viewsphere.errors import StoreError
 from viewsphere.planning.plan import plan
 from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.reproduce import make_again
-from viewsphere.run.reproduce_recipe import _free
-from viewsphere.run.stand_in import stand_in
+from viewsphere.run.reproduce_recipe import _free, stand_in
 
 SIZES = ((64, 48), (64, 48))
 LENSES = (("PINHOLE", (60, 61, 30.5, 25)), ("OPENCV", (60, 61, 33, 23, 0.1, -0.02, 1e-3, 2e-3)))

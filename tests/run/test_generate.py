@@ -18,7 +18,7 @@ from deadline import DEADLINE, until
 from small import small_recipe, tree_hash
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError, WorkerDied
 from viewsphere.run.executors import Listed, Outcome
-from viewsphere.run.executors.local import LocalCrew
+from viewsphere.run.executors.local import LocalPool
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.generate import generate
 from viewsphere.run.progress import Progress
@@ -232,7 +232,7 @@ def test_one_bad_model_is_left_out_if_asked(one_bad, tmp_path):
 def losing(monkeypatch):
     """The first two shots are lost with their workers, whoever makes them."""
 
-    class Losing(LocalCrew):
+    class Losing(LocalPool):
         def run(self, work, *heard):
             for number, outcome in enumerate(super().run(work, *heard)):
                 if isinstance(work, Listed) or number > 1:
@@ -241,7 +241,7 @@ def losing(monkeypatch):
                     shutil.rmtree(Store(self._root).shot_folder(outcome.key))
                     yield Outcome(outcome.key, error=WorkerDied(f"{outcome.key}: its worker died 2 times (it was lost)"))
 
-    monkeypatch.setattr("viewsphere.run.generate.hired", lambda root, portion, *_: Losing(root, portion, 0))
+    monkeypatch.setattr("viewsphere.run.generate.worker_pool", lambda root, portion, *_: Losing(root, portion, 0))
 
 
 @pytest.mark.slow

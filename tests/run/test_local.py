@@ -17,7 +17,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.planning.extension import whole
 from viewsphere.run.executors import Job, Listed, Queue
 from viewsphere.run.executors._jobs import MOST_DEATHS
-from viewsphere.run.executors.local import LocalCrew
+from viewsphere.run.executors.local import LocalPool
 from viewsphere.run.shots.tasks import ModelTask
 
 PORTION = whole(vs.plan(small_recipe()))
@@ -33,8 +33,8 @@ def jobs(**counts):
 
 def test_one_model_keeps_four_workers_busy():
     queue = Queue(jobs(car=16))
-    hands = [queue.next("").line for _ in range(4)]
-    assert hands == ["car"] * 4
+    lines = [queue.next("").line for _ in range(4)]
+    assert lines == ["car"] * 4
     assert len(left(queue)) == 12
 
 
@@ -167,8 +167,8 @@ def _without_memory():
     ],
 )  # fmt: skip
 def test_a_worker_that_dies_costs_a_retry_then_an_error(task, said, tmp_path):
-    with LocalCrew(tmp_path, PORTION, 1) as crew:
-        outcomes = list(crew.run(Listed((Job("x", "x", task(tmp_path)),))))
+    with LocalPool(tmp_path, PORTION, 1) as pool:
+        outcomes = list(pool.run(Listed((Job("x", "x", task(tmp_path)),))))
     assert len(outcomes) == 1
     assert said in str(outcomes[0].error)
 
@@ -180,8 +180,8 @@ def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
     notes = tmp_path / "notes"
     notes.mkdir()
     tasks = {"bad": Calls(_while_alone, notes, os.getpid(), before), **dict.fromkeys(("a", "b", "c"), LOOK_AT_CHAIR)}
-    with LocalCrew(tmp_path / "out", PORTION, 2) as crew:
-        outcomes = list(crew.run(Listed(tuple(Job(key, key, task) for key, task in tasks.items()))))
+    with LocalPool(tmp_path / "out", PORTION, 2) as pool:
+        outcomes = list(pool.run(Listed(tuple(Job(key, key, task) for key, task in tasks.items()))))
     assert [outcome.key for outcome in outcomes][-1] == "bad"
     assert str(outcomes[-1].error) == "1 workers"
     assert not any(outcome.error for outcome in outcomes[:-1])
@@ -191,9 +191,9 @@ def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
 def test_what_a_worker_cannot_do_ends_the_run_with_its_traceback(tmp_path):
     with (
         pytest.raises(ViewsphereError, match=r"x: a worker failed\nTraceback(.|\n)*AttributeError") as caught,
-        LocalCrew(tmp_path, PORTION, 1) as crew,
+        LocalPool(tmp_path, PORTION, 1) as pool,
     ):
-        list(crew.run(Listed((Job("x", "x", dict),))))
+        list(pool.run(Listed((Job("x", "x", dict),))))
     assert not isinstance(caught.value, UserError)
 
 
@@ -209,11 +209,11 @@ def test_workers_stay_for_the_next_list_and_one_that_died_meanwhile_is_replaced(
         return {child.pid for child in active_children()} - before
 
     before, job = {child.pid for child in active_children()}, Job("chair", "chair", LOOK_AT_CHAIR)
-    with LocalCrew(tmp_path, PORTION, 1) as crew:
-        first = list(crew.run(Listed((job,)))), pids()
-        second = list(crew.run(Listed((job, job)))), pids()
+    with LocalPool(tmp_path, PORTION, 1) as pool:
+        first = list(pool.run(Listed((job,)))), pids()
+        second = list(pool.run(Listed((job, job)))), pids()
         os.kill(*first[1], signal.SIGKILL)
-        third = list(crew.run(Listed((job,)))), pids()
+        third = list(pool.run(Listed((job,)))), pids()
     assert [len(outcomes) for outcomes, _ in (first, second, third)] == [1, 2, 1]
     assert not any(outcome.error for outcomes, _ in (first, second, third) for outcome in outcomes)
     assert first[1] == second[1] and len(third[1]) == 1 and third[1] != first[1]
@@ -240,8 +240,8 @@ def _interrupted():
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals are masked on POSIX alone")
 def test_ctrl_c_while_a_worker_starts_is_the_parents_to_hear(tmp_path, capfd):
-    with LocalCrew(tmp_path, Impatient(), 1) as crew:
-        outcomes = list(crew.run(Listed((Job("chair", "chair", LOOK_AT_CHAIR),))))
+    with LocalPool(tmp_path, Impatient(), 1) as pool:
+        outcomes = list(pool.run(Listed((Job("chair", "chair", LOOK_AT_CHAIR),))))
     assert [outcome.error for outcome in outcomes] == [None]
     assert "Traceback" not in capfd.readouterr().err
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())

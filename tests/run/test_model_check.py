@@ -10,7 +10,7 @@ from small import small_recipe, tree_hash
 from viewsphere.composing.physics import packages
 from viewsphere.errors import MissingExtraError, ModelError, RecipeError, StoreError
 from viewsphere.run.datasets import converting
-from viewsphere.run.model_check import check_models
+from viewsphere.run.shots.models import check_models
 
 HOUSE = "v 0 0 0\nv 103 0 0\nv 103 50 0\nv 0 50 60\nf 1 2 3\nf 1 3 4\nf 1 2 4\n"
 RECIPE = """name: houses

@@ -111,7 +111,7 @@ from pathlib import Path
 import viewsphere as vs
 from small import ROOT, small_recipe
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.run.executors import Job, Listed, hired
+from viewsphere.run.executors import Job, Listed, worker_pool
 from viewsphere.run.shots.tasks import ModelTask
 from viewsphere.planning.extension import whole
 from viewsphere.store import Store
@@ -125,10 +125,10 @@ if sys.argv[3] == "shared":
     Store(root).open_for(portion.record)
 chairs = [ModelSpec(key=f"chair{i}", source="zoo:chair", category="chair", category_id=1, seed=i) for i in range(3)]
 tasks = [Job(spec.key, spec.key, ModelTask("model", spec)) for spec in chairs]
-with hired(root, portion, 0, sys.argv[1]) as crew:
-    for outcome in crew.run(Listed((Job("x", "x", Deadly()), *tasks))):
+with worker_pool(root, portion, 0, sys.argv[1]) as pool:
+    for outcome in pool.run(Listed((Job("x", "x", Deadly()), *tasks))):
         print(outcome.key, "|", type(outcome.error).__name__, "|", outcome.error, flush=True)
-    print(crew.nodes, crew.under_way)
+    print(pool.nodes, pool.under_way)
 """
 
 

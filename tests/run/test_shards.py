@@ -21,7 +21,7 @@ from deadline import DEADLINE, until
 from small import small_recipe, tree_hash
 from viewsphere.check import check
 from viewsphere.errors import ModelError, StoreError, UserError
-from viewsphere.model.share import Share
+from viewsphere.model.shard import Shard
 from viewsphere.planning.extension import whole
 from viewsphere.run.generate import Missing, generate
 from viewsphere.run.opening import prepare, to_render
@@ -148,15 +148,15 @@ def test_shards_on_the_command_line():
 def test_a_bad_shard_is_refused_in_one_line_before_anything_is_made(recipe_file, tmp_path):
     answer = viewsphere("render", recipe_file, "-o", tmp_path / "out", "--shard", "7/7")
     assert (answer.returncode, answer.stderr.count("\n")) == (2, 1)
-    assert "--shard: expected k/n, the k-th of n shares counted from 0, such as 0/16; found '7/7'" in answer.stderr
+    assert "--shard: expected k/n, the k-th of n shards counted from 0, such as 0/16; found '7/7'" in answer.stderr
     assert not (tmp_path / "out").exists()
 
 
 def test_each_shot_is_in_one_shard(tmp_path):
     portion = to_render(prepare(small_recipe(shot_frames=1)), Store(tmp_path / "out"))
-    shares = [[row.key for row in replace(portion, share=Share(k, 5)).rows] for k in range(5)]
-    assert sorted(key for keys in shares for key in keys) == sorted(row.key for row in portion.rows)
-    assert {len(keys) for keys in shares} == {2, 3}
+    shards = [[row.key for row in replace(portion, shard=Shard(k, 5)).rows] for k in range(5)]
+    assert sorted(key for keys in shards for key in keys) == sorted(row.key for row in portion.rows)
+    assert {len(keys) for keys in shards} == {2, 3}
 
 
 @pytest.mark.slow
@@ -170,7 +170,7 @@ def test_a_share_of_an_index_is_counted_as_its_rows_are(data):
     index = Index(tuple(blocks), first=data.draw(number), most=data.draw(number), part=0)
     rows, of = list(index), data.draw(number)
     k = data.draw(st.integers(0, of - 1))
-    own = replace(index, share=Share(k, of))
+    own = replace(index, shard=Shard(k, of))
     assert list(own) == [own[i] for i in range(len(own))] == rows[k::of]
     assert own.samples == sum(row.count for row in own)
     assert [own.find(row.key) == row for row in rows] == [row in rows[k::of] for row in rows]
@@ -184,11 +184,11 @@ def test_a_shard_of_a_hundred_million_frames_counts_out_no_row_that_it_does_not_
     views = {"kind": "sphere", "count": 50_000_000, "distance": 3}
     planned = prepare(small_recipe(viewpoints=views, max_frames=10**9, shot_frames=16))
     made = counted(monkeypatch, Index, "_row")
-    shares = [replace(whole(planned), share=Share(k, 7)) for k in range(7)]
-    works = [Missing(portion, Store(tmp_path)) for portion in shares]
+    shards = [replace(whole(planned), shard=Shard(k, 7)) for k in range(7)]
+    works = [Missing(portion, Store(tmp_path)) for portion in shards]
     assert sum(work.total for work in works) == planned.frames == 10**8
     assert sum(count for work in works for _, count in work.lines()) == 10**8 // 16
-    assert all(len(portion.models) == len(portion.subjects) == 2 for portion in shares)
+    assert all(len(portion.models) == len(portion.subjects) == 2 for portion in shards)
     assert len(list(islice(works[3].rows(), 5))) == 5 and works[3].resumed == 0
     assert len(made) <= 7 * 2 + 6
 

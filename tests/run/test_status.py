@@ -22,7 +22,7 @@ from viewsphere.run.status import status
 from viewsphere.store import Store
 from viewsphere.store.index import Index
 from viewsphere.store.shots.folder import RUN
-from viewsphere.store.shots.heartbeat import SILENT_S, Heartbeat, Pulse
+from viewsphere.store.shots.heartbeat import SILENT_S, Heartbeat, HeartbeatWriter
 
 SPHERE = {"kind": "sphere", "count": 50_000_000, "distance": 3}
 
@@ -47,7 +47,7 @@ def test_a_clock_that_jumps_changes_no_rate(jump, monkeypatch):
     ticks, now = [0.0], [1e9]
     monkeypatch.setattr("viewsphere.store.shots.heartbeat.time.monotonic", lambda: ticks[0])
     monkeypatch.setattr("viewsphere.store.shots.heartbeat.time.time", lambda: now[0])
-    pulse = Pulse(lambda text: None)
+    pulse = HeartbeatWriter(lambda text: None)
     pulse.enters("frames")
     pulse.now = replace(pulse.now, done=40, total=100)
     ticks[0], now[0] = 20.0, 1e9 + 20 + jump
@@ -103,7 +103,7 @@ def test_a_run_is_seen_at_work(tmp_path):
 
 def test_the_pulse_tells_what_is_under_way():
     written = []
-    with Pulse(written.append, (1, 2)) as pulse:
+    with HeartbeatWriter(written.append, (1, 2)) as pulse:
         pulse.enters("frames")
         pulse.now = replace(pulse.now, done=6, total=40, resumed=4, under_way=3)
         pulse.working_on["m-000000"] = None
@@ -115,7 +115,7 @@ def test_the_pulse_tells_what_is_under_way():
 def test_the_pulse_goes_on_by_itself(tmp_path, monkeypatch):
     monkeypatch.setattr("viewsphere.store.shots.heartbeat.BEAT_S", 0.02)
     written = []
-    with Pulse(written.append):
+    with HeartbeatWriter(written.append):
         assert until(lambda: len(written) > 3)
     beats = [json.loads(text)["beat"] for text in written]
     assert beats == sorted(beats) and beats[0] < beats[-1]

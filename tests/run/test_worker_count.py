@@ -6,7 +6,7 @@ import viewsphere as vs
 from command_line import viewsphere
 from small import small_recipe
 from viewsphere.planning.extension import whole
-from viewsphere.run.executors.local import LocalCrew
+from viewsphere.run.executors.local import LocalPool
 from viewsphere.run.generate import Missing
 from viewsphere.run.workers import worker_count as crew_size
 from viewsphere.run.workers.worker_count import default_workers
@@ -66,18 +66,18 @@ def test_finished_shots_and_models_do_not_count(tmp_path):
 
 
 @pytest.fixture
-def hired(monkeypatch):
-    """The number of workers of each crew of the process at its end."""
-    counts, dismiss = [], LocalCrew._dismiss
-    monkeypatch.setattr(LocalCrew, "_dismiss", lambda crew: (counts.append(len(crew._hands)), dismiss(crew)))
+def pool_sizes(monkeypatch):
+    """The number of workers of each pool of the process at its end."""
+    counts, dismiss = [], LocalPool._dismiss
+    monkeypatch.setattr(LocalPool, "_dismiss", lambda pool: (counts.append(len(pool._pool)), dismiss(pool)))
     return counts
 
 
-def test_render_hires_nobody_for_one_picture_unless_told_to(hired, tmp_path):
+def test_render_hires_nobody_for_one_picture_unless_told_to(pool_sizes, tmp_path):
     recipe = tmp_path / "one.yaml"
     recipe.write_text(one_post_box(channels=["depth"], formats=[]).to_yaml(), "utf-8")
     assert viewsphere("render", recipe, "-o", tmp_path / "a").returncode == 0
     assert viewsphere("render", recipe, "-o", tmp_path / "a").returncode == 0
-    assert hired == [0, 0]
+    assert pool_sizes == [0, 0]
     assert viewsphere("render", recipe, "-o", tmp_path / "b", "--workers", 2).returncode == 0
-    assert hired == [0, 0, 1]
+    assert pool_sizes == [0, 0, 1]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from viewsphere.model.share import Share
+from viewsphere.model.shard import Shard
 from viewsphere.store.index import Block, Index, length, numbers
 
 SUBJECTS = st.text("ab-0+", min_size=1, max_size=4)
@@ -53,7 +53,7 @@ def test_every_way_leads_to_the_same_row(index):
     keys = ["", "no-such", *(row.key for row in rows), "a-999999"]
     assert list(index.found(keys)) == rows
     assert list(index.held(keys)) == [(row.key, row.subject, row.count) for row in rows]
-    own = replace(index, share=Share(1, 3))
+    own = replace(index, shard=Shard(1, 3))
     assert list(own.held(keys)) == [(row.key, row.subject, row.count) for row in own]
     for subject in index.subjects:
         own = [row for row in rows if row.subject == subject]

@@ -16,7 +16,7 @@ from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.limits import limits
 from viewsphere.run.datasets.repairing import Mender
 from viewsphere.run.exports.exporting import export
-from viewsphere.run.progress import Listener, unheard
+from viewsphere.run.progress import Listener, null_listener
 from viewsphere.store import Dataset
 from viewsphere.store.credits import CREDITS, write_credits
 
@@ -38,7 +38,7 @@ def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = No
     calling process. Raises StoreError where there is no plan that can be read.
     """
     dataset = Dataset(root)
-    mending = _Mending(dataset, Mender(dataset.store, dataset.plan, workers, listener or unheard))
+    mending = _Mending(dataset, Mender(dataset.store, dataset.plan, workers, listener or null_listener))
     with dataset.store.occupied():
         while mending.models(mending.damaged_models()):
             pass

@@ -109,7 +109,7 @@ def _kernels() -> dict[str, Any]:
 
 def _speed() -> dict[str, Any] | None:
     """CPU milliseconds of a frame, beside the machine of docs/performance.md; None where kernels are not compiled yet."""
-    from viewsphere.run.speed import REFERENCE_MS, measure_speed
+    from viewsphere.run.estimate import REFERENCE_MS, measure_speed
 
     speed = measure_speed()
     return speed and {"frame_ms": speed.frame_ms, "relative": speed.relative, "reference_ms": REFERENCE_MS}

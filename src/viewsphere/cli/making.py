@@ -419,7 +419,7 @@ def render(
 
 
 def _model_warnings(planned: Plan, quiet: bool) -> tuple[str, ...]:
-    from viewsphere.run.model_check import check_models
+    from viewsphere.run.shots.models import check_models
 
     with ProgressBar(quiet) as bar:
         said = check_models(planned, bar.show)

@@ -32,7 +32,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import quantity
-from viewsphere.model.share import ALL, Share
+from viewsphere.model.shard import ALL, Shard
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
 from viewsphere.planning.fitting import check_fit, settings
@@ -45,16 +45,16 @@ from viewsphere.store.index import Index, Ranges, numbers
 
 
 @dataclass(frozen=True, eq=False)
-class Portion(Sendable):
+class DatasetPart(Sendable):
     """A part of a data set, and the plan of its recipe, which renders it. `record` is the whole data set's.
 
-    A run may have a `share` of it: every n-th shot of each index, whatever is there already.
+    A run may have a `shard` of it: every n-th shot of each index, whatever is there already.
     """
 
     plan: Plan
     record: PlanRecord
     number: int
-    share: Share = ALL
+    shard: Shard = ALL
 
     @property
     def part(self) -> Part:
@@ -66,7 +66,7 @@ class Portion(Sendable):
         """Return whether all that its recipe asks for was there before."""
         return not self.part.frames and not self.part.supplies
 
-    def remembering(self, store: Store) -> Portion:
+    def remembering(self, store: Store) -> DatasetPart:
         """The same portion, which keeps in the store what is simulated for it."""
         from viewsphere.store import Simulated  # which loads what reads stores
 
@@ -85,10 +85,10 @@ class Portion(Sendable):
     @cached_property
     def models(self) -> tuple[tuple[ModelSpec, tuple[TimeStep, ...]], ...]:
         """The models that the recipe keeps, with the data set's numbers of their categories, and their time steps; of a share
-        those that its shots need, and its share of all, so that shares together have every model.
+        those that its shots need, and its shard of all, so that shards together have every model.
         """
         kept = enumerate(self.plan.kept_specs)
-        own = (spec for i, spec in kept if self.share.is_all or self.share.has(i) or spec.key in self._needed)
+        own = (spec for i, spec in kept if self.shard.is_all or self.shard.has(i) or spec.key in self._needed)
         return tuple((self._numbered(spec), self.plan.steps_of(spec)) for spec in own)
 
     @cached_property
@@ -112,7 +112,7 @@ class Portion(Sendable):
     @cached_property
     def indices(self) -> tuple[Index, ...]:
         """The indices of the shots: of its own ones, then of those with channels of older frames."""
-        return tuple(replace(index, share=self.share) for index in self.record.indices_of(self.number))
+        return tuple(replace(index, shard=self.shard) for index in self.record.indices_of(self.number))
 
     @property
     def rows(self) -> Iterator[Row]:
@@ -122,7 +122,7 @@ class Portion(Sendable):
     @cached_property
     def subjects(self) -> tuple[str, ...]:
         """The subjects of the shots, each once; of the whole part, all subjects of the plan."""
-        if self.share.is_all:
+        if self.shard.is_all:
             return self.plan.taken
         return tuple(dict.fromkeys(subject for index in self.indices for subject, shots in index.counts.items() if shots))
 
@@ -189,18 +189,18 @@ NOTHING = PlanRecord("", "", "", {}, (), (), (), (), 0, 0, 0)
 """A data set without parts."""
 
 
-def whole(planned: Plan) -> Portion:
+def whole(planned: Plan) -> DatasetPart:
     """A recipe's plan as the only part of a data set."""
     return extend(planned, NOTHING)
 
 
-def resumed(planned: Plan, there: PlanRecord, number: int) -> Portion:
+def resumed(planned: Plan, there: PlanRecord, number: int) -> DatasetPart:
     """A part of a data set that this plan began before."""
     wanted, _ = numbered(there, planned.pose_list)
-    return Portion(planned.keeping(_splits(there.parts[:number]), wanted), there, number)
+    return DatasetPart(planned.keeping(_splits(there.parts[:number]), wanted), there, number)
 
 
-def extend(planned: Plan, there: PlanRecord) -> Portion:
+def extend(planned: Plan, there: PlanRecord) -> DatasetPart:
     """Return the additions of a recipe to a data set, as its new last part.
 
     Raises RecipeError where the recipe's pictures or labels do not fit the existing ones.
@@ -246,7 +246,7 @@ def extend(planned: Plan, there: PlanRecord) -> Portion:
         max_objects=max(there.max_objects, planned.max_objects),
         parts=(*there.parts, part),
     )
-    return Portion(planned, record, len(there.parts))
+    return DatasetPart(planned, record, len(there.parts))
 
 
 def _splits(parts: Sequence[Part]) -> dict[str, str]:

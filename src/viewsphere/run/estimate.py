@@ -11,6 +11,7 @@ kernels.
 from __future__ import annotations
 
 import os
+import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -19,16 +20,33 @@ from pathlib import Path
 from viewsphere.aside import temporary
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.planning.extension import Portion
+from viewsphere.planning.extension import DatasetPart
 from viewsphere.planning.plan import Plan
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exports.exporting import write
 from viewsphere.run.exports.unused import Unused, unused
+from viewsphere.run.memory import render
 from viewsphere.run.opening import prepare, to_render
-from viewsphere.run.shots.precompile import load_kernels
+from viewsphere.run.shots.precompile import is_precompiled, load_kernels, sketched
 from viewsphere.run.shots.tasks import Worker
 from viewsphere.store import Dataset, Row, Store
+
+SPEED_RECIPE = Recipe.model_validate(
+    {
+        "models": [{"source": "zoo:car"}],
+        "viewpoints": {"azimuth": {"start": 0, "stop": 345, "step": 15}, "elevation": [20], "distance": 4},
+        "camera": {"size": [640, 480]},
+    }
+)
+REFERENCE_MS = 63.0
+"""CPU milliseconds of a frame on the machine of docs/performance.md, an AMD EPYC, idle: the upper of five calls, 59 to 63,
+2026-11.
+"""
+
+SPEED_S = 1.0
+"""Seconds after which no frame is begun: beside imports and the first frame, the command stays below three."""
+
 
 SUBJECTS = 3
 SHOTS_OF_EACH = 4
@@ -125,7 +143,7 @@ def _shown(planned: Plan, spec: ModelSpec, rows: Sequence[Row]) -> tuple[TimeSte
     return tuple(step for step in steps if step.frame in shown) or steps
 
 
-def _model_work(store: Store, portion: Portion, spec: ModelSpec, steps: Sequence[TimeStep]) -> Callable[[], object]:
+def _model_work(store: Store, portion: DatasetPart, spec: ModelSpec, steps: Sequence[TimeStep]) -> Callable[[], object]:
     return lambda: Worker(store.root, portion).models.make(spec, steps)
 
 
@@ -172,3 +190,27 @@ class _Stopwatch:
 
     def mean(self, works: Sequence[Callable[[], object]]) -> float:
         return sum(map(self, works)) / len(works)
+
+
+@dataclass(frozen=True)
+class Speed:
+    """CPU milliseconds of a frame, and how many times as many frames this machine makes as the reference."""
+
+    frame_ms: float
+    relative: float
+
+
+def measure_speed() -> Speed | None:
+    """The median over some frames, without the first; None where kernels would have to be compiled."""
+    if not is_precompiled(sketched(SPEED_RECIPE)):
+        return None
+    begun, before, spent = time.monotonic(), 0.0, list[float]()
+    for number, _ in enumerate(render(SPEED_RECIPE)):
+        now = time.process_time()
+        if number:
+            spent.append(now - before)
+        if number > 1 and time.monotonic() > begun + SPEED_S:
+            break
+        before = now
+    frame_ms = 1000 * statistics.median(spent)
+    return Speed(frame_ms, REFERENCE_MS / frame_ms)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import count
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain, count
 from os import PathLike
 from typing import Any
 
@@ -13,17 +15,18 @@ from viewsphere.model.mistakes import shown
 from viewsphere.model.notebook import Shown
 from viewsphere.model.quantity import quantity
 from viewsphere.model.sample import Sample
-from viewsphere.model.share import Share
+from viewsphere.model.shard import Shard
 from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import Plan, plan
-from viewsphere.planning.turns import Turns
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.progress import shown_on_terminal
-from viewsphere.run.shards import known_to_loaders, share_of, share_of_rank, share_of_worker
+from viewsphere.run.shards import register_for_loaders, shard_of, shard_of_rank, shard_of_worker
 from viewsphere.run.shots.framing import Framing
 from viewsphere.run.shots.precompile import precompile, told_to
 from viewsphere.run.shots.stages import Stages
+from viewsphere.store import Row
+from viewsphere.store.index import Index
 
 
 class Frames(Shown, Iterable[Sample]):
@@ -33,19 +36,19 @@ class Frames(Shown, Iterable[Sample]):
     and makes it an iterator, which ends once. PyTorch's DataLoader takes it as an IterableDataset.
     """
 
-    def __init__(self, recipe: Recipe, shard: Share | None, shuffle: bool, epochs: int | None, redraw: bool) -> None:
+    def __init__(self, recipe: Recipe, shard: Shard | None, shuffle: bool, epochs: int | None, redraw: bool) -> None:
         self.plan = prepare(recipe)
         self.epoch = 0
         self._shard, self._shuffle, self._epochs, self._redraw = shard, shuffle, epochs, redraw
         self._stages = Stages()
         self._taken: Iterator[Sample] | None = None
         self._is_compiled = False
-        known_to_loaders(type(self))
+        register_for_loaders(type(self))
 
     def __getstate__(self) -> dict[str, Any]:
         """The state sent to workers of data loaders: this process's rank, but no warm caches."""
         cold = {"_stages": Stages(), "_taken": None, "_is_compiled": False}
-        return {**self.__dict__, "_shard": self._shard or share_of_rank(), **cold}
+        return {**self.__dict__, "_shard": self._shard or shard_of_rank(), **cold}
 
     def __repr__(self) -> str:
         loops = "endless" if self._epochs is None else f"epochs {self._epochs}"
@@ -55,9 +58,9 @@ class Frames(Shown, Iterable[Sample]):
         """Frames of a loop, of this shard or rank alone; raises TypeError where loops are endless."""
         if self._epochs is None:
             raise TypeError("frames of epochs=None have no end, and no length")
-        turns = Turns(self.plan)
-        share = self._shard or share_of_rank()
-        return self._epochs * (self.plan.frames if share.of == 1 else share.size(len(turns)) * (self.plan.frames // len(turns)))
+        units = RenderUnits(self.plan)
+        shard = self._shard or shard_of_rank()
+        return self._epochs * (self.plan.frames if shard.of == 1 else shard.size(len(units)) * (self.plan.frames // len(units)))
 
     def __iter__(self) -> Iterator[Sample]:
         return self._taken or self._pass()
@@ -74,24 +77,24 @@ class Frames(Shown, Iterable[Sample]):
 
     def _pass(self) -> Iterator[Sample]:
         """The frames of one loop that are this process's."""
-        share = (self._shard or share_of_rank()).parted(share_of_worker(self))
+        shard = (self._shard or shard_of_rank()).parted(shard_of_worker(self))
         epochs = count(self.epoch) if self._epochs is None else range(self.epoch, self.epoch + self._epochs)
         self.epoch += self._epochs or 0
         for epoch in epochs:
-            yield from self._epoch(epoch, share)
+            yield from self._epoch(epoch, shard)
 
-    def _epoch(self, epoch: int, share: Share) -> Iterator[Sample]:
+    def _epoch(self, epoch: int, shard: Shard) -> Iterator[Sample]:
         planned = self._drawn(epoch)
-        whole = share.of == 1 and not self._shuffle
-        turns, seen = Turns(planned, planned.shot_frames if whole else 1), set[str]()
+        whole = shard.of == 1 and not self._shuffle
+        units, seen = RenderUnits(planned, planned.shot_frames if whole else 1), set[str]()
         framing = Framing(planned, planned, self._stages, self._stages.box)
-        order = turns.shuffled(epoch) if self._shuffle else turns.in_order()
-        for turn in share(order):
-            if turn.subject not in seen:
-                seen.add(turn.subject)
-                self._stages.read_ahead(planned, planned.cast(turn.subject))
-                self._stages.check_distances(planned, turn.subject)
-            for row in turns.rows(turn):
+        order = units.shuffled(epoch) if self._shuffle else units.in_order()
+        for unit in shard(order):
+            if unit.subject not in seen:
+                seen.add(unit.subject)
+                self._stages.read_ahead(planned, planned.cast(unit.subject))
+                self._stages.check_distances(planned, unit.subject)
+            for row in units.rows(unit):
                 shot = framing.shot(row)
                 self._compile_for(shot)
                 yield from self._stages.render(shot)
@@ -122,7 +125,7 @@ def render(
 
     In workers of a PyTorch DataLoader, each renders its share, and all together render every frame once an epoch. `shard`
     (k, n) renders the k-th of n shares, counted from 0; by default that of this process's rank where `torch.distributed` is
-    initialised, else all. Workers part their rank's or shard's share.
+    initialised, else all. Workers part their rank's or shard's frames.
 
     `shuffle` draws an order for each epoch from the recipe's seed; poses are shuffled one by one (all sensors of one
     together), sequences as a whole. `epochs` is how often a loop renders all frames, None for endless loops. With `redraw`
@@ -132,4 +135,42 @@ def render(
     """
     if epochs is not None and not (isinstance(epochs, int) and epochs > 0):
         raise UserError(f"epochs: expected a number of 1 or more, or None for endless frames; found {shown(epochs)}")
-    return Frames(Recipe.of(recipe), None if shard is None else share_of(shard), shuffle, epochs, redraw)
+    return Frames(Recipe.of(recipe), None if shard is None else shard_of(shard), shuffle, epochs, redraw)
+
+
+@dataclass(frozen=True, eq=False)
+class RenderUnits:
+    """The units in which loaders distribute and shuffle a plan: up to `most` poses of one subject, by all sensors, or a whole
+    sequence, whose instants stay in order.
+    """
+
+    plan: Plan
+    most: int = 1
+
+    @cached_property
+    def _index(self) -> Index:
+        time = self.plan.recipe.time
+        return Index(self.plan.blocks, 0, self.most if time is None else time.count, 0)
+
+    def __len__(self) -> int:
+        return len(self._index)
+
+    def in_order(self) -> Iterator[Row]:
+        """Yield all units, subject by subject."""
+        return chain.from_iterable(map(self._index.of, self.plan.taken))
+
+    def shuffled(self, epoch: int) -> Iterator[Row]:
+        """Yield all units in an order that the recipe's seed and the epoch draw."""
+        rng = generator(self.plan.recipe.lasting_seed, "turns", str(epoch))
+        return (self._index[int(number)] for number in rng.permutation(len(self)))
+
+    def rows(self, unit: Row) -> Iterator[Row]:
+        """The shots of a unit: a sequence is rendered in the shots that the plan cuts it into."""
+        if self.plan.recipe.time is None:
+            yield unit
+            return
+        first, end = unit.first, unit.first + unit.count
+        while first < end:
+            row = self.plan.rows.at(first)
+            yield row
+            first = row.first + row.count

@@ -14,7 +14,7 @@ from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Sensor
 from viewsphere.planning.checks.models import check_needs
 from viewsphere.planning.engine_digest import engine_digest
-from viewsphere.planning.extension import Portion, extend, resumed, whole
+from viewsphere.planning.extension import DatasetPart, extend, resumed, whole
 from viewsphere.planning.fitting import LOOK
 from viewsphere.planning.plan import Plan, check_engine, check_images, plan
 from viewsphere.plugins.format import FormatSpec
@@ -80,7 +80,7 @@ def _absent(entry: FormatEntry, name: str, kept: Sequence[str], recipe: Recipe, 
     )
 
 
-def to_render(planned: Plan, store: Store) -> Portion:
+def to_render(planned: Plan, store: Store) -> DatasetPart:
     """The part of the data set that this plan began before, else the whole of a new data set. Nothing is written.
 
     Raises StoreError for a data set that another version made, or another state of the engine's program.
@@ -96,7 +96,7 @@ def to_render(planned: Plan, store: Store) -> Portion:
     return _resumed(planned, store, found, number)
 
 
-def to_append(planned: Plan, store: Store) -> Portion:
+def to_append(planned: Plan, store: Store) -> DatasetPart:
     """Return the plan's additions to the data set, or their remainder if the part was begun. Nothing is written.
 
     Raises StoreError for a folder without a data set, for an unfinished data set, and for one from another version.
@@ -119,7 +119,7 @@ def to_append(planned: Plan, store: Store) -> Portion:
     return extend(planned, found)
 
 
-def commit(portion: Portion, store: Store) -> None:
+def commit(portion: DatasetPart, store: Store) -> None:
     """Make the portion a part of the data set; raises StoreError if another run appended something else meanwhile."""
     parts = portion.record.parts
     with store.locked():
@@ -133,7 +133,7 @@ def commit(portion: Portion, store: Store) -> None:
         store.save(portion.record)
 
 
-def _resumed(planned: Plan, store: Store, found: PlanRecord, number: int) -> Portion:
+def _resumed(planned: Plan, store: Store, found: PlanRecord, number: int) -> DatasetPart:
     _check_versions(store, found.parts)
     _check_look(planned, store, found, number)
     return resumed(planned, found, number)

@@ -28,7 +28,7 @@ class Progress:
 Listener = Callable[[Progress], None]
 
 
-def unheard(progress: Progress) -> None:
+def null_listener(progress: Progress) -> None:
     """Nobody listens."""
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +18,10 @@ from viewsphere import plugins
 from viewsphere.composing.viewpoints.pose_files import PoseFile
 from viewsphere.composing.viewpoints.poses import world_turn
 from viewsphere.geometry.rotation import rigid
+from viewsphere.limits import limits
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.listed import ListedObject, ListedShot
-from viewsphere.model.scene import IDENTITY
+from viewsphere.model.scene import IDENTITY, Vector
 from viewsphere.planning.models import numbered_specs
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.file import dump
@@ -26,8 +29,21 @@ from viewsphere.recipe.formats import Formats, read_formats
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.viewpoints import PoseList
 from viewsphere.run.exports.scope import needs_of
-from viewsphere.run.stand_in import CATEGORY, SOURCE, StandIn, stand_in
 from viewsphere.store.again import Again, AgainModel, Drafted
+
+SOURCE, CATEGORY = "zoo:car", "car"
+FILLED = 0.5
+"""Share of a picture's width that it fills, of half of the cameras."""
+
+SHORTEST = 1e-3
+"""Metres: of the model, and of what cameras are apart that do not stand at one place."""
+
+LONGEST = 0.9
+"""Of the size that models may have."""
+
+PARALLEL = 1e-6
+"""Smallest of the singular values, as a share of the largest, at which optical axes meet somewhere."""
+
 
 RECIPE, SHOTS, MODELS, SIDECARS = "recipe.yaml", "shots.jsonl", "models", "symmetries"
 CHANNELS = ("rgb", "depth", "instances")
@@ -202,3 +218,36 @@ def _text(data: dict[str, Any], of: str, found: Again, substitute: StandIn | Non
 
 def _comment(lines: Sequence[str]) -> str:
     return "".join(f"# {''.join(c if c.isprintable() else '?' for c in line)}\n" for line in lines)
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """A model at `origin`, a point of the cameras' world, `length` metres from front to back."""
+
+    origin: Vector
+    length: float
+
+
+def stand_in(shots: Sequence[ListedShot]) -> StandIn:
+    """A model at the point that is nearest to all optical axes, or ahead of the first camera where these are parallel or meet
+    behind it or in it; as large as half of the cameras show it well, and not so large that one would be inside.
+    """
+    poses = np.array([shot.world_from_camera for shot in shots])
+    centers, axes = poses[:, :3, 3], poses[:, :3, 2]
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    normal, rhs = across.sum(axis=0), (across @ centers[:, :, None]).sum(axis=0)[:, 0]
+    origin, _, _, singular = np.linalg.lstsq(normal, rhs, rcond=None)
+    if singular[-1] < PARALLEL * singular[0] or float(np.median(_ahead(centers, axes, origin))) <= SHORTEST:
+        spread = float(np.linalg.norm(centers - centers.mean(axis=0), axis=1).max())
+        origin = centers[0] + (2 * spread if spread > SHORTEST else 1.0) * axes[0]
+    distances = np.linalg.norm(centers - origin, axis=1)
+    widths = [shot.camera.width / shot.camera.fx for shot in shots if shot.camera] or [1.0]
+    sides = FILLED * float(np.median(distances)) * float(np.median(widths)), float(distances.min()), LONGEST * limits.MAX_SIZE
+    length = min(sides)
+    x, y, z = (round(value, 6) for value in origin.tolist())
+    return StandIn((x, y, z), max(SHORTEST, float(f"{length:.3g}")) if math.isfinite(length) else 1.0)
+
+
+def _ahead(centers: np.ndarray, axes: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Return the distance of a point ahead of each camera."""
+    return ((point - centers) * axes).sum(axis=1)

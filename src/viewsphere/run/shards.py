@@ -1,4 +1,4 @@
-"""The share of the frames that this process renders: that of a job array's task, a rank, or a data loader's worker.
+"""The shard of the frames that this process renders: that of a job array's task, a rank, or a data loader's worker.
 
 PyTorch is consulted only if the program has already imported it: it is no dependency.
 """
@@ -11,17 +11,17 @@ from typing import Any
 
 from viewsphere.errors import UserError
 from viewsphere.model.mistakes import shown
-from viewsphere.model.share import Share
+from viewsphere.model.shard import Shard
 
 
-def share_of(shard: object) -> Share:
-    """The share that the argument `shard` names; raises UserError for anything but (k, n) with 0 <= k < n."""
+def shard_of(shard: object) -> Shard:
+    """The shard that the argument `shard` names; raises UserError for anything but (k, n) with 0 <= k < n."""
     match shard:
         case (int(number), int(of)) if 0 <= number < of:
-            return Share(number, of)
+            return Shard(number, of)
         case _:
             raise UserError(
-                f"shard: expected (k, n), the k-th of n shares counted from 0, such as (0, 4); found {shown(shard)}"
+                f"shard: expected (k, n), the k-th of n shards counted from 0, such as (0, 4); found {shown(shard)}"
             )
 
 
@@ -29,34 +29,34 @@ def shard_named(text: str) -> tuple[int, int]:
     """The shard that the command line names k/n, k from 0; raises UserError for anything else."""
     found = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
     if found is None or int(found[1]) >= int(found[2]):
-        raise UserError(f"--shard: expected k/n, the k-th of n shares counted from 0, such as 0/16; found {shown(text)}")
+        raise UserError(f"--shard: expected k/n, the k-th of n shards counted from 0, such as 0/16; found {shown(text)}")
     return int(found[1]), int(found[2])
 
 
-def share_of_rank() -> Share:
-    """The share of this process among the ranks of PyTorch's default process group; all where there is none."""
+def shard_of_rank() -> Shard:
+    """The shard of this process among the ranks of PyTorch's default process group; all where there is none."""
     distributed: Any = sys.modules.get("torch.distributed")
     if distributed is None or not distributed.is_available() or not distributed.is_initialized():
-        return Share()
-    return Share(distributed.get_rank(), distributed.get_world_size())
+        return Shard()
+    return Shard(distributed.get_rank(), distributed.get_world_size())
 
 
-def share_of_worker(frames: object) -> Share:
-    """The share of this process among the workers of a PyTorch DataLoader that iterates over its data set; all where this
+def shard_of_worker(frames: object) -> Shard:
+    """The shard of this process among the workers of a PyTorch DataLoader that iterates over its data set; all where this
     is none, or where the loader itself says which item each worker makes.
 
     `frames`: what may be the loader's data set itself.
     """
     data: Any = sys.modules.get("torch.utils.data")
     if data is None:
-        return Share()
+        return Shard()
     info = data.get_worker_info()
     if info is None or not (info.dataset is frames or isinstance(info.dataset, data.IterableDataset)):
-        return Share()
-    return Share(info.id, info.num_workers)
+        return Shard()
+    return Shard(info.id, info.num_workers)
 
 
-def known_to_loaders(kind: type) -> None:
+def register_for_loaders(kind: type) -> None:
     """Let PyTorch's DataLoader take objects of a class as data sets to iterate over."""
     data: Any = sys.modules.get("torch.utils.data")
     if data is not None:

@@ -13,7 +13,7 @@ from functools import cached_property
 from itertools import accumulate
 from typing import overload
 
-from viewsphere.model.share import ALL, Share
+from viewsphere.model.shard import ALL, Shard
 
 MOST_DIGITS = 100
 """More than a position's number has: a stranger's key may end with more than Python reads."""
@@ -71,7 +71,7 @@ class Index(Sequence[Row]):
     """The shots of some blocks, in order, of `most` positions at most: those of one subject differ by one position at most.
 
     `first` is the number of the first sample, `part` that of the part that renders them; `suffix` ends all keys. An index may
-    have but a `share` of these shots, which are as they are in the whole one.
+    have but a `shard` of these shots, which are as they are in the whole one.
     """
 
     blocks: tuple[Block, ...]
@@ -79,10 +79,10 @@ class Index(Sequence[Row]):
     most: int
     part: int
     suffix: str = ""
-    share: Share = ALL
+    shard: Shard = ALL
 
     def __len__(self) -> int:
-        return self.share.size(self._rows[-1])
+        return self.shard.size(self._rows[-1])
 
     @overload
     def __getitem__(self, index: int) -> Row: ...
@@ -95,7 +95,7 @@ class Index(Sequence[Row]):
         i = index + len(self) if index < 0 else index
         if not 0 <= i < len(self):
             raise IndexError(f"expected a shot of 0..{len(self) - 1}, got {index}")
-        row = self.share.nth(i)
+        row = self.shard.nth(i)
         number = bisect_right(self._rows, row) - 1
         subject, chunk = divmod(row - self._rows[number], self._chunks(number))
         return self._row(number, subject, chunk)
@@ -161,7 +161,7 @@ class Index(Sequence[Row]):
             raise IndexError(f"expected a sample of {self.first}..{self._samples[-1] - 1}, got {sample}")
         number, subject, chunk = self._place_of(sample)
         if chunk not in self._own(number, subject):
-            raise IndexError(f"expected a sample of share {self.share}, got {sample}")
+            raise IndexError(f"expected a sample of shard {self.shard}, got {sample}")
         return self._row(number, subject, chunk)
 
     def find(self, key: str) -> Row | None:
@@ -190,7 +190,7 @@ class Index(Sequence[Row]):
                 if (number, end) not in ends:
                     ends[number, end] = self._chunk_of(number, end)
                 chunk = ends[number, end]
-                if chunk is not None and (self.share.is_all or chunk in self._own(number, place)):
+                if chunk is not None and (self.shard.is_all or chunk in self._own(number, place)):
                     yield key, (number, place, chunk)
 
     def _chunk_of(self, number: int, end: str) -> int | None:
@@ -228,21 +228,21 @@ class Index(Sequence[Row]):
         return number, subject, chunk
 
     def _own(self, number: int, subject: int) -> range:
-        """Return the chunks of a block's subject that are in the share."""
+        """Return the chunks of a block's subject that are in the shard."""
         chunks = self._chunks(number)
-        first = self.share.next(self._rows[number] + subject * chunks) - self._rows[number] - subject * chunks
-        return range(first, chunks, self.share.of)
+        first = self.shard.next(self._rows[number] + subject * chunks) - self._rows[number] - subject * chunks
+        return range(first, chunks, self.shard.of)
 
     def _samples_in(self, number: int, begin: int, end: int) -> int:
         """Number of the samples of the subjects begin..end-1 of a block, without counting out their rows."""
         block, chunks = self.blocks[number], self._chunks(number)
-        if self.share.is_all or not chunks:
+        if self.shard.is_all or not chunks:
             return (end - begin) * block.size * block.each
-        first = self.share.next(self._rows[number] + begin * chunks) - self._rows[number]
-        rows = range(first, end * chunks, self.share.of)
+        first = self.shard.next(self._rows[number] + begin * chunks) - self._rows[number]
+        rows = range(first, end * chunks, self.shard.of)
         # Before the row q of a block are floor(q * size / chunks) of its positions, whichever subject it is of.
         before, until = (
-            floor_sum(len(rows), chunks, self.share.of * block.size, row * block.size) for row in (first, first + 1)
+            floor_sum(len(rows), chunks, self.shard.of * block.size, row * block.size) for row in (first, first + 1)
         )
         return (until - before) * block.each
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from viewsphere.errors import RecipeError, ViewsphereError
 from viewsphere.labels import ChannelLabel, Sight, annotated, channel_labels, labels_of, sample_labels, sample_values
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.run.shots.reconstruct import Sights
+from viewsphere.run.shots.reconstruct import ViewReconstructor
 from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Dataset, ModelInfo, depth_step
 from viewsphere.store.samples.channel_files import MOST_STEPS
@@ -25,16 +25,16 @@ class Again:
 
     def __init__(self, dataset: Dataset, scenery: Scenery, models: Mapping[str, ModelInfo]) -> None:
         self._dataset = dataset
-        self._sights = Sights(dataset, scenery, models)
+        self._reconstructor = ViewReconstructor(dataset, scenery, models)
         self.not_run: dict[str, str] = {}
 
     def is_possible(self, sample: Sample) -> bool:
         """Return whether it is known what was seen."""
-        return self._sights.is_possible(sample)
+        return self._reconstructor.is_possible(sample)
 
     def differences(self, sample: Sample) -> Findings:
         """Yield the differences between a sample's stored and recomputed labels; none if the scenery has changed."""
-        sight = self._sights.of(sample, sample.files)
+        sight = self._reconstructor.of(sample, sample.files)
         if sight is None:
             return
         for name, label in channel_labels().items():

@@ -19,7 +19,7 @@ from viewsphere.check.report import in_short
 from viewsphere.errors import UserError
 from viewsphere.files import read_bytes, read_text
 from viewsphere.planning.engine_digest import script_digest
-from viewsphere.planning.extension import NOTHING, Portion, extend
+from viewsphere.planning.extension import NOTHING, DatasetPart, extend
 from viewsphere.planning.plan import Plan
 from viewsphere.run.shots.composing import Composer
 from viewsphere.run.shots.replanning import AnotherPlan, Replanned
@@ -109,7 +109,7 @@ class Recomputed:
             found = _read(folder / name)
             yield from in_words(differences(parsed(text) if text else None, found), f"shot {row.key}: {name}", "the recipe")
 
-    def _portion(self, number: int) -> Portion | None:
+    def _portion(self, number: int) -> DatasetPart | None:
         part = self._record.parts[number]
         if not part.is_rendered:
             self.why_not[number] = f"part {number + 1} was rendered elsewhere"

@@ -19,7 +19,7 @@ from viewsphere.run.datasets.importing import put_in_store, read_dataset
 from viewsphere.run.exports.exporting import linked, write
 from viewsphere.run.exports.scope import refuse, scope_of_foreign
 from viewsphere.run.exports.writable import writable
-from viewsphere.run.progress import Listener, unheard
+from viewsphere.run.progress import Listener, null_listener
 from viewsphere.store import Dataset, located, new_folder
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.places.local import TAKEN
@@ -73,7 +73,7 @@ def convert(
         with _told_of(store, foreign, source, located(out)):
             put_in_store(foreign, store, listener)
             dataset = Dataset(store)
-            notes = write(dataset, folders, listener or unheard, workers)
+            notes = write(dataset, folders, listener or null_listener, workers)
         return Converted(len(dataset), foreign.left_out, tuple(dict.fromkeys(notes)) + tuple(linked(dataset, out)))
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from viewsphere.errors import StoreError, UserError, ViewsphereError
-from viewsphere.planning.extension import Portion
-from viewsphere.run.executors import Job, Listed, hired
+from viewsphere.planning.extension import DatasetPart
+from viewsphere.run.executors import Job, Listed, worker_pool
 from viewsphere.run.opening import check_whether_same
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.run.shots.precompile import compile_kernels
@@ -66,8 +66,8 @@ class Mender:
         return errors
 
     def _run(self, number: int, jobs: Sequence[Job], errors: Errors) -> None:
-        with hired(self.store.root, self._portion(number), min(self.workers, len(jobs))) as crew:
-            for done, outcome in enumerate(crew.run(Listed(tuple(jobs))), 1):
+        with worker_pool(self.store.root, self._portion(number), min(self.workers, len(jobs))) as pool:
+            for done, outcome in enumerate(pool.run(Listed(tuple(jobs))), 1):
                 if outcome.error is not None:
                     errors[outcome.key] = outcome.error
                 self.tell(Progress("repair", done, len(jobs)))
@@ -91,7 +91,7 @@ class Mender:
                 problem = error
         raise problem
 
-    def _portion(self, number: int) -> Portion:
+    def _portion(self, number: int) -> DatasetPart:
         """A part, with its recipe's plan; raises UserError where that is not what it was."""
         check_whether_same(self.store, self.record.parts[number])
         try:

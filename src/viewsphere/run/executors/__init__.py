@@ -1,6 +1,6 @@
 """The executors of a run: processes of this machine (`local`), or the machines of a Ray cluster (`ray`).
 
-An executor is a file with a `Crew`; the common code is in `_jobs`. No other module depends on the choice of executor.
+An executor is a file with a `WorkerPool`; the common code is in `_jobs`. No other module depends on the choice of executor.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Protocol, Self
 from viewsphere.run.executors._jobs import LIVES, Job, Listed, Outcome, Queue, Work, ignored
 
 if TYPE_CHECKING:
-    from viewsphere.planning.extension import Portion
+    from viewsphere.planning.extension import DatasetPart
 
-__all__ = ["LIVES", "Crew", "Job", "Listed", "Outcome", "Queue", "Work", "hired"]
+__all__ = ["LIVES", "Job", "Listed", "Outcome", "Queue", "Work", "WorkerPool", "worker_pool"]
 
 
-class Crew(Protocol):
+class WorkerPool(Protocol):
     """Workers for a part of a data set, who stay warm until the context ends."""
 
     def __enter__(self) -> Self: ...
@@ -39,8 +39,8 @@ class Crew(Protocol):
         """The notes about the workers for the user, a line each."""
         ...
 
-    def run(self, work: Work, heard: Callable[[], None] = ignored) -> Iterator[Outcome]:
-        """Do all jobs; outcomes come as they are ready. `heard` is called when there is news, such as another frame under way.
+    def run(self, work: Work, report: Callable[[], None] = ignored) -> Iterator[Outcome]:
+        """Do all jobs; outcomes come as they are ready. `report` is called when there is news, such as another frame under way.
 
         A UserError is an outcome, and so is WorkerDied, of a job that was lost with its worker LIVES times; this one is raised
         where MOST_DEATHS workers die one after another and nothing is done in between, and anything else
@@ -49,16 +49,16 @@ class Crew(Protocol):
         ...
 
 
-def hired(root: Path, portion: Portion, workers: int, ray: str | None = None) -> Crew:
-    """A crew for a part of the data set at `root`: so many workers of this machine, this process itself if none; or, with the
-    address of a Ray cluster, at most so many of its CPUs, all if none.
+def worker_pool(root: Path, portion: DatasetPart, workers: int, ray: str | None = None) -> WorkerPool:
+    """A worker pool for a part of the data set at `root`: so many workers of this machine, this process itself if none; or,
+    with the address of a Ray cluster, at most so many of its CPUs, all if none.
 
     Raises UserError for an address that cannot be one, MissingExtraError where Ray is not installed.
     """
     if ray is None:
-        from viewsphere.run.executors.local import LocalCrew
+        from viewsphere.run.executors.local import LocalPool
 
-        return LocalCrew(root, portion, workers)
-    from viewsphere.run.executors.ray import RayCrew
+        return LocalPool(root, portion, workers)
+    from viewsphere.run.executors.ray import RayPool
 
-    return RayCrew(root, portion, workers, ray)
+    return RayPool(root, portion, workers, ray)

@@ -1,7 +1,7 @@
 """Processes of this machine that each do one job at a time, are handed what they have warm, and may die.
 
 `ProcessPoolExecutor` can hang when a worker dies or is replaced (CPython issue 115634) and knows nothing of what a worker has
-warm, hence our own (`_hands`).
+warm, hence our own (`workers/process.py`).
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, cast
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.kernels.garbage import pause_collection
 from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored
-from viewsphere.run.workers.pool import OUT_OF_MEMORY, Hand, belong_to_parent, deaf, end_of
+from viewsphere.run.workers.process import OUT_OF_MEMORY, WorkerProcess, belong_to_parent, end_reason, interrupts_deferred
 
 if TYPE_CHECKING:
-    from viewsphere.planning.extension import Portion
+    from viewsphere.planning.extension import DatasetPart
     from viewsphere.run.shots.tasks import Worker
 
 ADVICE = ", the last time while it was alone: give it more memory, or ask for smaller pictures or models"
@@ -29,7 +29,7 @@ LEAVING_S = 5.0
 """Seconds that workers have to end when all is done."""
 
 
-class LocalCrew:
+class LocalPool:
     """Worker processes for a part of a data set; with 0 workers, this process itself.
 
     A worker starts with its first job, which takes a second, and stays until the context ends.
@@ -38,15 +38,15 @@ class LocalCrew:
     nodes: int | None = None
     notes: tuple[str, ...] = ()
 
-    def __init__(self, root: Path, portion: Portion, workers: int) -> None:
+    def __init__(self, root: Path, portion: DatasetPart, workers: int) -> None:
         self._root = root
         self._workers = workers
         self._portion = portion
-        self._hands: list[_Hand] = []
+        self._pool: list[_Worker] = []
         self._here: Worker | None = None
         self._begun: dict[str, int] = {}
 
-    def __enter__(self) -> LocalCrew:
+    def __enter__(self) -> LocalPool:
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
@@ -58,50 +58,50 @@ class LocalCrew:
     def _let_go(self) -> None:
         """Give all workers the time to end by themselves, and to clear away what others could only find later."""
         until = time.monotonic() + LEAVING_S
-        for hand in self._hands:
-            hand.pipe.close()
-        for hand in self._hands:
-            hand.process.join(max(0.0, until - time.monotonic()))
+        for worker in self._pool:
+            worker.pipe.close()
+        for worker in self._pool:
+            worker.process.join(max(0.0, until - time.monotonic()))
 
     def _dismiss(self) -> None:
         """End all workers, and give back the memory of what they have warm."""
-        for hand in self._hands:
-            hand.stop()
-        self._hands.clear()
+        for worker in self._pool:
+            worker.stop()
+        self._pool.clear()
 
     @property
     def under_way(self) -> int:
         """Frames that were made of jobs without an outcome so far; those of a worker that dies no longer count."""
         return sum(self._begun.values())
 
-    def run(self, work: Work, heard: Callable[[], None] = ignored) -> Iterator[Outcome]:
-        """As `Crew.run`; `heard` is called when another frame is under way."""
-        queue = Queue(work, [hand.line for hand in self._hands])
+    def run(self, work: Work, report: Callable[[], None] = ignored) -> Iterator[Outcome]:
+        """As `WorkerPool.run`; `report` is called when another frame is under way."""
+        queue = Queue(work, [worker.line for worker in self._pool])
         if self._workers == 0:
-            yield from self._run_here(queue, heard)
+            yield from self._run_here(queue, report)
             return
-        busy: dict[Connection, _Hand] = {}
-        for hand in self._hands:
-            if hand.line in queue:
-                self._give(hand, queue, busy)
-        for hand in self._hands:
-            if hand.pipe not in busy:
-                self._give(hand, queue, busy)
-        while len(self._hands) < self._workers and self._give(None, queue, busy):
+        busy: dict[Connection, _Worker] = {}
+        for worker in self._pool:
+            if worker.line in queue:
+                self._give(worker, queue, busy)
+        for worker in self._pool:
+            if worker.pipe not in busy:
+                self._give(worker, queue, busy)
+        while len(self._pool) < self._workers and self._give(None, queue, busy):
             pass
         while busy:
             for pipe in wait(list(busy)):
-                yield from self._hear(busy, cast(Connection, pipe), queue, heard)  # Windows has another class
+                yield from self._receive(busy, cast(Connection, pipe), queue, report)  # Windows has another class
             if not busy and (job := queue.last()):
                 self._dismiss()
                 self._give_to(None, job, busy)
 
-    def _note(self, job: Job, frames: int, heard: Callable[[], None]) -> None:
+    def _note(self, job: Job, frames: int, report: Callable[[], None]) -> None:
         """Remember how many frames of a job are made."""
         self._begun[job.key] = frames
-        heard()
+        report()
 
-    def _run_here(self, queue: Queue, heard: Callable[[], None]) -> Iterator[Outcome]:
+    def _run_here(self, queue: Queue, report: Callable[[], None]) -> Iterator[Outcome]:
         with pause_collection():
             from viewsphere.run.shots.tasks import Worker
 
@@ -110,73 +110,73 @@ class LocalCrew:
         while (job := queue.next(line)) is not None:
             line = job.line
             try:
-                outcome = Outcome(job.key, self._here.do(job.task, lambda frames, job=job: self._note(job, frames, heard)))
+                outcome = Outcome(job.key, self._here.do(job.task, lambda frames, job=job: self._note(job, frames, report)))
             except UserError as error:
                 outcome = Outcome(job.key, error=error)
             self._begun.pop(job.key, None)
             yield outcome
 
-    def _give(self, hand: _Hand | None, queue: Queue, busy: dict[Connection, _Hand]) -> bool:
+    def _give(self, worker: _Worker | None, queue: Queue, busy: dict[Connection, _Worker]) -> bool:
         """Hand out the next job, to a new worker if none is given; False if there is none."""
-        job = queue.next(hand.line if hand else "")
+        job = queue.next(worker.line if worker else "")
         if job is not None:
-            self._give_to(hand, job, busy)
+            self._give_to(worker, job, busy)
         return job is not None
 
-    def _give_to(self, hand: _Hand | None, job: Job, busy: dict[Connection, _Hand]) -> None:
-        if hand is None:
-            with deaf():  # until it is known here, so that it is ended with the others
-                hand = _Hand(self._root, self._portion)
-                self._hands.append(hand)
-        busy[hand.pipe] = hand
-        hand.give(job)
+    def _give_to(self, worker: _Worker | None, job: Job, busy: dict[Connection, _Worker]) -> None:
+        if worker is None:
+            with interrupts_deferred():  # until it is known here, so that it is ended with the others
+                worker = _Worker(self._root, self._portion)
+                self._pool.append(worker)
+        busy[worker.pipe] = worker
+        worker.give(job)
 
-    def _hear(
-        self, busy: dict[Connection, _Hand], pipe: Connection, queue: Queue, heard: Callable[[], None]
+    def _receive(
+        self, busy: dict[Connection, _Worker], pipe: Connection, queue: Queue, report: Callable[[], None]
     ) -> Iterator[Outcome]:
         """Take the news of a frame; or one answer, or the news of a death, and hand out the next job."""
-        hand = busy[pipe]
-        job = hand.job
+        worker = busy[pipe]
+        job = worker.job
         assert job is not None
         try:
             news: Outcome | str | int = pipe.recv()
         except (EOFError, OSError):  # it may die in the middle of an answer
             self._end(job, busy, pipe)
-            self._hands.remove(hand)
-            if told := queue.again(job, end_of(hand.end(), ADVICE)):
-                yield told
+            self._pool.remove(worker)
+            if failed := queue.again(job, end_reason(worker.end(), ADVICE)):
+                yield failed
             self._give(None, queue, busy)
             return
         if isinstance(news, int):
-            self._note(job, news, heard)
+            self._note(job, news, report)
             return
         self._end(job, busy, pipe)
         if isinstance(news, str):
             raise ViewsphereError(f"{job.key}: a worker failed\n{news}")
         queue.ended()
-        self._give(hand, queue, busy)
+        self._give(worker, queue, busy)
         yield news
 
-    def _end(self, job: Job, busy: dict[Connection, _Hand], pipe: Connection) -> None:
+    def _end(self, job: Job, busy: dict[Connection, _Worker], pipe: Connection) -> None:
         """Its worker no longer does a job; the frames of one that died are made again, those of an outcome are in it."""
         self._begun.pop(job.key, None)
         del busy[pipe]
 
 
-class _Hand(Hand):
+class _Worker(WorkerProcess):
     """One worker process, and what it has warm."""
 
-    def __init__(self, root: Path, portion: Portion) -> None:
+    def __init__(self, root: Path, portion: DatasetPart) -> None:
         super().__init__(_serve, root, portion)
         self.line = ""
         self.job: Job | None = None
 
     def give(self, job: Job) -> None:
         self.job, self.line = job, job.line
-        self.tell(job)
+        self.send(job)
 
 
-def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
+def _serve(pipe: Connection, root: Path, portion: DatasetPart) -> None:
     """A worker's life: take a job, tell of each of its frames by their number so far, answer, until the other side is gone."""
     belong_to_parent()
     with pause_collection():

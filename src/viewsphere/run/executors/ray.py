@@ -30,7 +30,7 @@ except ImportError:
     raise MissingExtraError("--ray: expected the package ray, found none: pip install 'viewsphere[ray]'") from None
 
 if TYPE_CHECKING:
-    from viewsphere.planning.extension import Portion
+    from viewsphere.planning.extension import DatasetPart
     from viewsphere.run.shots.tasks import Worker
 
 TICK = 1.0
@@ -49,10 +49,10 @@ OF_A_MACHINE = frozenset({"VIEWSPHERE_CACHE", "VIEWSPHERE_BLENDER_PYTHON"})
 """Variables of the environment that say where something is on one machine, and mean nothing on others."""
 
 
-class RayCrew:
+class RayPool:
     """Workers on the CPUs of a cluster, at most so many, all if 0; machines that join later get workers, too."""
 
-    def __init__(self, root: Path, portion: Portion, most: int, address: str) -> None:
+    def __init__(self, root: Path, portion: DatasetPart, most: int, address: str) -> None:
         if address != "auto" and ":" not in address:
             raise UserError(f"--ray: expected auto, HOST:PORT or ray://HOST:PORT; found {address!r}")
         self._root = root.absolute()
@@ -60,148 +60,150 @@ class RayCrew:
         self._most = most
         self._address = address
         self._begun: dict[str, int] = {}
-        self._hands: list[_Hand] = []
+        self._pool: list[_Worker] = []
         self._failures: Counter[str] = Counter()
         self._unfit: dict[str, str] = {}
         self._looked = 0.0
 
-    def __enter__(self) -> RayCrew:
+    def __enter__(self) -> RayPool:
         self._connected_here = not ray.is_initialized()
         if self._connected_here:
             _connect(self._address)
-        self._told = ray.put((self._root, self._portion, os.getcwd(), _settings()))  # noqa: PTH109, pickled
+        self._shared = ray.put((self._root, self._portion, os.getcwd(), _settings()))  # noqa: PTH109, pickled
         return self
 
     def __exit__(self, *_: object) -> None:
         with suppress(RayError, ConnectionError):  # a cluster that is gone has no workers left
-            for hand in self._hands:
-                ray.kill(hand.actor)
-            refs = [hand.ref for hand in self._hands]
+            for worker in self._pool:
+                ray.kill(worker.actor)
+            refs = [worker.ref for worker in self._pool]
             if refs:
                 ray.wait(refs, num_returns=len(refs), timeout=GRACE)
-        self._hands.clear()
+        self._pool.clear()
         if self._connected_here:
             ray.shutdown()
 
     @property
     def under_way(self) -> int:
-        """As of `Crew`."""
+        """As of `WorkerPool`."""
         return sum(self._begun.values())
 
     @property
     def nodes(self) -> int:
-        """As of `Crew`."""
-        return len({hand.node for hand in self._hands if hand.is_ready})
+        """As of `WorkerPool`."""
+        return len({worker.node for worker in self._pool if worker.is_ready})
 
     @property
     def notes(self) -> tuple[str, ...]:
         """The machines that were left out, and why."""
         return tuple(f"left out {why}" for why in self._unfit.values())
 
-    def run(self, work: Work, heard: Callable[[], None] = ignored) -> Iterator[Outcome]:
-        """As `Crew.run`; `heard` is called now and then. Raises ViewsphereError if the cluster is gone."""
+    def run(self, work: Work, report: Callable[[], None] = ignored) -> Iterator[Outcome]:
+        """As `WorkerPool.run`; `report` is called now and then. Raises ViewsphereError if the cluster is gone."""
         try:
-            yield from self._run(work, heard)
+            yield from self._run(work, report)
         except ConnectionError as error:
             raise ViewsphereError(
                 f"--ray {self._address}: expected a Ray cluster, found it gone: {_first_line(error)}"
             ) from None
 
-    def _run(self, work: Work, heard: Callable[[], None]) -> Iterator[Outcome]:
-        queue = Queue(work, [hand.line for hand in self._hands])
+    def _run(self, work: Work, report: Callable[[], None]) -> Iterator[Outcome]:
+        queue = Queue(work, [worker.line for worker in self._pool])
         self._looked = 0.0
         while True:
-            for hand in [hand for hand in self._hands if hand.is_idle and hand.line in queue]:
-                self._give(hand, queue)
-            for hand in [hand for hand in self._hands if hand.is_idle]:
-                self._give(hand, queue)
-            if queue.is_done and not any(hand.job for hand in self._hands):
+            for worker in [worker for worker in self._pool if worker.is_idle and worker.line in queue]:
+                self._give(worker, queue)
+            for worker in [worker for worker in self._pool if worker.is_idle]:
+                self._give(worker, queue)
+            if queue.is_done and not any(worker.job for worker in self._pool):
                 return
             if time.monotonic() - self._looked > TICK:
                 self._look(queue.left)
-                heard()
-            for hand in self._heard_of():
-                yield from self._hear(hand, queue)
+                report()
+            for worker in self._answering():
+                yield from self._receive(worker, queue)
 
-    def _give(self, hand: _Hand, queue: Queue) -> None:
-        job = queue.next(hand.line)
-        if job is None and not any(other.job for other in self._hands if other.node == hand.node):
+    def _give(self, worker: _Worker, queue: Queue) -> None:
+        job = queue.next(worker.line)
+        if job is None and not any(other.job for other in self._pool if other.node == worker.node):
             job = queue.last()
         if job is not None:
-            hand.give(job)
+            worker.give(job)
 
     def _look(self, left: int) -> None:
         """See how far the workers are, and start others where there are CPUs for them, no more than there are jobs left."""
         self._looked = time.monotonic()
-        for hand in self._hands:
-            hand.ask()
-        for hand in _ready([hand for hand in self._hands if hand.asked is not None], "asked"):
-            key, frames = hand.told()
-            if hand.job is not None and hand.job.key == key:
+        for worker in self._pool:
+            worker.ask()
+        for worker in _ready([worker for worker in self._pool if worker.asked is not None], "asked"):
+            key, frames = worker.told()
+            if worker.job is not None and worker.job.key == key:
                 self._begun[key] = frames
         there = _nodes()
         nodes = {node: about for node, about in there.items() if node not in self._unfit}
-        if there and not nodes and not self._hands:
+        if there and not nodes and not self._pool:
             raise ViewsphereError("\n".join(self._unfit[node] for node in there))
-        taken = Counter(hand.node for hand in self._hands)
+        taken = Counter(worker.node for worker in self._pool)
         places = [(i, node) for node, (_, cpus) in nodes.items() for i in range(taken[node], cpus)]
-        wanted = left - sum(not hand.is_ready for hand in self._hands)
+        wanted = left - sum(not worker.is_ready for worker in self._pool)
         if self._most:
-            wanted = min(wanted, self._most - len(self._hands))
+            wanted = min(wanted, self._most - len(self._pool))
         for _, node in sorted(places)[: max(wanted, 0)]:  # machines in turns
-            self._hands.append(_Hand(node, nodes[node][0], self._told))
+            self._pool.append(_Worker(node, nodes[node][0], self._shared))
 
-    def _heard_of(self) -> list[_Hand]:
+    def _answering(self) -> list[_Worker]:
         """Return the workers with an answer, and the dead ones; waits briefly for the first."""
-        awaited = [hand for hand in self._hands if not hand.is_idle]
+        awaited = [worker for worker in self._pool if not worker.is_idle]
         if not awaited:
             time.sleep(TICK)  # until a machine joins
         return _ready(awaited, "ref", TICK)
 
-    def _hear(self, hand: _Hand, queue: Queue) -> Iterator[Outcome]:
+    def _receive(self, worker: _Worker, queue: Queue) -> Iterator[Outcome]:
         """Take one answer, or the news of a death."""
-        job, hand.job = hand.job, None
+        job, worker.job = worker.job, None
         if job is not None:
             self._begun.pop(job.key, None)
         try:
-            news: Outcome | str = ray.get(hand.ref)
+            news: Outcome | str = ray.get(worker.ref)
         except RayError as error:
-            self._lose(hand)
+            self._lose(worker)
             if job is None:
-                self._suspect(hand, error)
-            elif told := queue.again(job, f"last on node {hand.address}: {_first_line(error)}", alone=hand.node in _nodes()):
+                self._suspect(worker, error)
+            elif told := queue.again(
+                job, f"last on node {worker.address}: {_first_line(error)}", alone=worker.node in _nodes()
+            ):
                 yield told
             return
         if job is None:
-            hand.is_ready = True
-            self._failures[hand.node] = 0
+            worker.is_ready = True
+            self._failures[worker.node] = 0
         elif isinstance(news, str):
             raise ViewsphereError(f"{job.key}: a worker failed\n{news}")
         else:
             queue.ended()
             yield news
 
-    def _lose(self, hand: _Hand) -> None:
+    def _lose(self, worker: _Worker) -> None:
         """A worker that is gone, or that nobody can reach, is done with."""
-        self._hands.remove(hand)
+        self._pool.remove(worker)
         with suppress(RayError):
-            ray.kill(hand.actor)
+            ray.kill(worker.actor)
 
-    def _suspect(self, hand: _Hand, error: RayError) -> None:
+    def _suspect(self, worker: _Worker, error: RayError) -> None:
         """Leave a machine out where workers cannot start, though it is there."""
-        if hand.node not in _nodes():
+        if worker.node not in _nodes():
             return
-        self._failures[hand.node] += 1
-        if isinstance(error, RayTaskError) or self._failures[hand.node] >= STARTS:
-            self._unfit[hand.node] = f"node {hand.address}: {_first_line(error)}"
+        self._failures[worker.node] += 1
+        if isinstance(error, RayTaskError) or self._failures[worker.node] >= STARTS:
+            self._unfit[worker.node] = f"node {worker.address}: {_first_line(error)}"
 
 
-class _Hand:
+class _Worker:
     """One worker, seen from here; `ref` is what it answers next, first of all that it is ready."""
 
-    def __init__(self, node: str, address: str, told: Any) -> None:
+    def __init__(self, node: str, address: str, shared: Any) -> None:
         self.node, self.address = node, address
-        self.actor: Any = _ACTOR.options(scheduling_strategy=NodeAffinitySchedulingStrategy(node, soft=False)).remote(told)
+        self.actor: Any = _ACTOR.options(scheduling_strategy=NodeAffinitySchedulingStrategy(node, soft=False)).remote(shared)
         self.ref: Any = self.actor.ready.remote()
         self.asked: Any = None
         self.is_ready = False
@@ -228,15 +230,15 @@ class _Hand:
         ref, self.asked = self.asked, None
         try:
             return ray.get(ref)
-        except RayError:  # its death is heard of by its job
+        except RayError:  # its death is report of by its job
             return "", 0
 
 
 class _Actor:
     """A worker, on a machine of the cluster."""
 
-    def __init__(self, told: tuple[Path, Portion, str, dict[str, str]]) -> None:
-        self._root, self._portion, self._folder, self._settings = told
+    def __init__(self, shared: tuple[Path, DatasetPart, str, dict[str, str]]) -> None:
+        self._root, self._portion, self._folder, self._settings = shared
         self._key, self._frames = "", 0
         self._worker: Worker | None = None
         self._is_compiled = False
@@ -323,16 +325,16 @@ def _nodes() -> dict[str, tuple[str, int]]:
     return {node["NodeID"]: (str(node["NodeManagerAddress"]), cpus) for node, cpus in found if cpus}
 
 
-def _ready(hands: list[_Hand], which: str, seconds: float = 0.0) -> list[_Hand]:
+def _ready(workers: list[_Worker], which: str, seconds: float = 0.0) -> list[_Worker]:
     """Return the workers whose answer has arrived; waits up to this many seconds for the first answer."""
-    hand_of = {getattr(hand, which): hand for hand in hands}
-    if not hand_of:
+    worker_of = {getattr(worker, which): worker for worker in workers}
+    if not worker_of:
         return []
-    refs = list(hand_of)
+    refs = list(worker_of)
     if seconds:
         ray.wait(refs, num_returns=1, timeout=seconds)
     found, _ = ray.wait(refs, num_returns=len(refs), timeout=0)
-    return [hand_of[ref] for ref in found]
+    return [worker_of[ref] for ref in found]
 
 
 def _settings() -> dict[str, str]:

@@ -17,7 +17,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.scope import is_computed, needs_of
-from viewsphere.run.shots.reconstruct import Sights
+from viewsphere.run.shots.reconstruct import ViewReconstructor
 from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Choice, Dataset, Exported
 
@@ -72,13 +72,13 @@ class Completed(Exported):
         return super().shown(self._with(sample, wanted) if wanted else sample)
 
     @cached_property
-    def sights(self) -> Sights:
+    def reconstructor(self) -> ViewReconstructor:
         """The reconstructed views of the data set's sensors; several data sets of one root may share them."""
         whole = Dataset(self.root)  # chosen or not, and with what is hidden
-        return Sights(whole, Scenery(whole), {info.key: info for info in whole.models})
+        return ViewReconstructor(whole, Scenery(whole), {info.key: info for info in whole.models})
 
     def _with(self, sample: Sample, names: list[str]) -> Sample:
-        if not self.sights.is_possible(sample):
+        if not self.reconstructor.is_possible(sample):
             raise StoreError(
                 f"frame {sample.index}: expected a shot of which {names[0]} is computed; found an imported picture"
             )
@@ -95,9 +95,11 @@ class Completed(Exported):
         asked = [name for name in names if name in on_request()]
         needs = [labels()[name].needs for name in names]
         compares = any(need.instants or need.poses for need in needs)
-        sight = self.sights.of(sample, names, asked, continued=compares)
+        sight = self.reconstructor.of(sample, names, asked, continued=compares)
         if sight is None:
-            raise StoreError(f"frame {sample.index}: expected scenery as it was rendered: {'; '.join(self.sights.notes)}")
+            raise StoreError(
+                f"frame {sample.index}: expected scenery as it was rendered: {'; '.join(self.reconstructor.notes)}"
+            )
         return sight
 
 

@@ -16,7 +16,7 @@ from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_for
 from viewsphere.run.exports.preparing import Entries, prepared, targets
 from viewsphere.run.exports.scope import refuse, scope_of
 from viewsphere.run.exports.writable import writable
-from viewsphere.run.progress import Listener, Progress, unheard
+from viewsphere.run.progress import Listener, Progress, null_listener
 from viewsphere.store import Choice, Dataset, located, new_folder
 from viewsphere.store.credits import credits_digest
 from viewsphere.store.shots.checksums import write_checksums, written_credits, written_frames, written_least, written_options
@@ -61,7 +61,7 @@ def export(
             dataset.store.make_ready()
             whole.enter_context(dataset.store.occupied())
         written = [(entry, whole.enter_context(_folder(dataset, place / entry.name, is_own))) for entry in entries]
-        notes = (*write(dataset, written, listener or unheard, workers), *_lacks(dataset))
+        notes = (*write(dataset, written, listener or null_listener, workers), *_lacks(dataset))
     return tuple(dict.fromkeys(notes)) + tuple(linked(dataset, dataset.root))
 
 
@@ -91,7 +91,7 @@ def _known_options(dataset: Dataset, name: str) -> Mapping[str, JsonValue]:
     return written_options(dataset.root / name) or options_of(read_formats(said)).get(name, {})
 
 
-def write(dataset: Dataset, formats: Entries, tell: Listener = unheard, workers: int = 0) -> tuple[str, ...]:
+def write(dataset: Dataset, formats: Entries, tell: Listener = null_listener, workers: int = 0) -> tuple[str, ...]:
     """Write the data set in formats, each once, into these empty folders; gives notes for the user. `workers` as for `export`.
 
     Every sample is read once, and so is each of its channels. At last the digests of all files are listed, with the options.

@@ -67,7 +67,7 @@ class Views:
         if names:
             shown = Completed(root, choice, least, names)
             self._completed = self._completed or shown
-            shown.sights = self._completed.sights  # so that formats which need the same see it once
+            shown.reconstructor = self._completed.reconstructor  # so that formats which need the same see it once
         else:
             shown = Exported(root, choice, least)
         shown.link_kinds, shown.made = self._dataset.link_kinds, self._dataset.made

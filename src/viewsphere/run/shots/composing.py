@@ -8,7 +8,7 @@ from functools import cached_property
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.planning.extension import Portion
+from viewsphere.planning.extension import DatasetPart
 from viewsphere.run.shots.framing import Framing
 from viewsphere.run.shots.models import mesh_digest
 from viewsphere.run.shots.stages import Stages, StoredBoxes
@@ -26,13 +26,13 @@ class SceneryRecord(Frozen):
 class Composer:
     """Composes shots of a part; `boxes` gives the sizes of the data set's models."""
 
-    portion: Portion
+    portion: DatasetPart
     boxes: StoredBoxes
     stages: Stages
     _digests: dict[str, str] = field(default_factory=dict[str, str])
 
     def shot(self, row: Row) -> Shot:
-        """The shot of a row, with everything that is drawn again until it fits. Raises UserError as `Portion.shot`."""
+        """The shot of a row, with everything that is drawn again until it fits. Raises UserError as `DatasetPart.shot`."""
         with self.portion.plan.recipe.located():
             return self._framing.shot(row, self._settled(row))
 

@@ -15,13 +15,16 @@ from viewsphere.assets.cache import frame_of, read_ahead
 from viewsphere.assets.deforming import DeformingMesh
 from viewsphere.assets.exporting.export import export_deforming, export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
-from viewsphere.errors import StoreError
+from viewsphere.errors import StoreError, each
 from viewsphere.files import read_bytes
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.labels import labels
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
+from viewsphere.planning.distances import Distances
+from viewsphere.planning.plan import Plan
+from viewsphere.run.progress import Listener, Progress, null_listener
 from viewsphere.run.shots.stages import Stages, model_files
 from viewsphere.store import ModelInfo, PlanRecord, Store
 from viewsphere.store.shots.manifest import Manifest
@@ -237,3 +240,28 @@ def mesh_digest(mesh: Mesh) -> str:
     for image in mesh.images:
         digest.update(repr((image.name, image.pixels.shape)).encode() + image.pixels.tobytes())
     return digest.hexdigest()
+
+
+def check_models(planned: Plan, tell: Listener = null_listener) -> tuple[str, ...]:
+    """Read each model of a plan, place it and its cameras; returns the warnings, `<key>: <warning>`.
+
+    Raises ModelError or RecipeError, a line each, for all files that cannot be used, and for all models and scenes without
+    room or with a camera inside.
+    """
+    stages, specs = Stages(), planned.kept_specs
+    distances = Distances(planned, stages.box)
+
+    def warnings(number: int) -> list[str]:
+        mesh = stages.model(specs[number])
+        tell(Progress("models", number + 1, len(specs)))
+        return [f"{specs[number].key}: {warning}" for warning in mesh.warnings]
+
+    def stand(subject: str) -> None:
+        problem = distances.problem(subject)
+        if problem:
+            raise problem
+
+    found = each(warnings, range(len(specs)))
+    with planned.recipe.located():
+        each(stand, planned.subjects)
+    return tuple(dict.fromkeys(line for lines in found for line in lines))

@@ -30,7 +30,7 @@ MODELS = 200
 """Exported models that are kept in memory."""
 
 
-class Sights:
+class ViewReconstructor:
     """Gives the sights of a data set's samples; the last geometry, and the last sight, are kept: samples of one geometry follow
     one another, and several ask for the same sample.
     """

@@ -10,7 +10,7 @@ from pathlib import Path
 from viewsphere.errors import StoreError, UserError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.planning.extension import Portion, resumed
+from viewsphere.planning.extension import DatasetPart, resumed
 from viewsphere.planning.plan import Plan, plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import PlanRecord, Simulated, Store
@@ -37,7 +37,7 @@ class Replanned:
     store: Store
     record: PlanRecord
     _plans: dict[int, Plan | UserError] = field(default_factory=dict[int, "Plan | UserError"])
-    _portions: dict[int, Portion] = field(default_factory=dict[int, Portion])
+    _portions: dict[int, DatasetPart] = field(default_factory=dict[int, DatasetPart])
 
     def plan(self, number: int) -> Plan:
         """The plan of a part's recipe.
@@ -55,7 +55,7 @@ class Replanned:
             raise found
         return found
 
-    def portion(self, number: int) -> Portion:
+    def portion(self, number: int) -> DatasetPart:
         """A part, with its recipe's plan, which reads what was simulated for the part and keeps nothing more; errors as for
         `plan`.
         """

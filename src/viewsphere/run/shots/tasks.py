@@ -15,7 +15,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
-from viewsphere.planning.extension import Portion
+from viewsphere.planning.extension import DatasetPart
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.run.shots.composing import Composer
 from viewsphere.run.shots.models import Models
@@ -55,7 +55,7 @@ class KernelTask:
 class Worker:
     """Does tasks for a part of a data set."""
 
-    def __init__(self, root: Path, portion: Portion) -> None:
+    def __init__(self, root: Path, portion: DatasetPart) -> None:
         self.store = Store(root)
         self.stages = Stages()
         self.models = Models(self.store, self.stages, portion.record)

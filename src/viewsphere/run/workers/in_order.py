@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar, cast
 
 from viewsphere.errors import UserError, ViewsphereError, WorkerDied
-from viewsphere.run.workers.pool import OUT_OF_MEMORY, Hand, belong_to_parent, deaf, end_of
+from viewsphere.run.workers.process import OUT_OF_MEMORY, WorkerProcess, belong_to_parent, end_reason, interrupts_deferred
 
 Task = TypeVar("Task")
 Made = TypeVar("Made")
@@ -30,15 +30,15 @@ def in_order(workers: int, make: Callable[[], Callable[[Task], Made]], tasks: It
     Raises the first UserError or OSError that a task raises, ViewsphereError with the traceback of anything else, and
     WorkerDied where a worker dies: no task is done twice. Workers end with the iterator.
     """
-    left, hands, free = iter(tasks), list[Hand](), list[Hand]()
-    busy, made = dict[Connection, tuple[int, Task, Hand]](), dict[int, tuple[Task, Made]]()
+    left, started, free = iter(tasks), list[WorkerProcess](), list[WorkerProcess]()
+    busy, made = dict[Connection, tuple[int, Task, WorkerProcess]](), dict[int, tuple[Task, Made]]()
     given = taken = 0
     try:
         while True:
             while len(busy) < workers and given < taken + AHEAD * workers and (task := next(left, None)) is not None:
-                hand = free.pop() if free else _hired(make, hands)
-                hand.tell(task)
-                busy[hand.pipe] = given, task, hand
+                worker = free.pop() if free else _start(make, started)
+                worker.send(task)
+                busy[worker.pipe] = given, task, worker
                 given += 1
             if not busy and not made:
                 return
@@ -46,25 +46,25 @@ def in_order(workers: int, make: Callable[[], Callable[[Task], Made]], tasks: It
                 yield made.pop(taken)
                 taken += 1
             for pipe in wait(list(busy)) if busy else ():
-                number, task, hand = busy.pop(cast(Connection, pipe))  # Windows has another class
-                made[number] = task, _answered(hand)
-                free.append(hand)
+                number, task, worker = busy.pop(cast(Connection, pipe))  # Windows has another class
+                made[number] = task, _answered(worker)
+                free.append(worker)
     finally:
-        for hand in hands:
-            hand.stop()
+        for worker in started:
+            worker.stop()
 
 
-def _hired(make: Callable[[], Any], hands: list[Hand]) -> Hand:
-    with deaf():  # until it is known here, so that it is ended with the others
-        hands.append(Hand(_serve, make))
-    return hands[-1]
+def _start(make: Callable[[], Any], started: list[WorkerProcess]) -> WorkerProcess:
+    with interrupts_deferred():  # until it is known here, so that it is ended with the others
+        started.append(WorkerProcess(_serve, make))
+    return started[-1]
 
 
-def _answered(hand: Hand) -> Any:
+def _answered(worker: WorkerProcess) -> Any:
     try:
-        made, error = hand.pipe.recv()
+        made, error = worker.pipe.recv()
     except (EOFError, OSError):  # it may die in the middle of an answer
-        raise WorkerDied(f"expected a worker's answer, found that it died: {end_of(hand.end(), ADVICE)}") from None
+        raise WorkerDied(f"expected a worker's answer, found that it died: {end_reason(worker.end(), ADVICE)}") from None
     if error is not None:
         raise error
     return made

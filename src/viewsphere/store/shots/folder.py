@@ -28,7 +28,7 @@ from viewsphere.store.paths import file_inside
 from viewsphere.store.places import place_of
 from viewsphere.store.places.local import NEW, disk_errors
 from viewsphere.store.samples.channel_files import encode
-from viewsphere.store.shots.heartbeat import Heartbeat, Pulse
+from viewsphere.store.shots.heartbeat import Heartbeat, HeartbeatWriter
 from viewsphere.store.shots.manifest import MANIFEST, Manifest, refuse_another
 from viewsphere.store.shots.moving import move
 from viewsphere.store.shots.other_files import other_files
@@ -133,13 +133,13 @@ class Store:
         return self.place.locked()
 
     @contextmanager
-    def telling(self, own: Path, shard: tuple[int, int]) -> Generator[Pulse]:
+    def telling(self, own: Path, shard: tuple[int, int]) -> Generator[HeartbeatWriter]:
         """Tell of a run of this shard, as long as the block lasts, in the folder that `occupied` gave it.
 
         One of several that fails leaves a note that says why, until its shard is rendered again, or all is finished.
         """
         note = self._failed / f"{shard[0]}-of-{shard[1]}.json"
-        with Pulse(lambda text: self._tell(own, text), shard) as pulse:
+        with HeartbeatWriter(lambda text: self._tell(own, text), shard) as pulse:
             note.unlink(missing_ok=True)
             try:
                 yield pulse

@@ -82,7 +82,7 @@ class Heartbeat:
             return None
 
 
-class Pulse:
+class HeartbeatWriter:
     """Tells of a run, every few seconds by a thread of its own, however long a frame takes. `now` is what it tells next; a shot
     that is handed out or done changes `working_on`.
 
@@ -97,7 +97,7 @@ class Pulse:
         self._ended = Event()
         self._thread = Thread(target=self._beats, name="heartbeat", daemon=True)
 
-    def __enter__(self) -> Pulse:
+    def __enter__(self) -> HeartbeatWriter:
         self._write(self.told())
         self._thread.start()
         return self

@@ -1,4 +1,4 @@
-"""Shares of what there is to do: which each has follows from their numbers alone."""
+"""Shards of what there is to do: which each has follows from their numbers alone."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Share:
-    """Every `of`-th of some things, from the `number`-th on, counted from 0: shares together have each of them once."""
+class Shard:
+    """Every `of`-th of some things, from the `number`-th on, counted from 0: shards together have each of them once."""
 
     number: int = 0
     of: int = 1
@@ -26,7 +26,7 @@ class Share:
         return self.of == 1
 
     def __call__(self, things: Iterable[T]) -> Iterator[T]:
-        """This share of them, in their order."""
+        """This shard of them, in their order."""
         return islice(things, self.number, None, self.of)
 
     def has(self, number: int) -> bool:
@@ -42,13 +42,13 @@ class Share:
         return number + (self.number - number) % self.of
 
     def size(self, count: int) -> int:
-        """Return the number of items, of `count`, that the share has."""
+        """Return the number of items, of `count`, that the shard has."""
         return len(range(self.number, count, self.of))
 
-    def parted(self, inner: Share) -> Share:
-        """A share of this share."""
-        return Share(self.number + inner.number * self.of, self.of * inner.of)
+    def parted(self, inner: Shard) -> Shard:
+        """A shard of this shard."""
+        return Shard(self.number + inner.number * self.of, self.of * inner.of)
 
 
-ALL = Share()
-"""The one share that has everything."""
+ALL = Shard()
+"""The one shard that has everything."""

@@ -23,7 +23,7 @@ DYING_S = 10.0
 """Seconds that a worker whose pipe is closed has to end by itself, so that its exit code is its own."""
 
 
-class Hand:
+class WorkerProcess:
     """A worker process that does `serve(pipe, *told)`, to be stopped by who started it."""
 
     def __init__(self, serve: Callable[..., None], *told: Any) -> None:
@@ -33,7 +33,7 @@ class Hand:
         self.process.start()
         theirs.close()
 
-    def tell(self, what: object) -> None:
+    def send(self, what: object) -> None:
         """Send it something; that it is dead is noticed when its answer is awaited."""
         with suppress(OSError):
             self.pipe.send(what)
@@ -57,7 +57,7 @@ def _live(serve: Callable[..., None], *told: Any) -> None:
     exit_at_once(0)
 
 
-def end_of(code: int | None, advice: str) -> str:
+def end_reason(code: int | None, advice: str) -> str:
     """Return the reason for a worker's end with this exit code; if memory may have run out, the advice follows."""
     if code == OUT_OF_MEMORY:
         return f"it was refused memory{advice}"
@@ -67,8 +67,8 @@ def end_of(code: int | None, advice: str) -> str:
 
 
 @contextmanager
-def deaf() -> Generator[None]:
-    """A process started meanwhile does not hear Ctrl-C, not even before it serves; this one hears it afterwards."""
+def interrupts_deferred() -> Generator[None]:
+    """A process started meanwhile ignores Ctrl-C, even before it serves; this process receives it afterwards."""
     if sys.platform == "win32":  # has no masks to inherit
         yield
         return

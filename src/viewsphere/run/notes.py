@@ -1,24 +1,32 @@
-"""Frames and scenes of a finished run that no draw made as the recipe asks: warnings and notes with their numbers."""
+"""Warnings and notes about a finished run: draws that missed the recipe's wishes, and changes of materials without effect."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from itertools import islice
 
+from viewsphere.assets.exporting.glb import material_names
 from viewsphere.composing.redraws import fewer, redraws_frames
 from viewsphere.limits import limits
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
-from viewsphere.planning.extension import Portion
+from viewsphere.planning.extension import DatasetPart
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.store import Dataset
+from viewsphere.run.shots.stages import model_files
+from viewsphere.store import Dataset, Store
+
+MOST_NAMES = 8
+"""Materials that a warning lists."""
 
 MOST_READ = 5_000
 """Frames whose records are read, some two seconds, where the recipe neither says `wanted` nor `min_visibility`."""
 
 
-def left_by_chance(dataset: Dataset, portion: Portion) -> Iterator[str]:
+def left_by_chance(dataset: Dataset, portion: DatasetPart) -> Iterator[str]:
     """Lines about the frames of a run that are not as its recipe asks, and about scenes that lost objects.
 
     Of a large run whose recipe asks for nothing, shots evenly over all are read.
@@ -38,7 +46,7 @@ def left_by_chance(dataset: Dataset, portion: Portion) -> Iterator[str]:
 class _Tally:
     """Counts frames and scenes as their shots are added."""
 
-    portion: Portion
+    portion: DatasetPart
     hidden: int = 0
     misses: list[float] = field(default_factory=list[float])
     empty: int = 0
@@ -97,3 +105,27 @@ class _Tally:
                 f"note: scenes.objects: {len(self.smaller):,} of {len(self.portion.plan.taken):,} {have} fewer objects than "
                 f"drawn: after {limits.MAX_REDRAWS} draws not all fitted"
             )
+
+
+def materials_not_found(recipe: Recipe, specs: Sequence[ModelSpec], store: Store) -> dict[str, tuple[str, ...]]:
+    """Warnings by the keys of finished models, for each change that is for them and fits none of their materials.
+
+    One for all models (`models: '*'`) that fits some of them is meant so.
+    """
+    warnings: defaultdict[str, tuple[str, ...]] = defaultdict(tuple)
+    for i, entry in enumerate(recipe.scene.materials):
+        meant = [spec.key for spec in specs if fnmatchcase(spec.key, entry.models)]
+        if entry.material == "*":
+            continue
+        files = {key: store.root / model_files(key)[1] for key in meant}
+        names = {key: material_names(file) for key, file in files.items() if file.is_file()}
+        missed = [key for key in names if not any(fnmatchcase(name, entry.material) for name in names[key])]
+        if entry.models == "*" and len(missed) < len(names):
+            continue
+        for key in missed:
+            known = sorted(filter(None, set(names[key])))
+            listed = ", ".join(known[:MOST_NAMES]) + (", ..." if len(known) > MOST_NAMES else "")
+            such = f"a pattern of its materials' names ({listed})" if known else "names of its materials, which have none,"
+            text = f"expected {such}; found {entry.material!r}, which fits none: it changes nothing"
+            warnings[key] += (recipe.locate(f"scene.materials[{i}].material: {text}"),)
+    return dict(warnings)
