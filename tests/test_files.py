@@ -3,6 +3,7 @@
 import ast
 import os
 import pickle
+import re
 import socket
 from functools import partial
 
@@ -146,22 +147,28 @@ ALLOWED = {
 """Places that may open files otherwise, and why."""
 
 
+READERS = {"open", "read_text", "read_bytes", "ZipFile", "iterparse"}.union(*OPENERS.values())
+"""A source without any of these names opens no file."""
+
+
 def bare(source):
     """Lines of a source that open a file by a path other than through `viewsphere.files`."""
-    tree = ast.parse(source)
+    if READERS.isdisjoint(re.findall(r"\w+", source)):
+        return
+    nodes = [*ast.walk(ast.parse(source))]
     streams = {
         item.optional_vars.id
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.With)
         for item in node.items
         if isinstance(item.optional_vars, ast.Name) and named(item.context_expr) in BOUNDED
     } | {
         node.targets[0].id
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
         if any(named(call) in BOUNDED for call in ast.walk(node.value))
     }
-    for node in ast.walk(tree):
+    for node in nodes:
         reads = isinstance(node, ast.Attribute) and node.attr in ("read_text", "read_bytes")
         if reads and not (isinstance(node.value, ast.Name) and node.value.id == "files"):
             yield node.lineno

@@ -107,7 +107,8 @@ def test_a_scatter_over_60_m_keeps_clear_of_a_whole_street(tmp_path):
 
 
 @pytest.mark.parametrize("layout", ["scatter", "heap_together", {"kind": "scatter", "between": "hulls"}])
-def test_a_model_larger_than_the_floor_is_refused_with_both_sizes(layout, tmp_path):
+def test_a_model_larger_than_the_floor_is_refused_with_both_sizes(layout, tmp_path, monkeypatch):
+    monkeypatch.setenv("VIEWSPHERE_MAX_REDRAWS", "2")  # each fails as the first
     reason = r"scenes: weed covers 0\.08 x 0\.08 m, and the free floor has 0\.05 x 2 m\. Use a smaller model, set its `scale`"
     with pytest.raises(RecipeError, match=reason):
         spots_of(tmp_path, layout, objects=1, surface={"size": [0.05, 2], "height": 0.5})

@@ -11,7 +11,7 @@ from viewsphere.labels.barycentrics import prove
 
 def test_weights_of_a_ground_to_the_horizon_are_proved():
     recipe = small_recipe(
-        viewpoints={"azimuth": list(range(0, 360, 30)), "elevation": [10], "distance": 4},
+        viewpoints={"azimuth": [0, 120, 240], "elevation": [10], "distance": 4},
         camera={"size": [320, 240], "fov_deg": 50},
         channels=["barycentrics"],
         formats=[],

@@ -41,7 +41,8 @@ def scenes_on(side, objects, count=4, **more):
     return {"count": count, "objects": objects, "gap": 0.02, "surface": {"size": [side, side], "height": 0.5}, **more}
 
 
-def test_models_without_room_are_placed_again_and_one_is_left_out_at_last():
+def test_models_without_room_are_placed_again_and_one_is_left_out_at_last(monkeypatch):
+    monkeypatch.setenv("VIEWSPHERE_MAX_REDRAWS", "16")
     shots = composed(recipe_of(scenes=scenes_on(0.55, [1, 4])))
     sizes = [sum(thing.is_target for thing in shot.things) for shot in shots]
     asked = [len(plan(recipe_of(scenes=scenes_on(0.55, [1, 4]))).cast(f"scene-{i:06d}")) for i in range(len(shots))]
@@ -57,7 +58,8 @@ def test_what_fits_at_once_is_the_original_draw():
 
 
 @pytest.mark.parametrize("more", [{"balance": "category"}, {}])
-def test_the_lower_bound_of_objects_and_balanced_scenes_are_kept(more):
+def test_the_lower_bound_of_objects_and_balanced_scenes_are_kept(more, monkeypatch):
+    monkeypatch.setenv("VIEWSPHERE_MAX_REDRAWS", "8")
     objects = [2, 4] if more else 4
     with pytest.raises(RecipeError, match=r"covers .* and the free floor has 0\.2 x 0\.2 m"):
         composed(recipe_of(scenes=scenes_on(0.2, objects, count=1, **more)))
