@@ -23,6 +23,7 @@ from viewsphere.planning.plan import Plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.rig import SensorList
 from viewsphere.run.opening import prepare
+from viewsphere.run.shots.camera_collisions import CameraChecks
 from viewsphere.run.shots.framing import Framing
 from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Dataset, Row
@@ -75,7 +76,7 @@ def _check(stages: Stages, planned: Plan, subjects: Sequence[str]) -> None:
         stages.box(spec)
 
     each(read, specs.values())
-    each(lambda subject: stages.check_distances(planned, subject), dict.fromkeys(subjects))
+    each(lambda subject: CameraChecks(stages).check_distances(planned, subject), dict.fromkeys(subjects))
 
 
 def _each(count: int, films: int, row: int) -> int:

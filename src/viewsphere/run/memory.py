@@ -22,6 +22,7 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.progress import shown_on_terminal
 from viewsphere.run.shards import register_for_loaders, shard_of, shard_of_rank, shard_of_worker
+from viewsphere.run.shots.camera_collisions import CameraChecks
 from viewsphere.run.shots.framing import Framing
 from viewsphere.run.shots.precompile import precompile, told_to
 from viewsphere.run.shots.stages import Stages
@@ -93,7 +94,7 @@ class Frames(Shown, Iterable[Sample]):
             if unit.subject not in seen:
                 seen.add(unit.subject)
                 self._stages.read_ahead(planned, planned.cast(unit.subject))
-                self._stages.check_distances(planned, unit.subject)
+                CameraChecks(self._stages).check_distances(planned, unit.subject)
             for row in units.rows(unit):
                 shot = framing.shot(row)
                 self._compile_for(shot)

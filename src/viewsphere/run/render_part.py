@@ -14,6 +14,7 @@ from viewsphere.run.executors import Job, Listed, Outcome, Work, WorkerPool
 from viewsphere.run.missing import Missing
 from viewsphere.run.opening import commit
 from viewsphere.run.progress import Listener, Progress
+from viewsphere.run.shots.camera_collisions import CameraChecks
 from viewsphere.run.shots.precompile import is_compiled, precompile, told_to
 from viewsphere.run.shots.stages import Stages, StoredBoxes
 from viewsphere.run.shots.tasks import KernelTask, Kind, ModelTask
@@ -123,7 +124,7 @@ def _render_shots(work: Missing, pool: WorkerPool, keep_going: bool, tell: Liste
     total, resumed, rendered = work.total, work.resumed, 0
     first = next(work.rows(), None)
     if first is not None:
-        Stages().check_scenery(portion.plan)
+        CameraChecks(Stages()).check_scenery(portion.plan)
         with portion.plan.recipe.located():
             shot = portion.shot(first, StoredBoxes(store))
         if not is_compiled(shot):

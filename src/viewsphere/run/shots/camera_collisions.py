@@ -1,18 +1,28 @@
-"""The limits that walls set for cameras: a camera stays inside the model's room, and never goes through a wall."""
+"""Cameras that cannot be where they are: inside a thing, outside the model's room, or on a way through a wall."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.composing.redraws import is_redrawn
 from viewsphere.composing.viewpoints.camera import inside_box
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.classes import STUFF_IDS, stuff_of
+from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
+from viewsphere.planning.distances import Distances
+from viewsphere.planning.plan import Plan
+from viewsphere.run.shots.stages import Stages
+from viewsphere.truth.sky_visibility import sky_occlusion
+from viewsphere.zoo import rooms_of
 
 Float = NDArray[np.float64]
 
@@ -22,8 +32,122 @@ Step = tuple[int, Float, Float]
 WALLS = {STUFF_IDS[name] for name in ("building", "wall", "floor", "ceiling")}
 """Classes of scenery that nobody goes through: leaves and hedges are none."""
 
+MOST_CAMERAS = 1000
+"""Cameras that are looked at before rendering; the others are when their turn comes."""
 
-def check_rooms(rooms: Sequence[Float], model: Float, cameras: Float) -> None:
+MOST_SKY = 0.8
+"""Share of the sky that scenery may hide from a camera that is not inside of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Stand:
+    """The place of a still thing: its box (8, 3), and those of its rooms, world metres."""
+
+    box: Float
+    rooms: tuple[Float, ...]
+
+
+NONE_KNOWN: Mapping[int, _Stand] = MappingProxyType({})
+"""No known places."""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraChecks:
+    """Checks whether the cameras of shots can be where they are: not inside things, not beyond walls."""
+
+    stages: Stages
+
+    def check_distances(self, planned: Plan, subject: str) -> None:
+        """Raise RecipeError if a pose's camera would stand inside what stands in a subject's frames."""
+        problem = Distances(planned, self.stages.box).problem(subject)
+        with planned.recipe.located():
+            if problem:
+                raise problem
+
+    def check_scenery(self, planned: Plan) -> None:
+        """Raise RecipeError if a pose's camera would stand in a house, where all models have the same around them.
+
+        Scenery that is drawn for each model or frame is looked at when its shot is rendered.
+        """
+        scene = planned.recipe.scene
+        if planned.composition is None or not scene.has_fixed_scenery or is_redrawn(planned.recipe):
+            return
+        subject = planned.subjects[0]
+        there = next(iter(planned.standing(subject, self.stages.box)), None)
+        if there is None or not there.views.are_known:  # where the camera is, is known with its shot
+            return
+        things = planned.composition.things(subject, there.things, None, self.stages.box)
+        poses = range(0, planned.poses, -(-planned.poses // MOST_CAMERAS))
+        cameras = Distances(planned, self.stages.box).cameras(things, poses, views=there.views)
+        with planned.recipe.located():
+            self._check_cameras(things, cameras)
+
+    def _check_cameras(self, things: Sequence[Thing], cameras: Float, known: Mapping[int, _Stand] = NONE_KNOWN) -> None:
+        """Raise RecipeError for the first of the cameras (N, 3) that is inside of something; known: where some of the things
+        stand, by their identity.
+
+        Inside of a target means its box. Inside of scenery means that it hides the sky from the camera, but not from the
+        frame's model: under a tree, among hills or in the room where the model stands a camera may well be. So cameras are not
+        looked at where no target is there.
+        """
+        own = next((i for i, thing in enumerate(things) if not thing.scenery), None)
+        if own is None:
+            return
+        stands = [known.get(id(thing)) or self._stand(thing) for thing in things]
+        boxes, model = np.array([stand.box for stand in stands]), stands[own].box.mean(axis=0)
+        _check_rooms([room for stand in stands for room in stand.rooms], model, cameras)
+        low, high = cameras.min(axis=0), cameras.max(axis=0)
+        for k in np.flatnonzero(((boxes.min(axis=1) <= high) & (boxes.max(axis=1) >= low)).all(axis=1)).tolist():
+            thing = things[k]
+            for i in np.flatnonzero(inside_box(boxes[k], cameras)):
+                if not thing.scenery or (self._roofs(thing, cameras[i]) and not self._roofs(thing, model)):
+                    what = f"{thing.model.category or 'piece'} {thing.key}"
+                    x, y = np.array(thing.world_from_object)[:2, 3]
+                    raise RecipeError(
+                        f"viewpoints: expected the camera outside of all that is placed; found it at "
+                        f"({', '.join(f'{v:.3g}' for v in cameras[i])}) inside {what}, which stands at ({x:.3g}, {y:.3g}): go "
+                        f"farther away, or, where distance is a share to fill, fill less; with min_visibility, frames that are "
+                        f"drawn at random are drawn again"
+                    )
+
+    def check_shot(self, shot: Shot) -> None:
+        """Raise RecipeError where a camera of a shot is inside of something, or a trajectory leads through a wall; what stands
+        still is looked at once.
+        """
+        instants, sensors = range(len(shot.instants)), range(len(shot.rig.sensors))
+        still = {id(thing): self._stand(thing) for thing in shot.things if thing.motion.is_still}
+        for poses in dict.fromkeys(map(shot.poses_at, instants)):
+            together = [instant for instant in instants if shot.poses_at(instant) == poses]
+            cameras = [shot.camera(instant, sensor).center for instant in together for sensor in sensors]
+            there = [thing for thing in shot.things_at(together[0]) if thing.is_there]
+            self._check_cameras(there, np.array(cameras), still)
+        if shot.sequence:
+            fixed = [(thing, still[id(thing)].box) for thing in shot.things if id(thing) in still]
+            check_way(fixed, lambda thing: self.stages.model(thing.model, thing.step), _steps(shot))
+
+    def _stand(self, thing: Thing) -> _Stand:
+        pose = thing.world_from_object
+        rooms = tuple(transform(pose, box) for box in rooms_of(thing.model.source, thing.model.seed)) if thing.scenery else ()
+        return _Stand(transform(pose, self.stages.box(thing.model, thing.step)), rooms)
+
+    def check_instant(self, shot: Shot, instant: int) -> None:
+        """Raise RecipeError where a camera of a shot is inside of something at an instant, counted from 0 in the shot."""
+        self.check_shot(shot.model_copy(update={"instants": (shot.instants[instant],), "things": shot.things_at(instant)}))
+
+    def _roofs(self, thing: Thing, point: Float) -> bool:
+        """Return whether scenery hides most of the sky from a point in the world."""
+        mesh = self.stages.model(thing.model, thing.step)
+        inside = transform(np.linalg.inv(np.array(thing.world_from_object)), point)
+        return sky_occlusion(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY
+
+
+def _steps(shot: Shot) -> list[Step]:
+    """From each frame to the next one, where the shot has both."""
+    pairs = enumerate(pairwise(shot.instants))
+    return [(a.index, shot.camera(i, 0).center, shot.camera(i + 1, 0).center) for i, (a, b) in pairs if b.index == a.index + 1]
+
+
+def _check_rooms(rooms: Sequence[Float], model: Float, cameras: Float) -> None:
     """Raise RecipeError for the first camera of (N, 3) in none of the rooms (8, 3), if the model's middle (3,) is in one."""
     if not any(inside_box(room, model[None])[0] for room in rooms):
         return

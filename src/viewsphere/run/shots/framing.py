@@ -25,6 +25,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.planning.plan import Plan
+from viewsphere.run.shots.camera_collisions import CameraChecks
 from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Row
 from viewsphere.truth.moving import Ring, shot_floor
@@ -132,7 +133,7 @@ class Framing:
     def _problems(self, shot: Shot) -> list[RecipeError | None]:
         """The problems of each frame's cameras."""
         try:
-            self.stages.check_shot(shot)
+            CameraChecks(self.stages).check_shot(shot)
         except RecipeError as error:
             if len(shot.instants) == 1 or shot.sequence:  # which is drawn as a whole
                 return [error] * len(shot.instants)
@@ -141,7 +142,7 @@ class Framing:
 
     def _problem(self, shot: Shot, instant: int) -> RecipeError | None:
         try:
-            self.stages.check_instant(shot, instant)
+            CameraChecks(self.stages).check_instant(shot, instant)
         except RecipeError as error:
             return error
         return None

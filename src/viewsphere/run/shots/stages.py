@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from itertools import pairwise
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from viewsphere import plugins
 from viewsphere.assets.appearance.looks import looks_of
@@ -21,26 +17,21 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.metadata.traits import traits_of, with_body_parts
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts
-from viewsphere.composing.redraws import is_redrawn
-from viewsphere.composing.viewpoints.camera import inside_box
-from viewsphere.errors import ModelError, RecipeError
+from viewsphere.errors import ModelError
 from viewsphere.geometry.box import box_size, box_vertices
-from viewsphere.geometry.rotation import transform
 from viewsphere.labels import annotated, labels, observe, sample_values, sight_of
 from viewsphere.model.channel import PASSES
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
 from viewsphere.model.sample import Float, Sample, Taken
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing, TimeStep
+from viewsphere.model.thing import TimeStep
 from viewsphere.model.traits import Traits
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.rendering.ground.material import ground_stamps
-from viewsphere.run.shots.camera_collisions import Step, check_rooms, check_way
 from viewsphere.store import ModelInfo, Store
 from viewsphere.truth.raster.visibility import with_ground
 from viewsphere.truth.shot_views import ShotViews
-from viewsphere.truth.sky_visibility import sky_occlusion
-from viewsphere.zoo import build_zoo_model, rooms_of
+from viewsphere.zoo import build_zoo_model
 
 if TYPE_CHECKING:
     from viewsphere.engines import Stage  # which takes a third of a worker's start
@@ -48,12 +39,6 @@ if TYPE_CHECKING:
 
 WARM_BYTES = 400_000_000
 """Of models that are kept, the last ones used."""
-
-MOST_CAMERAS = 1000
-"""Cameras that are looked at before rendering; the others are when their turn comes."""
-
-MOST_SKY = 0.8
-"""Share of the sky that scenery may hide from a camera that is not inside of it."""
 
 
 def model_files(key: str, frame: int | None = None) -> tuple[str, str]:
@@ -79,18 +64,6 @@ class StoredBoxes:
             return self._known[spec.key].at(step and step.frame).box3d_object
         except ValueError as error:
             raise ModelError(f"{self.store.root}: {error}: render again") from None
-
-
-@dataclass(frozen=True, eq=False)
-class _Stand:
-    """The place of a still thing: its box (8, 3), and those of its rooms, world metres."""
-
-    box: Float
-    rooms: tuple[Float, ...]
-
-
-NONE_KNOWN: Mapping[int, _Stand] = MappingProxyType({})
-"""No known places."""
 
 
 @dataclass(eq=False)
@@ -162,93 +135,6 @@ class Stages:
             if frames and spec.rest is not None:
                 read_ahead(spec, frames | {spec.rest}, build=build_zoo_model)
 
-    def check_distances(self, planned: Plan, subject: str) -> None:
-        """Raise RecipeError if a pose's camera would stand inside what stands in a subject's frames."""
-        from viewsphere.planning.distances import Distances
-
-        problem = Distances(planned, self.box).problem(subject)
-        with planned.recipe.located():
-            if problem:
-                raise problem
-
-    def check_scenery(self, planned: Plan) -> None:
-        """Raise RecipeError if a pose's camera would stand in a house, where all models have the same around them.
-
-        Scenery that is drawn for each model or frame is looked at when its shot is rendered.
-        """
-        from viewsphere.planning.distances import Distances
-
-        scene = planned.recipe.scene
-        if planned.composition is None or not scene.has_fixed_scenery or is_redrawn(planned.recipe):
-            return
-        subject = planned.subjects[0]
-        there = next(iter(planned.standing(subject, self.box)), None)
-        if there is None or not there.views.are_known:  # where the camera is, is known with its shot
-            return
-        things = planned.composition.things(subject, there.things, None, self.box)
-        poses = range(0, planned.poses, -(-planned.poses // MOST_CAMERAS))
-        cameras = Distances(planned, self.box).cameras(things, poses, views=there.views)
-        with planned.recipe.located():
-            self._check_cameras(things, cameras)
-
-    def _check_cameras(self, things: Sequence[Thing], cameras: Float, known: Mapping[int, _Stand] = NONE_KNOWN) -> None:
-        """Raise RecipeError for the first of the cameras (N, 3) that is inside of something; known: where some of the things
-        stand, by their identity.
-
-        Inside of a target means its box. Inside of scenery means that it hides the sky from the camera, but not from the
-        frame's model: under a tree, among hills or in the room where the model stands a camera may well be. So cameras are not
-        looked at where no target is there.
-        """
-        own = next((i for i, thing in enumerate(things) if not thing.scenery), None)
-        if own is None:
-            return
-        stands = [known.get(id(thing)) or self._stand(thing) for thing in things]
-        boxes, model = np.array([stand.box for stand in stands]), stands[own].box.mean(axis=0)
-        check_rooms([room for stand in stands for room in stand.rooms], model, cameras)
-        low, high = cameras.min(axis=0), cameras.max(axis=0)
-        for k in np.flatnonzero(((boxes.min(axis=1) <= high) & (boxes.max(axis=1) >= low)).all(axis=1)).tolist():
-            thing = things[k]
-            for i in np.flatnonzero(inside_box(boxes[k], cameras)):
-                if not thing.scenery or (self._roofs(thing, cameras[i]) and not self._roofs(thing, model)):
-                    what = f"{thing.model.category or 'piece'} {thing.key}"
-                    x, y = np.array(thing.world_from_object)[:2, 3]
-                    raise RecipeError(
-                        f"viewpoints: expected the camera outside of all that is placed; found it at "
-                        f"({', '.join(f'{v:.3g}' for v in cameras[i])}) inside {what}, which stands at ({x:.3g}, {y:.3g}): go "
-                        f"farther away, or, where distance is a share to fill, fill less; with min_visibility, frames that are "
-                        f"drawn at random are drawn again"
-                    )
-
-    def check_shot(self, shot: Shot) -> None:
-        """Raise RecipeError where a camera of a shot is inside of something, or a trajectory leads through a wall; what stands
-        still is looked at once.
-        """
-        instants, sensors = range(len(shot.instants)), range(len(shot.rig.sensors))
-        still = {id(thing): self._stand(thing) for thing in shot.things if thing.motion.is_still}
-        for poses in dict.fromkeys(map(shot.poses_at, instants)):
-            together = [instant for instant in instants if shot.poses_at(instant) == poses]
-            cameras = [shot.camera(instant, sensor).center for instant in together for sensor in sensors]
-            there = [thing for thing in shot.things_at(together[0]) if thing.is_there]
-            self._check_cameras(there, np.array(cameras), still)
-        if shot.sequence:
-            fixed = [(thing, still[id(thing)].box) for thing in shot.things if id(thing) in still]
-            check_way(fixed, lambda thing: self.model(thing.model, thing.step), _steps(shot))
-
-    def _stand(self, thing: Thing) -> _Stand:
-        pose = thing.world_from_object
-        rooms = tuple(transform(pose, box) for box in rooms_of(thing.model.source, thing.model.seed)) if thing.scenery else ()
-        return _Stand(transform(pose, self.box(thing.model, thing.step)), rooms)
-
-    def check_instant(self, shot: Shot, instant: int) -> None:
-        """Raise RecipeError where a camera of a shot is inside of something at an instant, counted from 0 in the shot."""
-        self.check_shot(shot.model_copy(update={"instants": (shot.instants[instant],), "things": shot.things_at(instant)}))
-
-    def _roofs(self, thing: Thing, point: Float) -> bool:
-        """Return whether scenery hides most of the sky from a point in the world."""
-        mesh = self.model(thing.model, thing.step)
-        inside = transform(np.linalg.inv(np.array(thing.world_from_object)), point)
-        return sky_occlusion(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY
-
     def stage(self, shot: Shot) -> Stage:
         """The engine's stage for this shot, built anew only when the scene is another one, or a picture in it has changed."""
         key = shot.stage_key, _stamps(shot)
@@ -261,7 +147,7 @@ class Stages:
         return stage
 
     def render(self, shot: Shot) -> Iterator[Sample]:
-        """The shot's samples in order, channels in memory; `check_shot` says beforehand whether its cameras can stand there."""
+        """The shot's samples in order, channels in memory; `CameraChecks` checks its cameras beforehand."""
         stage = self.stage(shot)
         views = ShotViews(shot, stage.at, lambda thing: self.model(thing.model, thing.step))
         shown: tuple[TimeStep | None, ...] | None = None
@@ -280,12 +166,6 @@ class Stages:
 def _name(spec: ModelSpec, step: TimeStep | None) -> str:
     """Equal for equal models."""
     return spec.model_dump_json() + (step.model_dump_json() if step else "")
-
-
-def _steps(shot: Shot) -> list[Step]:
-    """From each frame to the next one, where the shot has both."""
-    pairs = enumerate(pairwise(shot.instants))
-    return [(a.index, shot.camera(i, 0).center, shot.camera(i + 1, 0).center) for i, (a, b) in pairs if b.index == a.index + 1]
 
 
 def _stamps(shot: Shot) -> tuple[Stamp, ...]:
