@@ -8,8 +8,7 @@ import pytest
 from viewsphere import Recipe, render
 from viewsphere.composing.viewpoints.camera import inside_box
 from viewsphere.errors import RecipeError
-from viewsphere.run.shots.camera_collisions import check_way
-from viewsphere.run.shots.stages import _steps
+from viewsphere.run.shots.camera_collisions import _steps, check_way
 from viewsphere.zoo import build, rooms_of
 
 SEED_OF_A_FLAT = 4
