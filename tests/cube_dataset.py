@@ -92,7 +92,7 @@ def render(shot: Shot):
         sight = sight_of(shot, instant, camera, geometry, visibility, boxes, files, None, views.around(instant, sensor), traits)
         objects = annotated(sight)
         more = sample_values(sight, objects)
-        told = {"instant": now.index, "asked": shot.annotations, "more": more, "options": shot.labels}
+        told = {"instant": now.index, "requested": shot.annotations, "extra": more, "options": shot.labels}
         yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {}, **told)
 
 

@@ -125,7 +125,7 @@ def test_a_label_of_objects_is_one_file(labelled, tmp_path):
     kept = Dataset(tmp_path / "out")[0]
     width, height, _ = sample.objects[0].size
     assert sample.objects[0].aspect == kept.objects[0].aspect == pytest.approx(height / width)
-    assert kept.objects[0].more == {"aspect": kept.objects[0].aspect}
+    assert kept.objects[0].extra == {"aspect": kept.objects[0].aspect}
     spelled = json.loads(json.dumps(whole_sample(kept)))
     assert from_whole_sample(spelled, kept.channels, kept.files).objects[0].aspect == kept.objects[0].aspect
     assert "aspect" not in (next((tmp_path / "out").rglob("frames.json"))).read_text()

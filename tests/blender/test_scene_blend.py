@@ -392,7 +392,7 @@ def test_the_light_of_a_file_comes_in_parts(made):
     engine = ENGINE | {"samples": 8}
     sample = next(iter(render(street(made, engine=engine, channels=names, viewpoints={"azimuth": [0], "distance": 7}))))
     light = np.dstack([sample.albedo * sample.shading + sample.residual, np.ones((72, 96), np.float32)])
-    composed = develop(light, None, sample.taken.shot.finish(0).view)
+    composed = develop(light, None, sample.origin.shot.finish(0).view)
     assert np.abs(composed.astype(int) - sample.rgb).max() <= 1
     assert sample.albedo.max() > 0.5
     assert (sample.albedo * sample.shading).max() > 0.05

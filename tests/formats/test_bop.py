@@ -393,7 +393,7 @@ def test_what_is_hidden_or_outside(stills, tmp_path):
     o, other = next(o for o in sample.objects if not o.truncation), next(o for o in sample.objects if o.truncation)
     nothing = replace(o.rle, counts=_nothing(o.rle))
     hidden = replace(o, rle=nothing, area=0, visibility=0.0)
-    gone = replace(other, rle=nothing, area=0, visibility=0.0, truncation=1.0, more={**other.more, "amodal": nothing})
+    gone = replace(other, rle=nothing, area=0, visibility=0.0, truncation=1.0, extra={**other.extra, "amodal": nothing})
     (info,) = made(stills, tmp_path, replace(sample, objects=(hidden, gone)))["scene_gt_info.json"][str(sample.index)]
     assert info["px_count_all"] == amodal(o).sum() and info["px_count_visib"] == 0 == info["visib_fract"]
     assert info["bbox_obj"] == info["bbox_visib"] == [-1] * 4

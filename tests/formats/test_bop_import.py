@@ -118,7 +118,7 @@ def test_of_others_less_is_known(tree, tmp_path):
     assert dataset.plan.channels == ("rgb",) and {c.name for c in dataset.categories} <= {f"obj_{i:06d}" for i in range(9)}
     o = dataset[0].objects[0]
     np.testing.assert_array_equal(o.world_from_object, o.camera_from_object)
-    assert np.isnan(o.visibility) and o.area and "amodal" not in o.more
+    assert np.isnan(o.visibility) and o.area and "amodal" not in o.extra
     with pytest.raises(UserError, match=r"format bop: expected amodal of all pictures; .*, and expected depth of all pictures"):
         export(dataset.root, "bop", output=tmp_path / "again")
     assert not (tmp_path / "again" / "bop").exists()

@@ -44,4 +44,4 @@ def test_eyes(videos, stills):
     with pytest.raises(UserError, match="frame 0: expected sensors left, right; found top"):
         eyes.side(replace(videos[0], sensor="top"))
     with pytest.raises(StoreError, match="frame 0: expected the rig that took it; found an imported picture"):
-        eyes.side(replace(videos[0], taken=None))
+        eyes.side(replace(videos[0], origin=None))

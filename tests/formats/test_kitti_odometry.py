@@ -95,7 +95,7 @@ def test_one_camera_is_its_own_partner(tmp_path):
     generate(alone.model_copy(update={"shot_frames": 1}), tmp_path)
     read = loaded(tmp_path / FORMAT, "00")
     left = Dataset(tmp_path).sequence("car_000")
-    assert len({sample.taken.key for sample in left}) == 2  # shots, which a pose's sequence begins before
+    assert len({sample.origin.key for sample in left}) == 2  # shots, which a pose's sequence begins before
     np.testing.assert_allclose(read.poses[1], np.linalg.inv(world_from(left[0])) @ world_from(left[1]), atol=1e-12)
     assert len(read) == len(read.cam2_files) == 2 and read.cam3_files == read.velo_files == []
     np.testing.assert_array_equal(read.calib.P_rect_20, read.calib.P_rect_30)

@@ -385,7 +385,7 @@ def moved_on(sample):
 
 def with_object(sample, **changes):
     (o,) = sample.objects
-    return replace(sample, objects=(replace(o, more={**o.more, **changes}),))
+    return replace(sample, objects=(replace(o, extra={**o.extra, **changes}),))
 
 
 @pytest.mark.slow

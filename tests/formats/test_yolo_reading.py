@@ -140,7 +140,7 @@ def test_points_without_a_third_number(tmp_path):
     one, other = next(iter(Dataset(tmp_path / "out"))).objects
     assert one.keypoint_names == ("0", "1") and one.keypoint_states.tolist() == [0, 3]
     close("yolo", "import: points", one.keypoints[0], [16, 15], "px", atol=1e-12)
-    assert np.isnan(one.keypoints[1]).all() and "keypoints" not in other.more
+    assert np.isnan(one.keypoints[1]).all() and "keypoints" not in other.extra
 
 
 def test_lists_of_pictures_and_paths_as_others_write_them(tmp_path):

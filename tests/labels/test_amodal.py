@@ -35,7 +35,7 @@ def amodal(o):
 
 def sample_of(found):
     objects, camera, _, _, pose = found
-    return Sample(0, "train", camera, pose, objects, {}, {}, asked=ASKED)
+    return Sample(0, "train", camera, pose, objects, {}, {}, requested=ASKED)
 
 
 def proofs(sample):
@@ -124,9 +124,9 @@ def test_a_box_from_above(turn, yaw):
 def test_labels_that_nobody_asked_for_follow_or_are_missing():
     objects, *_ = scene([UNIT], [at()])
     (cube,) = objects
-    assert not cube.more
+    assert not cube.extra
     assert cube.occlusion_level == 0 and len(cube.hull) == 4 and cube.birds_eye.length == 1.0
-    assert not cube.more
+    assert not cube.extra
     with pytest.raises(AttributeError, match=r"no 'amodal'.*add it to the recipe's annotations"):
         _ = cube.amodal
 
@@ -147,7 +147,7 @@ def test_random_scenes_prove_themselves_and_come_back(lens, seed):
     sample = sample_of(random_scene(seed, lens))
     assert proofs(sample) == []
     back = from_whole_sample(json.loads(json.dumps(whole_sample(sample), allow_nan=False)), {}, {})
-    assert back.asked == ASKED
+    assert back.requested == ASKED
     fields = [field for label in object_labels() if label.on_request and label.name in ASKED for field in label.fields]
     for o, again in zip(sample.objects, back.objects, strict=True):
         for field in fields:
@@ -231,7 +231,7 @@ def test_proofs_notice_what_was_changed(name):
     found = scene([UNIT, block((-2,) * 3, (2,) * 3)], [at(), at(y=6.0)], asked=ASKED)
     sample = sample_of(found)
     far = sample.objects[1]
-    changed = replace(far, more={**far.more, **TAMPERED[name](far)})
+    changed = replace(far, extra={**far.extra, **TAMPERED[name](far)})
     assert list(on_request()[name].prove(replace(sample, objects=(sample.objects[0], changed)), {}))
 
 

@@ -198,15 +198,15 @@ def test_proofs_find_other_words(kept):
         for i, one in enumerate(sample.referring):
             assert list(referring.prove(changed(sample, "referring", i, text=one.text + "s"), models))
             assert list(referring.prove(changed(sample, "referring", i, extreme="middlemost"), models))
-        fewer = replace(sample, more={**sample.more, "referring": sample.referring[1:]})
+        fewer = replace(sample, extra={**sample.extra, "referring": sample.referring[1:]})
         assert sample.referring and list(referring.prove(fewer, models))
 
 
 def changed(sample, name, i, **parts):
     """The sample with other parts of one of its captions or expressions."""
-    found = list(sample.more[name])
+    found = list(sample.extra[name])
     found[i] = replace(found[i], **parts)
-    return replace(sample, more={**sample.more, name: tuple(found)})
+    return replace(sample, extra={**sample.extra, name: tuple(found)})
 
 
 def test_scenes_are_painted_and_have_weather():

@@ -186,7 +186,7 @@ class World:
 
     def weather(self):
         """The sentences that hold of sky and sun."""
-        shot, taken = self.dataset.labelled(self.sample.taken.key), self.sample.taken
+        shot, taken = self.dataset.labelled(self.sample.origin.key), self.sample.origin
         scene, finish = shot.scene, shot.instants[taken.instant].finish or shot.scene.finish
         ground = finish.background
         if scene.sky is None or scene.sky.kind != "daylight" or ground.color or ground.image or ground.transparent:

@@ -95,7 +95,7 @@ def test_they_are_kept_and_proved(tmp_path):
     for kept, again in zip(dataset, vs.render(recipe()), strict=True):
         np.testing.assert_array_equal(kept.objects[0].velocity, again.objects[0].velocity)
         np.testing.assert_array_equal(kept.camera_from_sensors, again.camera_from_sensors)
-        assert kept.asked == again.asked == ("velocity", "ego_motion", "sensor_poses")
+        assert kept.requested == again.requested == ("velocity", "ego_motion", "sensor_poses")
 
 
 @pytest.mark.parametrize(("name", "lacking"), [("velocity", "time"), ("ego_motion", "time"), ("sensor_poses", "rig")])

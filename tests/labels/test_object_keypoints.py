@@ -73,7 +73,7 @@ def test_rays_reach_what_is_visible_and_nothing_else(made):
     wrong = total = 0
     stages = Stages()
     for sample in vs.render(recipe()):
-        geometry = stages.stage(sample.taken.shot).at(sample.taken.instant)
+        geometry = stages.stage(sample.origin.shot).at(sample.origin.instant)
         for o in sample.objects:
             away = o.keypoints3d - sample.camera.center
             distance = np.linalg.norm(away, axis=1)

@@ -56,7 +56,7 @@ def test_what_is_computed_is_what_would_have_been_kept(world, request, tmp_path_
             for name in ("amodal", "occluders", "obb", "keypoints", "keypoint_states"):
                 np.testing.assert_equal(getattr(one, name), getattr(other, name))
         if world == "videos":
-            np.testing.assert_equal(ours.more["camera_from_next"], theirs.more["camera_from_next"])
+            np.testing.assert_equal(ours.extra["camera_from_next"], theirs.extra["camera_from_next"])
 
 
 def test_what_cannot_be_computed_is_told(tmp_path):

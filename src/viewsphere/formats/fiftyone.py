@@ -81,7 +81,7 @@ class FiftyOne(Tree):
                 path = f"fields/ground_truth.detections/{stem}_{o.id:03d}.png"
                 yield File(path, mask)
                 detections[-1]["mask_path"] = path
-        marked = [self._marked(sample, o) for o in seen if o.more.get("keypoint_names")] if self._points else []
+        marked = [self._marked(sample, o) for o in seen if o.extra.get("keypoint_names")] if self._points else []
         entry["ground_truth"] = {"_cls": "Detections", "detections": detections}
         if marked:
             entry["keypoints"] = {"_cls": "Keypoints", "keypoints": marked}

@@ -127,7 +127,7 @@ class Viper(Tree):
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its maps, its flow, and a line for its camera."""
-        course, sensor = self._timeline.course(sample), sample.taken.sensor if sample.taken else 0
+        course, sensor = self._timeline.course(sample), sample.origin.sensor if sample.origin else 0
         sequence = f"{course.number + 1:03d}{f'-{sensor}' if sensor else ''}"
         root, frame = sample.split or "train", sample.instant + 1
         name = f"{sequence}/{sequence}_{frame:05d}"

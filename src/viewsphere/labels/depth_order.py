@@ -79,7 +79,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
                 yield f"object {o.id}: expected the overlap of {one.pixels} pixels that object {one.id} has with it, found none"
             elif not 0 <= one.nearer <= 1 or one.nearer + mutual.nearer > 1 + 1e-12:
                 yield f"objects {o.id}, {one.id}: expected shares of together at most 1, found {one.nearer}, {mutual.nearer}"
-        if "amodal" in sample.asked:
+        if "amodal" in sample.requested:
             yield from _by_masks(o, by_id)
 
 

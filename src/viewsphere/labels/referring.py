@@ -210,7 +210,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         text = _text(one, {o.id: o for o in visible})
         if text != one.text:
             yield f"object {one.object}: expected {text!r}, by the parts of the expression; found {one.text!r:.80}"
-    if "looks" in sample.asked and not isinstance(sample.camera.distortion, Scan):
+    if "looks" in sample.requested and not isinstance(sample.camera.distortion, Scan):
         options = Referring.model_validate(sample.options.get("referring", {}))
         words = {o.id: (o.color or "", o.material or "") for o in visible}
         scene = Scene(visible, words, (sample.width, sample.height))

@@ -76,7 +76,7 @@ class ObjectAnnotation:
     An imported object has `source`, its annotation in the imported data set; values that the annotation lacks are NaN, and
     key and model may be empty. If it lacks a mask, the mask is empty, but `box2d` and `area` are the annotation's.
 
-    `more` holds the fields of labels that were asked for, and of those that other packages bring; these fields are attributes,
+    `extra` holds the fields of labels that were asked for, and of those that other packages bring; these fields are attributes,
     too. So are those of labels that follow from what every data set has, asked for or not.
     """
 
@@ -108,20 +108,20 @@ class ObjectAnnotation:
     source: Mapping[str, Any] | None = None
     # Default factories, unlike defaults, leave no attribute on the class, so that `__getattr__` of a subclass gets these, too.
     track: str = field(default_factory=str)
-    more: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    extra: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __getattr__(self, name: str) -> Any:
-        """Fields in `more`; raises AttributeError for other names."""
+        """Fields in `extra`; raises AttributeError for other names."""
         try:
-            return self.__dict__["more"][name]
+            return self.__dict__["extra"][name]
         except KeyError:
             raise AttributeError(
                 f"an object has no {name!r}, or its data set does not keep it: add it to the recipe's annotations"
             ) from None
 
     def __dir__(self) -> list[str]:
-        """Return the names of the attributes, with those of the fields in `more`."""
-        return sorted({*object.__dir__(self), *self.more})
+        """Return the names of the attributes, with those of the fields in `extra`."""
+        return sorted({*object.__dir__(self), *self.extra})
 
     @property
     def is_placed(self) -> bool:
@@ -156,7 +156,7 @@ class ObjectAnnotation:
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
+class Origin:
     """Of which shot a sample is, at which instant and by which sensor, both counted from 0 there: the shot itself, or the root
     of a data set and the key of the shot in it.
     """
@@ -188,9 +188,9 @@ class Sample(Shown):
     sensor: str = CAMERA
     instant: int = 0  # counted from 0 in the sequence, or, for still pictures, in the data set
     time: float = 0.0  # seconds from the sequence's first instant
-    taken: Taken | None = None  # None: nobody knows what was there
-    asked: tuple[str, ...] = ()  # labels of objects and of pictures that were asked for
-    more: Mapping[str, Any] = field(default_factory=dict[str, Any])  # fields of labels of pictures
+    origin: Origin | None = None  # None: nobody knows what was there
+    requested: tuple[str, ...] = ()  # labels of objects and of pictures that were asked for
+    extra: Mapping[str, Any] = field(default_factory=dict[str, Any])  # fields of labels of pictures
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])  # those of labels
 
     def __repr__(self) -> str:
@@ -269,18 +269,18 @@ class Sample(Shown):
 
     def __dir__(self) -> list[str]:
         """Return the names of the attributes, with those of channels and of the fields of labels."""
-        return sorted({*object.__dir__(self), *self.channels, *self.more})
+        return sorted({*object.__dir__(self), *self.channels, *self.extra})
 
     def __getattr__(self, name: str) -> Any:
         """Any channel by name, and any field of a label of pictures: `sample.rgb`, `sample.depth`, `sample.captions`, ..."""
         if name.startswith("_") or "channels" not in self.__dict__:
             raise AttributeError(f"Sample has no attribute {name!r}")
-        if name in self.more:
-            return self.more[name]
+        if name in self.extra:
+            return self.extra[name]
         try:
             return self.channels[name]
         except KeyError:
             raise AttributeError(
-                f"this sample has no channel {name!r}; it has {', '.join((*self.channels, *self.more))}: add it to the "
+                f"this sample has no channel {name!r}; it has {', '.join((*self.channels, *self.extra))}: add it to the "
                 f"recipe's channels, or annotations"
             ) from None

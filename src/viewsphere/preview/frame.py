@@ -46,7 +46,7 @@ def check_drawn(samples: Sequence[Sample], draw: Sequence[str]) -> None:
         source = known[name]
         if samples and not any(is_in(source, sample) for sample in samples):
             what = "channel" if source in channels() else "annotation"
-            kept = ", ".join((*samples[0].channels, *samples[0].asked))
+            kept = ", ".join((*samples[0].channels, *samples[0].requested))
             raise StoreError(f"--draw: expected the {what} {source}, to draw {name}; found pictures that have {kept}")
 
 

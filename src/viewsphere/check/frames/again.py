@@ -43,7 +43,7 @@ class Again:
         objects = annotated(sight)
         for o, again in zip(sample.objects, objects, strict=True):
             yield from _fields(o, again, sight.asked)
-        yield from _of_picture(sample.more, sample_values(sight, objects))
+        yield from _of_picture(sample.extra, sample_values(sight, objects))
 
     def _computed(self, label: ChannelLabel, sight: Sight) -> NDArray[Any] | None:
         """A channel, computed again; None where a picture of the scene is no longer there: it is no part of the data set."""

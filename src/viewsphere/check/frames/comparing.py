@@ -41,7 +41,7 @@ def files(sample: Sample) -> Iterator[str]:
 
 def _passes(sample: Sample, name: str, array: NDArray[Any]) -> Iterator[str]:
     """Light is a number and not negative; shares are at most 1, but for the colours of a user's own .blend scene."""
-    is_own = sample.taken is not None and sample.taken.shot is not None and sample.taken.shot.scene.blend is not None
+    is_own = sample.origin is not None and sample.origin.shot is not None and sample.origin.shot.scene.blend is not None
     most = np.inf if PASSES[name].unit != "1" or is_own else 1 + SHARE_TOLERANCE
     wrong = ~(np.isfinite(array) & (array >= 0) & (array <= most))
     if wrong.any():

@@ -164,7 +164,7 @@ def _is_kept(dataset: Dataset, name: str) -> bool:
 def _proofs(models: Mapping[str, ModelInfo], sample: Sample) -> Iterator[tuple[str, list[str]]]:
     """Every check of one frame against itself and what it found; a proof that cannot be carried out counts as failed."""
     proofs: dict[str, Callable[[], Iterable[str]]] = {name: partial(proof, sample) for name, proof in FRAME_PROOFS.items()}
-    following = on_request().keys() - sample.asked  # of these nothing is kept, so nothing can be wrong
+    following = on_request().keys() - sample.requested  # of these nothing is kept, so nothing can be wrong
     kept = {name: label for name, label in labels().items() if name not in following and label.is_in(sample)}
     proofs |= {name: partial(label.prove, sample, models) for name, label in kept.items()}
     for name, proof in proofs.items():

@@ -190,7 +190,7 @@ def _split(sample: Sample) -> str:
 def _place(dataset: Dataset, sample: Sample) -> tuple[int, int]:
     """The numbers of a picture's scene, and of the picture in it."""
     part = dataset.plan.parts[dataset.plan.part_of(sample.index)]
-    if sample.sequence and sample.taken is not None:
+    if sample.sequence and sample.origin is not None:
         return sample.index - sample.instant * part.blocks[0].each, sample.instant
     of = max(1, min(SCENE, FOLDER_SIZE // max(1, part.max_objects)))
     image = (sample.index - part.first) % of

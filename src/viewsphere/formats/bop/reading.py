@@ -224,9 +224,9 @@ def _samples(
             files["depth"] = Loaded(".png", _depth(frame.depth, frame))
         objects = tuple(_object(frame, n, *named[gt["obj_id"]], boxes.get(gt["obj_id"])) for n, gt in enumerate(frame.gt))
         said = {"scene_id": frame.scene.name, "im_id": frame.image}
-        whole = all("amodal" in o.more for o in objects)
+        whole = all("amodal" in o.extra for o in objects)
         sample = Sample(index, frame.split, frame.camera, None, objects, {}, {}, source=said, instant=index)
-        yield ForeignFrame(replace(sample, asked=("amodal",) if whole else ()), files)
+        yield ForeignFrame(replace(sample, requested=("amodal",) if whole else ()), files)
 
 
 def _depth(file: Path, frame: Frame) -> bytes:
@@ -252,7 +252,7 @@ def _object(frame: Frame, n: int, category: Category, key: str, box: NDArray[np.
     known |= {"key": key, "camera_from_object": pose, "quaternion": quaternion_from_matrix(pose[:3, :3])}
     if whole is not None:
         tight = rle_box(height, width, whole)
-        known["more"] = {"amodal": Rle(height, width, whole), "box2d_amodal": tight and tuple(map(float, tight))}
+        known["extra"] = {"amodal": Rle(height, width, whole), "box2d_amodal": tight and tuple(map(float, tight))}
     if info is not None:
         known["visibility"] = float(info["visib_fract"])
         everything, outer = int(info["px_count_all"]), _corners(info["bbox_obj"])

@@ -74,7 +74,7 @@ class Entries:
 
 def _captions(sample: Sample) -> Iterator[dict[str, Any]]:
     """COCO's captions of a picture, if it has any."""
-    if CAPTIONS not in sample.asked:
+    if CAPTIONS not in sample.requested:
         return
     from viewsphere.labels.captions import MOST  # which loads what describes scenes
 
@@ -156,7 +156,7 @@ def _foreign_annotation(o: ObjectAnnotation, own: Mapping[str, int], names: Name
     points come in the category's order where that has others than when it was imported.
     """
     source = {k: v for k, v in (o.source or {}).items() if k != "path_mask"}
-    told = o.more.get("keypoint_names")
+    told = o.extra.get("keypoint_names")
     points = object_points(o, names) if told and tuple(told) != names.get(o.category_id) else {}
     return {"iscrowd": 0, "area": o.area, **source, **points, **own}
 

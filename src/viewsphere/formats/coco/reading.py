@@ -288,7 +288,7 @@ def _sample(part: _Split, points: Mapping[int, tuple[str, ...]], image: dict[str
 
 def _more(names: tuple[str, ...] | None, source: dict[str, Any]) -> dict[str, Any]:
     """The label of an annotation's points, if it has any."""
-    return {"more": named_points(names, source[KEYPOINTS])} if names and source.get(KEYPOINTS) else {}
+    return {"extra": named_points(names, source[KEYPOINTS])} if names and source.get(KEYPOINTS) else {}
 
 
 def _corners(source: dict[str, Any]) -> Box | None:

@@ -110,7 +110,7 @@ class FallingThings(Tree):
         """A camera's picture, depth, classes and objects; raises UserError where an imported picture lacks a channel."""
         for name in missing(CHANNELS, sample.channels):
             raise UserError(f"frame {sample.index}: expected channel {name}; found none")
-        number = sample.instant if sample.sequence else sample.index - (sample.taken.sensor if sample.taken else 0)
+        number = sample.instant if sample.sequence else sample.index - (sample.origin.sensor if sample.origin else 0)
         folder = self._folder(sample, number)
         side = self._sides.get(sample.sensor, "left")
         yield from (Piece(f"{folder}/_{name}_settings.json", b"") for name in ("camera", "object"))

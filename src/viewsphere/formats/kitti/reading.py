@@ -219,7 +219,7 @@ def _object(number: int, row: Row, category: Category, picture: _Frame, camera: 
         more["truncation_level"] = int(outside)
     elif outside >= 0:
         known["truncation"] = float(outside)
-    return foreign_object(number, category, picture.size, source, None, row.box, **known, more=more)
+    return foreign_object(number, category, picture.size, source, None, row.box, **known, extra=more)
 
 
 def _standing(solid: tuple[float, ...], camera: Camera | None) -> dict[str, Any]:

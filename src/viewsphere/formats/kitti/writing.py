@@ -81,14 +81,14 @@ class Kitti(Tree):
         """The rig, what it is to KITTI, and the sample's sensor by its place in it; of one camera, as imported and merged data
         sets may have it, where the shot is not known. Raises UserError for another sensor there.
         """
-        if sample.taken is not None or sample.sensor != CAMERA:
+        if sample.origin is not None or sample.sensor != CAMERA:
             shot, _, place = self._timeline.taken(sample)
             return shot.rig, car_in(shot, "kitti"), place
         return None if sample.known_camera is None else Rig.of(sample.known_camera.intrinsics), Car(0), 0
 
     def _course(self, sample: Sample) -> _Course:
         """The sequence that a sample is of; raises UserError for a still picture."""
-        if sample.taken is None and sample.sequence:
+        if sample.origin is None and sample.sequence:
             return self._unplanned(sample.sequence)
         course = self._timeline.course(sample)
         return _Course(course.number, course.instants, None)

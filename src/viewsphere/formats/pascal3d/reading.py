@@ -129,7 +129,7 @@ def _sample(
         _annotation(o, categories[o.kind], cads.get(o.kind, ()), picture, lens, mask)
         for o, mask in zip(seen, masks, strict=True)
     ]
-    sample = replace(unposed(picture, index, objects, {"file_name": picture.name}), asked=("keypoints",), instant=index)
+    sample = replace(unposed(picture, index, objects, {"file_name": picture.name}), requested=("keypoints",), instant=index)
     camera = lens and Camera(lens, np.eye(3), np.zeros(3))
     return sample if camera is None else replace(sample, known_camera=camera, image_size=None)
 
@@ -165,7 +165,7 @@ def _annotation(
     info = cads[o.cad - 1].info if 0 < o.cad <= len(cads) else None
     known: dict[str, Any] = {"key": info.key if info else "", **_standing(o, info and info.box3d_object, lens)}
     assert o.id is not None
-    return foreign_object(o.id, category, picture.size, source, mask, o.box, box2d=o.box, more=_keypoints(o), **known)
+    return foreign_object(o.id, category, picture.size, source, mask, o.box, box2d=o.box, extra=_keypoints(o), **known)
 
 
 def _masks(file: Path, seen: Sequence[Seen]) -> Iterator[str | None]:

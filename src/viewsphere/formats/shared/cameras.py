@@ -89,7 +89,7 @@ class Rigs:
 
     def at(self, sample: Sample) -> Moment:
         """The rig that takes a sample, then; of one whose shot nobody knows, its camera alone."""
-        taken = sample.taken
+        taken = sample.origin
         shot = taken.shot or self._shot(taken.key) if taken else None
         if taken is None or shot is None:
             camera = sample.camera

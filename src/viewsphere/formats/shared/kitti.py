@@ -131,8 +131,8 @@ def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
     """Return the part of an object outside of the picture, as a share or a grade. Imported objects may have only one of them,
     or neither.
     """
-    if in_grades and "truncation_level" in o.more:
-        return int(o.more["truncation_level"])
+    if in_grades and "truncation_level" in o.extra:
+        return int(o.extra["truncation_level"])
     if math.isnan(o.truncation):
         return NO_SHARE
     return (o.truncation > TRUNCATED) + (o.truncation > LARGELY_OUTSIDE) if in_grades else o.truncation
@@ -140,8 +140,8 @@ def _outside(o: ObjectAnnotation, in_grades: bool) -> float:
 
 def _hidden(o: ObjectAnnotation) -> int:
     """KITTI's grade of occlusion, of merged objects too, of which no more than the shares is kept."""
-    if "occlusion_level" in o.more:
-        return int(o.more["occlusion_level"])
+    if "occlusion_level" in o.extra:
+        return int(o.extra["occlusion_level"])
     if math.isnan(o.visibility) or o.truncation >= 1:
         return UNKNOWN
     hidden = 1 - o.visibility / (1 - o.truncation)

@@ -47,8 +47,8 @@ class Eyes:
 
     def numbers(self, sample: Sample) -> tuple[int, int]:
         """The number of the first sample of a sample's instant in the data set, and that of the instant before."""
-        assert sample.taken is not None
-        first = sample.index - sample.taken.sensor
+        assert sample.origin is not None
+        first = sample.index - sample.origin.sensor
         return first, first - len(self._rig(sample).sensors)
 
     def lens(self, sample: Sample) -> Intrinsics:
@@ -56,9 +56,9 @@ class Eyes:
         return self._rig(sample).sensors[self.pair(sample).left].intrinsics
 
     def _rig(self, sample: Sample) -> Rig:
-        if sample.taken is None:
+        if sample.origin is None:
             raise StoreError(f"frame {sample.index}: expected the rig that took it; found an imported picture")
-        return self._rig_of(sample.taken.key)
+        return self._rig_of(sample.origin.key)
 
     def _read(self, key: str) -> Rig:
         shot = self._dataset.labelled(key)

@@ -69,14 +69,14 @@ class Timeline:
 
     def shot(self, sample: Sample) -> Shot | None:
         """The shot that a sample is of; None for an imported picture, or one of a merged data set."""
-        return None if sample.taken is None else self._labelled(sample.taken.key)
+        return None if sample.origin is None else self._labelled(sample.origin.key)
 
     def taken(self, sample: Sample) -> tuple[Shot, int, int]:
         """The shot that a sample is of, and its instant and its sensor there; raises UserError where nobody knows it."""
         shot = self.shot(sample)
-        if shot is None or sample.taken is None:
+        if shot is None or sample.origin is None:
             raise UserError(f"frame {sample.index}: expected {KNOWN}; found none")
-        return shot, sample.taken.instant, sample.taken.sensor
+        return shot, sample.origin.instant, sample.origin.sensor
 
     def shots(self, course: Course) -> Iterator[Shot]:
         """The finished shots of a sequence, in order."""

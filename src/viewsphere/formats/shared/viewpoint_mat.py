@@ -169,7 +169,7 @@ class Cads:
     def _anchors(self, o: ObjectAnnotation) -> dict[str, dict[str, Any]]:
         """Anchors by their names; those that are not visible have no place, but for imported ones."""
         fields, said = self._fields[o.category], o.source
-        if not self._has_anchors or (not fields if said is None else "keypoint_names" not in o.more):
+        if not self._has_anchors or (not fields if said is None else "keypoint_names" not in o.extra):
             return {}
         known = (said or {}).get("anchors", {})
         names: Sequence[str] = o.keypoint_names

@@ -131,7 +131,7 @@ def tracked(sample: Sample, names: Names) -> bytes:
 
 def looks(o: ObjectAnnotation) -> tuple[str, str]:
     """The names of an object's model and of its colour, each a word."""
-    model, color = o.track or o.key, o.more.get("color")
+    model, color = o.track or o.key, o.extra.get("color")
     return word(model), word(color or UNKNOWN)
 
 

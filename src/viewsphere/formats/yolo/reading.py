@@ -214,4 +214,4 @@ def _object(number: int, row: Row, categories: Sequence[Category], picture: List
     x, y, width, height = source["bbox"]
     outline, box = source.get("segmentation"), (x, y, x + width, y + height)
     mask = rle_of_polygons(picture.size[1], picture.size[0], outline) if outline else None
-    return foreign_object(number, categories[row.number], picture.size, source, mask, box, **({"more": more} if more else {}))
+    return foreign_object(number, categories[row.number], picture.size, source, mask, box, **({"extra": more} if more else {}))

@@ -73,7 +73,7 @@ class Yolo(Tree):
                 return ""
             numbers = (one_ring(rings) / size).ravel()
         elif self._task == "obb":
-            corners = o.more.get("obb")
+            corners = o.extra.get("obb")
             if corners is None:
                 return ""
             numbers = np.clip(corners / size, 0, 1).ravel()
@@ -86,7 +86,7 @@ class Yolo(Tree):
         picture.
         """
         found = np.zeros((len(self._points), 3))
-        if "keypoint_names" not in o.more:  # imported, as a box alone
+        if "keypoint_names" not in o.extra:  # imported, as a box alone
             return found
         for name, place, state in zip(o.keypoint_names, o.keypoints, o.keypoint_states, strict=True):
             if int(state) in STATES and name in self._points:
@@ -104,7 +104,7 @@ def _points(dataset: Dataset) -> dict[str, int]:
     """The names of all models' points, and their numbers; of imported data sets, those of the first object that has some."""
     names = [name for model in dataset.models for name in (model.keypoints.points if model.keypoints else ())]
     if not names:
-        marked = (o.more.get("keypoint_names") for sample in dataset for o in sample.objects)
+        marked = (o.extra.get("keypoint_names") for sample in dataset for o in sample.objects)
         names = next((found for found in marked if found), ())
     return {name: number for number, name in enumerate(dict.fromkeys(names))}
 

@@ -18,14 +18,14 @@ _OWN = frozenset(f.name for f in fields(ObjectAnnotation))
 
 
 def annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: Mapping[str, Any] | None = None) -> Any:
-    """The annotation with these fields; fields that `ObjectAnnotation` lacks go to `more`."""
+    """The annotation with these fields; fields that `ObjectAnnotation` lacks go to `extra`."""
     own: dict[str, Any] = {}
     for some in values:
         own.update(some)
     if own.keys() <= _OWN:
         return ObjectAnnotation(id=object_id, source=source, **own)
     more = {name: own.pop(name) for name in own.keys() - _OWN}
-    return ObjectAnnotation(id=object_id, source=source, more=more, **own)
+    return ObjectAnnotation(id=object_id, source=source, extra=more, **own)
 
 
 def computed(object_id: int, values: Iterable[Mapping[str, Any]], placement: Placement, makers: Makers) -> ObjectAnnotation:
@@ -42,7 +42,7 @@ def computed(object_id: int, values: Iterable[Mapping[str, Any]], placement: Pla
 
 def whole_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str, Any]:
     """Return every field of an object, in the types that `json.dumps(..., allow_nan=False)` accepts."""
-    known = {**o.more, **{name: getattr(o, name) for name in _OWN}}
+    known = {**o.extra, **{name: getattr(o, name) for name in _OWN}}
     record = {"id": o.id, **{f.name: f.plain(known[f.name]) for f in _fields(labels) if f.name in known}}
     return record if o.source is None else {**record, "source": dict(o.source)}
 
@@ -127,13 +127,13 @@ class _Restored(ObjectAnnotation):
             ) from None
 
     def _other(self, name: str) -> Any:
-        if name != "more":
+        if name != "extra":
             return super().__getattr__(name)
         makers: Makers | None = self.__dict__.get("_makers")
         beyond = [field for field in makers.of if field not in _OWN and makers.has(field)] if makers else []
-        self.__dict__["more"] = {}
-        self.__dict__["more"] = {field: getattr(self, field) for field in beyond}
-        return self.__dict__["more"]
+        self.__dict__["extra"] = {}
+        self.__dict__["extra"] = {field: getattr(self, field) for field in beyond}
+        return self.__dict__["extra"]
 
     def __dir__(self) -> list[str]:
         """Return all attributes, also those that are not restored yet."""

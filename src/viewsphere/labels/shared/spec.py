@@ -127,7 +127,7 @@ class Label(Spec):
 
     def is_in(self, sample: Sample) -> bool:
         """Return whether a sample has it."""
-        return self.name in sample.asked
+        return self.name in sample.requested
 
 
 class ChannelLabel(Label):
@@ -200,7 +200,7 @@ class ObjectLabel(Label):
 
     def is_in(self, sample: Sample) -> bool:
         """Return whether the sample's objects have it: it was asked for, or did not have to be."""
-        return not self.on_request or self.name in sample.asked or (self.follows and sample.taken is not None)
+        return not self.on_request or self.name in sample.requested or (self.follows and sample.origin is not None)
 
     @staticmethod
     def derived(

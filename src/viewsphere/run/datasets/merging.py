@@ -335,7 +335,7 @@ def _renumbered(source: _Source, sample: Sample, index: int) -> ForeignFrame:
     moved = replace(
         sample,
         index=index,
-        more=_with_ids(source, sample.more, sample_labels().values()),
+        extra=_with_ids(source, sample.extra, sample_labels().values()),
         sequence=source.sequences.get(sample.sequence, sample.sequence),
         known_pose=pose and pose.model_copy(update={"index": pose.index + source.first_pose}),
         objects=tuple(_moved_object(source, o) for o in sample.objects),
@@ -352,8 +352,8 @@ def _moved_object(source: _Source, o: ObjectAnnotation) -> ObjectAnnotation:
     folder, _, name = o.model.rpartition("/")
     model = f"{folder.rpartition('/')[0]}/{key}/{name}" if o.model else ""
     named = {"key": key + o.key.removeprefix(old), "track": key if o.track else ""}
-    more = _with_ids(source, o.more, object_labels())
-    return replace(o, **named, model=model, more=more, **_of(source.categories[o.category_id]))
+    more = _with_ids(source, o.extra, object_labels())
+    return replace(o, **named, model=model, extra=more, **_of(source.categories[o.category_id]))
 
 
 def _with_ids(source: _Source, values: Mapping[str, Any], labels: Iterable[ObjectLabel | SampleLabel]) -> dict[str, Any]:

@@ -68,7 +68,7 @@ class Completed(Exported):
 
     def shown(self, sample: Sample) -> Sample:
         """A sample with the labels that are computed."""
-        wanted = [name for name in self._names if name not in sample.channels and name not in sample.asked]
+        wanted = [name for name in self._names if name not in sample.channels and name not in sample.requested]
         return super().shown(self._with(sample, wanted) if wanted else sample)
 
     @cached_property
@@ -88,8 +88,8 @@ class Completed(Exported):
             return replace(sample, channels=channels)
         sight = self._sight(sample, names)
         objects = annotated(sight)
-        more = {**sample.more, **sample_values(sight, objects)}
-        return replace(sample, channels=channels, objects=objects, more=more, asked=(*sample.asked, *asked))
+        more = {**sample.extra, **sample_values(sight, objects)}
+        return replace(sample, channels=channels, objects=objects, extra=more, requested=(*sample.requested, *asked))
 
     def _sight(self, sample: Sample, names: list[str]) -> Sight:
         asked = [name for name in names if name in on_request()]

@@ -124,7 +124,7 @@ class Target:
         the format needs of every frame.
         """
         shown = self.view.shown(sample)
-        absent = missing(self.spec.channels or (), {*shown.channels, *shown.asked})
+        absent = missing(self.spec.channels or (), {*shown.channels, *shown.requested})
         is_exempt = self.spec.lidar and isinstance(sample.known_camera and sample.camera.distortion, Scan)
         if sample.sensor != CAMERA and absent and not is_exempt:
             raise UserError(

@@ -58,7 +58,7 @@ def scope_of(dataset: Dataset) -> Scope:
     if shots and shots[0] and all(shots):
         return replace(known, rig=shots[0].rig)
     pictures = tuple(chain.from_iterable(map(telling, dataset.samples_of_parts)))
-    asked = dict.fromkeys(name for sample in pictures for name in sample.asked)
+    asked = dict.fromkeys(name for sample in pictures for name in sample.requested)
     return replace(known, annotations=tuple(dict.fromkeys((*known.annotations, *asked))), pictures=pictures)
 
 
@@ -72,7 +72,7 @@ def scope_of_foreign(foreign: ForeignDataset) -> Scope:
         is_moving=False,
         most_objects=foreign.max_objects,
         channels=foreign.channels,
-        annotations=pictures[0].asked if pictures else (),
+        annotations=pictures[0].requested if pictures else (),
         pictures=pictures,
     )
 

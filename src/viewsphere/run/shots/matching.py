@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError, UserError
-from viewsphere.model.sample import Sample, Taken
+from viewsphere.model.sample import Origin, Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.shots.stages import Stages
@@ -57,14 +57,14 @@ def matches(a: Sample, b: Sample) -> Matches:
 
 
 def _shot_of(sample: Sample) -> Shot:
-    taken = sample.taken
-    if taken is None:
+    origin = sample.origin
+    if origin is None:
         raise StoreError(f"frame {sample.index}: expected a sample whose shot is kept; found one that was imported or merged")
-    if taken.shot is not None:
-        return taken.shot
-    found = _stored(taken.root, taken.key)
+    if origin.shot is not None:
+        return origin.shot
+    found = _stored(origin.root, origin.key)
     if found is None:
-        raise StoreError(f"{taken.root}: frame {sample.index}: expected its shot {taken.key}, found none")
+        raise StoreError(f"{origin.root}: frame {sample.index}: expected its shot {origin.key}, found none")
     return found
 
 
@@ -79,11 +79,11 @@ def _subject(shot: Shot) -> str:
 
 def _view(sample: Sample, shot: Shot) -> View:
     """Return the view of a sample's sensor."""
-    assert sample.taken is not None
-    return views_of(shot, _meshes(sample.taken)).view(sample.taken.instant, sample.taken.sensor)
+    assert sample.origin is not None
+    return views_of(shot, _meshes(sample.origin)).view(sample.origin.instant, sample.origin.sensor)
 
 
-def _meshes(taken: Taken) -> Callable[[Thing], Mesh]:
+def _meshes(taken: Origin) -> Callable[[Thing], Mesh]:
     """Gives the mesh of a thing: what was exported of objects of a data set, what sources say of all else."""
 
     def mesh(thing: Thing) -> Mesh:

@@ -22,7 +22,7 @@ from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.labels import annotated, labels, observe, sample_values, sight_of
 from viewsphere.model.channel import PASSES
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
-from viewsphere.model.sample import Float, Sample, Taken
+from viewsphere.model.sample import Float, Origin, Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
 from viewsphere.model.traits import Traits
@@ -223,9 +223,9 @@ def render_sample(
         sensor=shot.rig.sensors[sensor].name,
         instant=now.index,
         time=now.seconds,
-        taken=Taken(instant, sensor, shot),
-        asked=shot.annotations,
-        more=sample_values(sight, objects),
+        origin=Origin(instant, sensor, shot),
+        requested=shot.annotations,
+        extra=sample_values(sight, objects),
         options=shot.labels,
     )
 

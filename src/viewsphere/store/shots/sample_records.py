@@ -32,7 +32,7 @@ from viewsphere.labels import (
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.rig import CAMERA
-from viewsphere.model.sample import ObjectAnnotation, Sample, Taken
+from viewsphere.model.sample import ObjectAnnotation, Origin, Sample
 from viewsphere.model.shot import Shot
 from viewsphere.store.shots.records import typed
 
@@ -43,14 +43,14 @@ Facts = Callable[[str, int | None], ModelFacts]
 
 def short_sample(sample: Sample) -> dict[str, Any]:
     """The short record of a sample whose shot is stored, too, as `json.dumps(..., allow_nan=False)` takes it."""
-    labels = labels_of(sample.asked)
+    labels = labels_of(sample.requested)
     return {"index": sample.index, "objects": [short_record(o, labels) for o in sample.objects], **_plain_more(sample)}
 
 
 def _plain_more(sample: Sample) -> dict[str, Any]:
     """The fields of the labels of whole pictures as JSON; none without any."""
     fields = {field.name: field for label in sample_labels().values() for field in label.fields}
-    return {"more": {name: fields[name].plain(value) for name, value in sample.more.items()}} if sample.more else {}
+    return {"more": {name: fields[name].plain(value) for name, value in sample.extra.items()}} if sample.extra else {}
 
 
 def _more(asked: Sequence[str], plain: Mapping[str, Any]) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def whole_sample(sample: Sample) -> dict[str, Any]:
         **({"source": dict(sample.source)} if sample.source is not None else {}),
         "objects": [whole_record(o, labels) for o in sample.objects],
         "files": dict(sample.files),
-        **({"asked": list(sample.asked)} if sample.asked else {}),
+        **({"asked": list(sample.requested)} if sample.requested else {}),
         **({"options": {name: dict(of) for name, of in sample.options.items()}} if sample.options else {}),
         **_plain_more(sample),
     }
@@ -135,8 +135,8 @@ def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapp
         sensor=picture.sensor,
         instant=picture.instant,
         time=picture.time,
-        asked=picture.asked,
-        more=_more(picture.asked, picture.more),
+        requested=picture.asked,
+        extra=_more(picture.asked, picture.more),
         options=picture.options,
     )
 
@@ -193,9 +193,9 @@ class ShotRecords:
             sensor=self.shot.rig.sensors[sensor].name,
             instant=now.index,
             time=now.seconds,
-            taken=Taken(instant, sensor, None, self.root, self.shot.key),
-            asked=self.shot.annotations,
-            more=_more(self.shot.annotations, record.get("more", {})),
+            origin=Origin(instant, sensor, None, self.root, self.shot.key),
+            requested=self.shot.annotations,
+            extra=_more(self.shot.annotations, record.get("more", {})),
             options=self.shot.labels,
         )
 

@@ -116,7 +116,7 @@ def wrong(sample: Sample, caption: Caption, objects: Sequence[ObjectAnnotation],
 
 def _phrases(sample: Sample, o: ObjectAnnotation) -> list[tuple[str, Words]]:
     """Return every noun phrase of an object; none where its appearance is unknown."""
-    if "looks" not in sample.asked:
+    if "looks" not in sample.requested:
         return []
     return list(phrases(o, (o.color or "", o.material or "")))
 
