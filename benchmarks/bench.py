@@ -34,7 +34,7 @@ from viewsphere.engines import Stage
 from viewsphere.engines.raster import staging
 from viewsphere.engines.raster.shading import painting
 from viewsphere.geometry.box import box_vertices
-from viewsphere.labels import annotated, observe, sight_of
+from viewsphere.labels import annotated, context_of, observe
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
@@ -187,7 +187,7 @@ def one_frame(clock: Clock, shot: Shot, instant: int, stage: Stage, mesh: Mesh) 
     observed = clock("truth: channels", lambda: observe(geometry, camera, visibility, names))
     observed["rgb"] = clock("colour", lambda: stage.paint(instant, 0, visibility, ("rgb",))["rgb"])
     known = (shot, instant, camera, geometry, visibility, boxes, ["model.obj"])
-    objects = clock("annotations", lambda: annotated(sight_of(*known)))
+    objects = clock("annotations", lambda: annotated(context_of(*known)))
     return Sample(now.index, "train", camera, now.viewpoint, objects, observed, {})
 
 

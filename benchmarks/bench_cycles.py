@@ -23,7 +23,7 @@ from viewsphere import Recipe, plan, plugins
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.engines._blender.staging import CyclesStage
 from viewsphere.geometry.box import box_vertices
-from viewsphere.labels import annotated, observe, sight_of
+from viewsphere.labels import annotated, context_of, observe
 from viewsphere.model.shot import Shot
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.rendering.sky.sky import sky_pictures
@@ -108,7 +108,7 @@ def ours(shot: Shot, stages: Stages, pictures: Path | None = None) -> Costs:
         geometry = stage.at(instant)
         visibility = rasterize(geometry, camera)
         observe(geometry, camera, visibility, LABELS)
-        annotated(sight_of(shot, instant, camera, geometry, visibility, boxes, ["model.obj"]))
+        annotated(context_of(shot, instant, camera, geometry, visibility, boxes, ["model.obj"]))
         labels.append(time.process_time() - before)
         before = spent()
         picture = stage.paint(instant, sensor, visibility, ("rgb",))["rgb"]

@@ -20,14 +20,14 @@ from viewsphere.labels import (
     SampleLabel,
     annotated,
     channel_labels,
+    context_of,
     labels,
     object_labels,
     on_request,
     sample_labels,
-    sight_of,
 )
-from viewsphere.labels.shared.context import Sight
-from viewsphere.labels.shared.spec import later
+from viewsphere.labels.shared.context import LabelContext
+from viewsphere.labels.shared.spec import derived
 from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.raster.visibility import Visibility, rasterize
 from viewsphere.truth.shot_views import ShotViews
@@ -107,7 +107,7 @@ def measure_moving(objects: int, rounds: int) -> dict[str, float]:
             view, around = views.view(1, sensor), views.around(1, sensor)
             for instant in (0, 2):
                 _ = views.view(instant, sensor).visibility
-            seen = sight_of(
+            seen = context_of(
                 shot, 1, view.camera, view.geometry, view.visibility, boxes, ["model.obj"] * len(boxes), None, around
             )
             _ = seen.instances, seen.corners
@@ -117,7 +117,7 @@ def measure_moving(objects: int, rounds: int) -> dict[str, float]:
     return {name: float(np.median(times)) for name, times in found.items()}
 
 
-def of_any(label: Any, seen: Sight) -> None:
+def of_any(label: Any, seen: LabelContext) -> None:
     if isinstance(label, ChannelLabel):
         label.compute(seen)
     elif isinstance(label, ObjectLabel):
@@ -149,34 +149,36 @@ def measure(objects: int, rounds: int, embree: Callable[[Any], Any]) -> tuple[di
             view = views.view(instant, 0)
             around = views.around(instant, 0)
 
-            def sight(view: Any = view, around: Any = around, instant: int = instant) -> Sight:
+            def context(view: Any = view, around: Any = around, instant: int = instant) -> LabelContext:
                 files = ["model.obj"] * len(boxes)
-                seen = sight_of(shot, instant, view.camera, view.geometry, view.visibility, boxes, files, None, around, traits)
+                seen = context_of(
+                    shot, instant, view.camera, view.geometry, view.visibility, boxes, files, None, around, traits
+                )
                 for placement in seen.placements:
                     if placement:
                         _ = placement.facts.diameter, placement.facts.keypoints
                 return seen
 
             rival = rival or embree(view.geometry)
-            times = frame(sight, view, rival)
+            times = frame(context, view, rival)
             if round_:
                 for name, ms in times.items():
                     found.setdefault(name, []).append(ms)
     return {name: float(np.median(times)) for name, times in found.items()}, len(stage.at(0).triangles)
 
 
-def frame(sight: Callable[[], Sight], view: Any, cast: Any) -> dict[str, float]:
+def frame(context: Callable[[], LabelContext], view: Any, cast: Any) -> dict[str, float]:
     """CPU milliseconds of one frame's labels by name."""
     times = {"Embree": clocked(lambda: cast[1](view.camera))}
     times[RASTER] = clocked(lambda: rasterize(view.geometry, view.camera))
     for name in still_channels():
-        label, seen = channel_labels()[name], sight()
+        label, seen = channel_labels()[name], context()
         _ = seen.instances, seen.corners
         times[name] = clocked(lambda label=label, seen=seen: label.compute(seen))
     times["instances"] = clocked(lambda: fresh_instances(view))
-    objects = annotated(sight())
+    objects = annotated(context())
     for name in still_labels():
-        label, seen = labels()[name], sight()
+        label, seen = labels()[name], context()
         _ = seen.instances, seen.projected
         of = of_objects if isinstance(label, ObjectLabel) else of_picture
         times[name] = clocked(lambda of=of, label=label, seen=seen: of(label, seen, objects))
@@ -187,15 +189,15 @@ def fresh_instances(view: Any) -> Any:
     return Visibility(view.visibility.triangle, view.visibility.inverse_depth).instances(view.geometry)
 
 
-def of_objects(label: ObjectLabel, seen: Sight, objects: Any) -> None:
+def of_objects(label: ObjectLabel, seen: LabelContext, objects: Any) -> None:
     for o in objects:
-        if label.compute is later:
+        if label.compute is derived:
             label.restore(None, seen.placement(o.id - 1), o)
         else:
             label.compute(seen, o.id - 1)
 
 
-def of_picture(label: SampleLabel, seen: Sight, objects: Any) -> None:
+def of_picture(label: SampleLabel, seen: LabelContext, objects: Any) -> None:
     label.compute(seen, objects)
 
 

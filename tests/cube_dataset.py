@@ -13,7 +13,7 @@ from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.diameter import diameter
 from viewsphere.geometry.pose_category import pose_category
-from viewsphere.labels import annotated, observe, sample_values, sight_of
+from viewsphere.labels import annotated, context_of, observe, sample_values
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import PASSES
 from viewsphere.model.files import Files
@@ -89,9 +89,11 @@ def render(shot: Shot):
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
         channels = {name: channels[name] for name in shot.channels}
         traits = [partial(Traits, diameter(mesh.vertices), looks=partial(looks_of, mesh)) for mesh in meshes]
-        sight = sight_of(shot, instant, camera, geometry, visibility, boxes, files, None, views.around(instant, sensor), traits)
-        objects = annotated(sight)
-        more = sample_values(sight, objects)
+        context = context_of(
+            shot, instant, camera, geometry, visibility, boxes, files, None, views.around(instant, sensor), traits
+        )
+        objects = annotated(context)
+        more = sample_values(context, objects)
         told = {"instant": now.index, "requested": shot.annotations, "extra": more, "options": shot.labels}
         yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {}, **told)
 

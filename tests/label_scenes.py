@@ -11,7 +11,7 @@ from truth_scenes import LENSES, cube, lens, mesh_of, random_soup, sphere
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.geometry.rotation import random_rotation, rigid
-from viewsphere.labels import annotated, observe, sight_of
+from viewsphere.labels import annotated, context_of, observe
 from viewsphere.model.camera import Camera
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
@@ -62,7 +62,7 @@ def pictured(things, meshes, camera, names, ground=True, around=None):
     pose = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=4)
     shot = still_shot(things, camera.intrinsics, [pose])
     files = [f"store/models/{thing.model.key}.obj" for thing in objects]
-    told = annotated(sight_of(shot, 0, camera, geometry, visibility, boxes, files))
+    told = annotated(context_of(shot, 0, camera, geometry, visibility, boxes, files))
     return Sample(0, "train", camera, None, told, channels, {}), geometry, visibility
 
 

@@ -20,7 +20,7 @@ from viewsphere.errors import MissingExtraError
 from viewsphere.formats import native
 from viewsphere.geometry.mask import decode_rle, encode_rle
 from viewsphere.labels import Needs, channel_labels, channels, labels, labels_of, object_labels, on_request
-from viewsphere.labels.shared.spec import nothing
+from viewsphere.labels.shared.spec import no_record
 from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
 from viewsphere.run.exports.exporting import export
@@ -424,7 +424,7 @@ def test_background_without_depth(dataset):
     assert failures(dataset) == {(name, 5) for name in names}
 
 
-KEPT = [label.name for label in object_labels() if label.keep is not nothing and not label.on_request]
+KEPT = [label.name for label in object_labels() if label.keep is not no_record and not label.on_request]
 
 
 def test_all_that_is_kept_of_objects_is_computed_again(dataset):

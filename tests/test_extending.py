@@ -76,8 +76,8 @@ from viewsphere.labels import ChannelLabel, Needs
 
 LABEL = ChannelLabel(
     name="unseen", meaning="whether the point is hidden an instant later", needs=Needs(instants=(1,)), dtype=np.uint8, empty=4,
-    ids={}, encoding="png", compute=lambda sight: np.zeros(sight.visibility.triangle.shape, np.uint8)
-    if sight.match(1) is None else sight.match(1).state,
+    ids={}, encoding="png", compute=lambda context: np.zeros(context.visibility.triangle.shape, np.uint8)
+    if context.match(1) is None else context.match(1).state,
 )
 """
 
@@ -114,7 +114,7 @@ def of(placement):
     low, high = placement.box.min(axis=0), placement.box.max(axis=0)
     return {"aspect": float((high - low)[2] / (high - low)[0])}
 
-LABEL = ObjectLabel.derived(of, name="aspect", meaning="how tall", fields=(Field("aspect", "height over width", float),))
+LABEL = ObjectLabel.from_placement(of, name="aspect", meaning="how tall", fields=(Field("aspect", "height over width", float),))
 """
 
 
@@ -149,8 +149,8 @@ def test_a_label_of_another_name_than_its_file_is_refused(labelled):
         ("compute=compute", "compute=max", r"ChannelLabel\.meaning: expected a value; found nothing"),
         ("    ids={},\n", "", r"ChannelLabel\.ids: label 'borders' holds whole numbers"),
         (
-            "def compute(sight)",
-            "def compute(sight, i)",
+            "def compute(context)",
+            "def compute(context, i)",
             r"ChannelLabel\.compute: expected a function of 1 value; found",
         ),
     ],

@@ -10,7 +10,7 @@ import viewsphere as vs
 from proven import close, told
 from truth_scenes import cube, lens, orbit_camera, placed
 from viewsphere.errors import RecipeError
-from viewsphere.labels import Sight
+from viewsphere.labels import LabelContext
 from viewsphere.labels.depth_sensor import LABEL, STEPS, _seen, _shadow
 from viewsphere.store import Dataset
 from viewsphere.truth.raster.visibility import rasterize
@@ -131,7 +131,7 @@ def test_it_is_the_same_whether_other_labels_compare_pictures_or_not():
     geometry, camera = placed(cube(0.7), ground=True), orbit_camera(lens(96, 72, 1.1), 0.4, 0.5, 5.0)
     around = SimpleNamespace(drawn_as=("shot", "camera", "0.0"))
     rounded, exact = (
-        Sight(geometry, camera, rasterize(geometry, camera, keeps_exact=keeps), around=around) for keeps in (False, True)
+        LabelContext(geometry, camera, rasterize(geometry, camera, keeps_exact=keeps), around=around) for keeps in (False, True)
     )
     assert (rounded.inverse_depth != exact.inverse_depth).mean() > 0.5
     for one, other in zip(_seen(rounded), _seen(exact), strict=True):

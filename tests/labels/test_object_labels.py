@@ -12,7 +12,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices, clip_to_image
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
-from viewsphere.labels import annotated, sight_of
+from viewsphere.labels import annotated, context_of
 from viewsphere.labels.shared.placement import view_of
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.instant import Viewpoint
@@ -59,7 +59,7 @@ def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_de
     geometry = build_geometry(things, meshes, ground, 0.01)
     visibility = rasterize(geometry, camera)
     boxes = [box_vertices(*m.bounds) for m in meshes]
-    objects = annotated(sight_of(shot, 0, camera, geometry, visibility, boxes, [f"MODELS/{s.key}.glb" for s in specs]))
+    objects = annotated(context_of(shot, 0, camera, geometry, visibility, boxes, [f"MODELS/{s.key}.glb" for s in specs]))
     return objects, camera, geometry, visibility, pose
 
 
@@ -274,7 +274,7 @@ def test_lens_distortion_is_followed():
 def test_wrong_numbers_of_models_are_refused():
     objects, camera, geometry, visibility, _ = scene([UNIT], [at()])
     with pytest.raises(ValueError, match="shot s: expected 1 objects"):
-        annotated(sight_of(still_shot((), key="s"), 0, camera, geometry, visibility, [objects[0].box3d_object], ["m"]))
+        annotated(context_of(still_shot((), key="s"), 0, camera, geometry, visibility, [objects[0].box3d_object], ["m"]))
 
 
 def test_a_record_gives_back_every_bit():

@@ -9,7 +9,7 @@ from label_scenes import changed, proof, random_sample
 from proven import equal
 from truth_scenes import LENSES
 from viewsphere.errors import StoreError
-from viewsphere.labels import Sight, channels
+from viewsphere.labels import LabelContext, channels
 from viewsphere.labels.panoptic import LABEL, MOST, class_of, compute, object_of, picture, renumbered
 from viewsphere.store import encode
 from viewsphere.store.samples.channel_files import decode
@@ -40,7 +40,7 @@ def test_more_than_the_number_has_room_for_is_an_error():
     higher = TriangleLabels((), (), (lambda: geometry.triangle_class + 32768,))
     for more in ({"object_count": 65536}, {"labels": higher}):
         with pytest.raises(StoreError, match=r"channel panoptic: expected objects of 0\.\.65535, classes of 0\.\.32767; found"):
-            compute(Sight(replace(geometry, **more), sample.camera, visibility))
+            compute(LabelContext(replace(geometry, **more), sample.camera, visibility))
 
 
 def test_its_proof_notices_other_numbers():

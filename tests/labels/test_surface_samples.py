@@ -17,7 +17,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels import annotated, channels, observe, sight_of
+from viewsphere.labels import annotated, channels, context_of, observe
 from viewsphere.labels.surface_samples import LABEL
 from viewsphere.model.sample import Sample
 from viewsphere.model.surface_samples import SURFACE_SAMPLE
@@ -42,7 +42,7 @@ def sampled(seed, lens_name, count=200, move=None, ground=False):
     rows = observe(view.geometry, camera, view.visibility, ["instances", "depth", "surface_samples"], around)
     objects = [thing for thing in things if thing.id]
     boxes = [box_vertices(*own[thing.model.key].bounds) for thing in objects]
-    told = annotated(sight_of(shot, 0, camera, view.geometry, view.visibility, boxes, ["m.obj"] * len(objects)))
+    told = annotated(context_of(shot, 0, camera, view.geometry, view.visibility, boxes, ["m.obj"] * len(objects)))
     return Sample(0, "train", camera, None, told, rows, {}), view
 
 

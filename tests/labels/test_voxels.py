@@ -18,7 +18,7 @@ from viewsphere.check import check
 from viewsphere.errors import RecipeError, StoreError
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels import Sight, channels
+from viewsphere.labels import LabelContext, channels
 from viewsphere.labels.voxels import LABEL
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
@@ -32,8 +32,8 @@ NAMES = ("depth", "instances", "semantic")
 
 
 def with_voxels(sample, geometry, visibility, options=SMALL):
-    sight = Sight(geometry, sample.camera, visibility, options={"voxels": options})
-    return replace(sample, channels={**sample.channels, "voxels": LABEL.compute(sight)}, options={"voxels": options})
+    context = LabelContext(geometry, sample.camera, visibility, options={"voxels": options})
+    return replace(sample, channels={**sample.channels, "voxels": LABEL.compute(context)}, options={"voxels": options})
 
 
 def voxelled(seed, lens_name="pinhole", options=SMALL, ground=True):

@@ -273,7 +273,7 @@ class Neighbour:
     share: float
 
 
-COMPUTE = {"meaning": "x", "compute": lambda sight: np.zeros((2, 2), np.int32)}
+COMPUTE = {"meaning": "x", "compute": lambda context: np.zeros((2, 2), np.int32)}
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from proven import told
 from truth_scenes import placed, random_soup, sphere
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.labels import Sight
+from viewsphere.labels import LabelContext
 from viewsphere.labels.lidar import LABEL
 from viewsphere.model.camera import Camera
 from viewsphere.model.rig import Sensor
@@ -36,7 +36,7 @@ def turned(rng):
 
 def measured(geometry, camera, said):
     sensor = Sensor(intrinsics=camera.intrinsics, lidar=said.measuring(0))
-    return LABEL.compute(Sight(geometry, camera, rasterize(geometry, camera), around=Alone(sensor)))
+    return LABEL.compute(LabelContext(geometry, camera, rasterize(geometry, camera), around=Alone(sensor)))
 
 
 def entry(**more):

@@ -12,7 +12,7 @@ from proven import close, equal
 from quick import quick
 from truth_scenes import FISHEYE, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere.geometry.rotation import rigid
-from viewsphere.labels import Needs, Sight, channel_labels
+from viewsphere.labels import LabelContext, Needs, channel_labels
 from viewsphere.labels.shared.drawing.flow_colors import picture, wheel
 from viewsphere.model.camera import Camera
 from viewsphere.model.files import Files
@@ -52,25 +52,25 @@ class Beside:
         return self.views.get((instants, sensor))
 
 
-def sight_of(own, around=None):
+def context_of(own, around=None):
     around = around or {}
     views = {(0, None): own} | around
-    return Sight(own.geometry, own.camera, own.visibility, (), Beside(views))
+    return LabelContext(own.geometry, own.camera, own.visibility, (), Beside(views))
 
 
-def observed(sight, *names):
-    return {name: channel_labels()[name].compute(sight) for name in names or NAMES}
+def observed(context, *names):
+    return {name: channel_labels()[name].compute(context) for name in names or NAMES}
 
 
-def sample_of(sight, channels):
+def sample_of(context, channels):
     return Sample(
-        index=0, split="train", known_camera=sight.camera, known_pose=None, objects=(), channels=channels, files={},
+        index=0, split="train", known_camera=context.camera, known_pose=None, objects=(), channels=channels, files={},
         sequence="a", sensor="camera", instant=0, time=0.0,
     )  # fmt: skip
 
 
-def proofs(sight, channels):
-    sample = sample_of(sight, channels)
+def proofs(context, channels):
+    sample = sample_of(context, channels)
     return [message for name in channels for message in channel_labels()[name].prove(sample, {})]
 
 
@@ -93,7 +93,7 @@ def whole(sky=True, focal=LENS):
         for step, lens_ in ((-1, LENS), (0, LENS), (1, focal))
         for name in (None, "right")
     }
-    return sight_of(around.pop((0, None)), around)
+    return context_of(around.pop((0, None)), around)
 
 
 def test_all_have_the_shapes_and_types_of_the_contract():
@@ -120,21 +120,21 @@ def test_all_come_back_from_their_files(kind, tmp_path):
 
 def test_a_whole_picture_contradicts_nothing():
     for sky in (True, False):
-        sight = whole(sky)
-        channels = observed(sight, *NAMES, "depth")
-        assert proofs(sight, channels) == []
+        context = whole(sky)
+        channels = observed(context, *NAMES, "depth")
+        assert proofs(context, channels) == []
         for drawing in (channel_labels()[name].drawing for name in NAMES):
-            sample = sample_of(sight, channels)
+            sample = sample_of(context, channels)
             drawn = drawing.pixels(np.zeros((72, 96, 3), np.uint8), sample) if drawing.pixels else drawing.picture(sample)
             assert drawn.shape == (72, 96, 3) and drawn.dtype == np.uint8 and drawn.std() > 0
 
 
 def test_flow_is_that_of_depth_and_motion():
     """The camera moves 0.2 m ahead: what stands still at depth z moves away from the middle by 0.2 / (z - 0.2) of its place."""
-    sight = whole()
-    channels = observed(sight, "flow", "depth", "scene_flow", "flow_backward", "scene_flow_backward")
+    context = whole()
+    channels = observed(context, "flow", "depth", "scene_flow", "flow_backward", "scene_flow_backward")
     centers = np.stack(np.meshgrid(np.arange(96) + 0.5, np.arange(72) + 0.5), axis=-1)
-    owners = np.append(sight.neighbour().owners, -1)[sight.visibility.triangle]
+    owners = np.append(context.neighbour().owners, -1)[context.visibility.triangle]
     z, still = channels["depth"][..., None], (owners != 1) & (owners >= 0)
     expected = (centers - (48, 36)) * 0.2 / (z - 0.2)
     near = still & (z[..., 0] < 100)
@@ -158,8 +158,8 @@ def test_flow_is_that_of_depth_and_motion():
 
 
 def test_disparity_times_depth_is_focal_length_times_baseline():
-    sight = whole()
-    channels = observed(sight, "disparity", "depth", "disparity_state")
+    context = whole()
+    channels = observed(context, "disparity", "depth", "disparity_state")
     seen = np.isfinite(channels["depth"])
     expected = 0.1 * LENS.fx / channels["depth"][seen].astype(np.float64)
     close("disparity", "focal length x baseline / depth", channels["disparity"][seen], expected, "px", rtol=2e-7)
@@ -176,33 +176,33 @@ def test_disparity_times_depth_is_focal_length_times_baseline():
     ),
 )
 def test_states_are_those_of_brute_force(name, where):
-    sight = whole(sky=False)
-    own, there = sight.around.views[0, None], sight.around.views[where]
+    context = whole(sky=False)
+    own, there = context.around.views[0, None], context.around.views[where]
     triangle, world, sure = brute_points(own, there)
     seen = (triangle >= 0) & sure
     first = np.minimum(triangle[seen], own.geometry.triangle_start[-1])
     expected, known = expected_states(there, world[seen], first)
     assert known.sum() > 3000 and len(set(expected[known].tolist())) >= 2
-    equal(name, "brute force in float64", observed(sight, name)[name][seen][known], expected[known])
+    equal(name, "brute force in float64", observed(context, name)[name][seen][known], expected[known])
 
 
 def test_left_and_right_agree():
     """The right picture's disparity is positive too, and equals the left one's at the same point."""
     left, right = scene(at(LENS), 0), scene(at(LENS, 0.1), 0)
-    other = observed(sight_of(right, {(0, "left"): left}), "disparity", "depth")
-    sight = sight_of(left, {(0, "right"): right})
-    own = observed(sight, "disparity", "disparity_state")
+    other = observed(context_of(right, {(0, "left"): left}), "disparity", "depth")
+    context = context_of(left, {(0, "right"): right})
+    own = observed(context, "disparity", "disparity_state")
     seen = np.isfinite(other["depth"])
     product = other["disparity"][seen].astype(np.float64) * other["depth"][seen]
     np.testing.assert_allclose(product, 0.1 * LENS.fx, rtol=2e-7)
-    expected = -(sight.match(0, "right").xy[..., 0] - (np.arange(96) + 0.5))
+    expected = -(context.match(0, "right").xy[..., 0] - (np.arange(96) + 0.5))
     np.testing.assert_allclose(own["disparity"], expected, atol=1e-5)
 
 
 @pytest.mark.parametrize("zoom", [1.0, 0.8])
 def test_the_change_of_disparity_is_the_difference_of_the_points_disparities(zoom):
-    sight = whole(focal=lens(96, 72, zoom))
-    channels = observed(sight, "disparity", "disparity_change", "depth", "flow_state")
+    context = whole(focal=lens(96, 72, zoom))
+    channels = observed(context, "disparity", "disparity_change", "depth", "flow_state")
     z = channels["depth"].astype(np.float64)
     then = lens(96, 72, zoom).fx * 0.1 / (z - 0.2) - LENS.fx * 0.1 / z
     close("disparity_change", "closed form", channels["disparity_change"], then, "px", atol=2e-6)
@@ -211,13 +211,13 @@ def test_the_change_of_disparity_is_the_difference_of_the_points_disparities(zoo
 
 def test_without_a_neighbour_all_is_invalid():
     for around in ({}, {(0, "back"): scene(at(LENS, 0.1).__class__(LENS, -AHEAD, np.zeros(3)), 0)}):
-        sight = sight_of(scene(at(LENS), 0), around)
-        channels = observed(sight)
+        context = context_of(scene(at(LENS), 0), around)
+        channels = observed(context)
         for name, array in channels.items():
             expected = 4 if "state" in name else 0 if name == "motion_boundaries" else np.nan
             assert np.array_equal(array, np.full_like(array, expected), equal_nan=True), name
-        assert proofs(sight, channels) == []
-    assert np.isnan(observed(Sight(sight.geometry, sight.camera, sight.visibility), "flow")["flow"]).all()
+        assert proofs(context, channels) == []
+    assert np.isnan(observed(LabelContext(context.geometry, context.camera, context.visibility), "flow")["flow"]).all()
 
 
 @pytest.mark.parametrize(
@@ -232,30 +232,32 @@ def test_without_a_neighbour_all_is_invalid():
 )
 def test_sensors_that_are_not_rectified_give_no_disparity(camera):
     own = scene(at(LENS), 0)
-    there = sight_of(own, {(0, "odd"): replace(own, camera=camera)})
+    there = context_of(own, {(0, "odd"): replace(own, camera=camera)})
     assert np.isnan(observed(there, "disparity")["disparity"]).all()
     assert (observed(there, "disparity_state")["disparity_state"] == 4).all()
-    both = sight_of(own, {(0, "odd"): replace(own, camera=camera), (0, "even"): replace(own, camera=at(LENS, -0.2))})
+    both = context_of(own, {(0, "odd"): replace(own, camera=camera), (0, "even"): replace(own, camera=at(LENS, -0.2))})
     assert np.nanmax(observed(both, "disparity")["disparity"]) > 0
 
 
 def test_a_calibration_s_rounding_is_no_turn():
     own = scene(at(LENS), 0)
     turned = Camera(LENS, AHEAD + 1e-12, at(LENS, 0.1).t)
-    found = observed(sight_of(own, {(0, "right"): replace(own, camera=turned)}), "disparity", "disparity_state")
+    found = observed(context_of(own, {(0, "right"): replace(own, camera=turned)}), "disparity", "disparity_state")
     assert np.nanmax(found["disparity"]) > 0 and (found["disparity_state"] == 0).any()
 
 
 def test_a_bent_lens_has_no_rectified_sensor():
     bent = lens(96, 72, 2.0, FISHEYE)
     own = scene(at(bent), 0)
-    assert np.isnan(observed(sight_of(own, {(0, "right"): replace(own, camera=at(bent, 0.1))}), "disparity")["disparity"]).all()
+    assert np.isnan(
+        observed(context_of(own, {(0, "right"): replace(own, camera=at(bent, 0.1))}), "disparity")["disparity"]
+    ).all()
 
 
 def test_a_flat_picture_has_neither_flow_nor_disparity():
-    sight = whole(sky=False)
-    flat = sight.visibility.triangle < 0
-    channels = observed(sight)
+    context = whole(sky=False)
+    flat = context.visibility.triangle < 0
+    channels = observed(context)
     assert flat.any()
     for name, array in channels.items():
         if "state" in name:
@@ -269,7 +271,7 @@ def test_boundaries_are_where_things_move_apart():
     card = mesh_of([[-0.5, 2, -0.5], [0.5, 2, -0.5], [0.5, 2, 0.5], [-0.5, 2, 0.5]], [[0, 1, 2], [0, 2, 3]])
     wall = mesh_of([[-9, 4, -9], [9, 4, -9], [9, 4, 9], [-9, 4, 9]], [[0, 1, 2], [0, 2, 3]])
     now, then, hardly = (view([card, wall], [pose(x, 0, 0), pose(0, 0, 0)], at(LENS)) for x in (0, 0.2, 0.01))
-    found = observed(sight_of(now, {(1, None): then}), "motion_boundaries")["motion_boundaries"]
+    found = observed(context_of(now, {(1, None): then}), "motion_boundaries")["motion_boundaries"]
     thing = now.owners[rasterize(now.geometry, now.camera).triangle]
     outline = np.zeros(thing.shape, bool)
     for axis in (0, 1):
@@ -277,7 +279,7 @@ def test_boundaries_are_where_things_move_apart():
         outline |= np.pad(step, [(0, a == axis) for a in (0, 1)]) | np.pad(step, [(a == axis, 0) for a in (0, 1)])
     assert outline.any()
     equal("motion_boundaries", "outline of a card", found > 0, outline)
-    assert not observed(sight_of(now, {(1, None): hardly}), "motion_boundaries")["motion_boundaries"].any()
+    assert not observed(context_of(now, {(1, None): hardly}), "motion_boundaries")["motion_boundaries"].any()
 
 
 def test_one_thing_that_hides_itself_has_boundaries_within():
@@ -286,9 +288,9 @@ def test_one_thing_that_hides_itself_has_boundaries_within():
     back = [[-9, 8, -9], [9, 8, -9], [9, 8, 9], [-9, 8, 9]]
     both = mesh_of(front + back, [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
     now, then = (view([both], [pose(0, 0, 0)], at(LENS, x)) for x in (0, 0.2))
-    sight = sight_of(now, {(1, None): then})
-    found = observed(sight, "motion_boundaries")["motion_boundaries"]
-    near = sight.visibility.triangle < 2
+    context = context_of(now, {(1, None): then})
+    found = observed(context, "motion_boundaries")["motion_boundaries"]
+    near = context.visibility.triangle < 2
     assert found.any() and not found[:, :1].any()
     assert (found[near].sum() > 0) and (found[~near].sum() > 0) and found.mean() < 0.2
 
@@ -309,9 +311,9 @@ BROKEN = {
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_is_broken_is_told(name):
-    sight = whole(sky=False)
-    channels = observed(sight, *NAMES, "depth")
-    assert proofs(sight, channels | {name: BROKEN[name](channels[name])})
+    context = whole(sky=False)
+    channels = observed(context, *NAMES, "depth")
+    assert proofs(context, channels | {name: BROKEN[name](channels[name])})
 
 
 def test_the_wheel_is_that_of_the_paper():

@@ -5,7 +5,7 @@ import pytest
 
 from truth_scenes import cube, orbit_camera, sphere
 from viewsphere.geometry.box import overlap
-from viewsphere.labels import Sight
+from viewsphere.labels import LabelContext
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
@@ -62,9 +62,9 @@ def test_what_hides_nothing_is_told_by_all_pairs_of_boxes(seed):
     rng = np.random.default_rng(seed)
     geometry = scattered(rng, 40)
     camera = orbit_camera(LENS, rng.uniform(0, 7), rng.uniform(0.5, 1.3), rng.uniform(3, 12))
-    sight = Sight(geometry, camera, rasterize(geometry, camera))
-    boxes = sight.projected
-    said = [sight.is_unobstructed(i) for i in range(40)]
+    context = LabelContext(geometry, camera, rasterize(geometry, camera))
+    boxes = context.projected
+    said = [context.is_unobstructed(i) for i in range(40)]
     for i, (own, _) in enumerate(boxes):
         others = [(box, whole) for j, (box, whole) in enumerate(boxes) if j != i and box]
         meets = own is not None and any(not whole or overlap(own, box) for box, whole in others)

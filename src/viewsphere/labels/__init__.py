@@ -34,8 +34,8 @@ from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel, picture_
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.computing import annotated, observe, sample_values, sight_of
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.computing import annotated, context_of, observe, sample_values
+    from viewsphere.labels.shared.context import LabelContext
 
 __all__ = [
     "TAIL",
@@ -46,19 +46,19 @@ __all__ = [
     "Field",
     "IdKind",
     "Label",
+    "LabelContext",
     "Makers",
     "ModelFacts",
     "Needs",
     "ObjectLabel",
     "Placement",
     "SampleLabel",
-    "Sight",
-    "alone",
     "annotated",
     "by_number",
     "by_table",
     "channel_labels",
     "channels",
+    "context_of",
     "drawable",
     "drawings",
     "finite",
@@ -81,7 +81,7 @@ __all__ = [
     "sample_labels",
     "sample_values",
     "short_record",
-    "sight_of",
+    "stand_in_for",
     "view_of",
     "whole_record",
 ]
@@ -90,11 +90,11 @@ _COMPUTING = "viewsphere.labels.shared.computing"
 __getattr__ = names_of(
     __name__,
     {
-        "Sight": "viewsphere.labels.shared.context",
+        "LabelContext": "viewsphere.labels.shared.context",
         "annotated": _COMPUTING,
         "observe": _COMPUTING,
         "sample_values": _COMPUTING,
-        "sight_of": _COMPUTING,
+        "context_of": _COMPUTING,
     },
 )
 
@@ -185,16 +185,16 @@ def drawings() -> tuple[Drawing, ...]:
     return tuple(drawable().values())
 
 
-def alone(channels: Container[str]) -> Callable[[Sample, int], Picture] | None:
+def stand_in_for(channels: Container[str]) -> Callable[[Sample, int], Picture] | None:
     """Return the substitute for the picture of samples with these channels, a function of a sample and a size. Returns None
     where the samples have a picture, or no label has a substitute.
     """
     if picture_of(channels) is not None:
         return None
-    found = (label.drawing and label.drawing.alone for name, label in channel_labels().items() if name in channels)
+    found = (label.drawing and label.drawing.stand_in for name, label in channel_labels().items() if name in channels)
     return next(filter(None, found), None)
 
 
 def is_shown(channels: Container[str]) -> bool:
     """Return whether samples with these channels have a picture, or something that stands for it."""
-    return picture_of(channels) is not None or alone(channels) is not None
+    return picture_of(channels) is not None or stand_in_for(channels) is not None

@@ -17,21 +17,21 @@ from viewsphere.model.sample import ObjectAnnotation, Rle, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """The pixels that would show the object if it were alone, and their tight box.
 
     Y. Zhu et al., Semantic Amodal Segmentation (https://arxiv.org/abs/1509.01329), cut off at the image's border, as in COCOA
     and KINS.
     """
-    width, height = sight.camera.width, sight.camera.height
-    if sight.is_unobstructed(i):
-        x0, y0, x1, y1 = sight.instances.box[i + 1].tolist() if sight.instances.area[i + 1] else (0, 0, 0, 0)
-        part = sight.instances.ids[y0:y1, x0:x1] == i + 1
+    width, height = context.camera.width, context.camera.height
+    if context.is_unobstructed(i):
+        x0, y0, x1, y1 = context.instances.box[i + 1].tolist() if context.instances.area[i + 1] else (0, 0, 0, 0)
+        part = context.instances.ids[y0:y1, x0:x1] == i + 1
     else:
-        alone = sight.alone(i).in_image(width, height)
+        alone = context.isolated(i).in_image(width, height)
         x0, y0, part = alone.left, alone.top, alone.inverse_depth > 0
     return _fields(height, width, rle_of_part(height, width, part, x0, y0))
 

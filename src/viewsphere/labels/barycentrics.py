@@ -12,7 +12,7 @@ from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-5
 """The largest distance of the sum of weights from 1, as a share of the largest weight. Weights of a ground that reaches to the
@@ -20,12 +20,12 @@ horizon are large, and float32.
 """
 
 
-def compute(sight: Sight) -> NDArray[np.float32]:
+def compute(context: LabelContext) -> NDArray[np.float32]:
     """Weights (H, W, 3) of the seen triangle's corners; 0 where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out = sight.empty(np.float32, 3)
-    kernels.barycentrics(sight.visibility.triangle, sight.geometry.triangles, sight.corners, sight.rays, out)
+    out = context.empty(np.float32, 3)
+    kernels.barycentrics(context.visibility.triangle, context.geometry.triangles, context.corners, context.rays, out)
     return out
 
 

@@ -89,7 +89,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
         in_space(pen, sample, scale, np.array([corners.mean(axis=0), corners[:2].mean(axis=0)]), color_of(o.id))
 
 
-LABEL = ObjectLabel.derived(
+LABEL = ObjectLabel.from_placement(
     of,
     name="birds_eye",
     meaning="its box from above",

@@ -14,12 +14,12 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Half-open pixel corners, None where no pixel shows the object."""
-    seen = sight.instances
+    seen = context.instances
     return {"box2d": tuple(map(float, seen.box[i + 1].tolist())) if seen.area[i + 1] else None}
 
 

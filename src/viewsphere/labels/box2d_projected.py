@@ -16,17 +16,17 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Both boxes, clipped and unclipped. Where the lens shows only a part of the model, the box includes the centres of its
     visible pixels, which lie on the model: surface nearer than projected boxes begin is in no other box.
     """
-    bounds, whole = sight.projected[i]
-    projected = _clipped(bounds, sight.camera)
-    if not whole and sight.instances.area[i + 1]:
-        x0, y0, x1, y1 = map(float, sight.instances.box[i + 1].tolist())
+    bounds, whole = context.projected[i]
+    projected = _clipped(bounds, context.camera)
+    if not whole and context.instances.area[i + 1]:
+        x0, y0, x1, y1 = map(float, context.instances.box[i + 1].tolist())
         x0, y0, x1, y1 = x0 + 0.5, y0 + 0.5, x1 - 0.5, y1 - 0.5
         a = projected or (x0, y0, x1, y1)
         projected = min(a[0], x0), min(a[1], y0), max(a[2], x1), max(a[3], y1)

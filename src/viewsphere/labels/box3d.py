@@ -87,7 +87,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 
 _EIGHT = "vertices, ordered as in `viewsphere.geometry.box`"
 
-LABEL = ObjectLabel.derived(
+LABEL = ObjectLabel.from_placement(
     of,
     name="box3d",
     meaning="its tight box along its own axes",

@@ -119,7 +119,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
         axes(pen, sample, scale, o.canonical_pose, (o.diameter or 1.0) / 3)
 
 
-LABEL = ObjectLabel.derived(
+LABEL = ObjectLabel.from_placement(
     of,
     name="canonical_pose",
     meaning="one pose for all that look the same",

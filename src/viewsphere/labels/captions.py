@@ -50,7 +50,7 @@ from viewsphere.model.numbers import Count, Natural, Portion
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Around, Sight
+    from viewsphere.labels.shared.context import LabelContext, NeighbourViews
 
 MOST = 100
 """Sentences about one picture."""
@@ -127,27 +127,29 @@ class Seen:
         return listing(self.groups, self.plurals)
 
 
-def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The sentences of a picture; of a LiDAR's none."""
-    options, around = sight.options_of("captions", Captions), sight.around
+    options, around = context.options_of("captions", Captions), context.around
     if around is None:
         raise ValueError("captions: expected a sample of a shot, found none")
     if around.sensor.lidar is not None:
         return {"captions": ()}
-    seen, rng = _seen(sight, around, objects, options), generator(options.seed, "captions", *around.drawn_as)
+    seen, rng = _seen(context, around, objects, options), generator(options.seed, "captions", *around.drawn_as)
     found = _by_templates(seen, options, rng) if options.templates else _sentences(seen, options.count, rng)
     return {"captions": tuple(found)}
 
 
-def _seen(sight: Sight, around: Around, objects: Sequence[ObjectAnnotation], options: Captions) -> Seen:
+def _seen(context: LabelContext, around: NeighbourViews, objects: Sequence[ObjectAnnotation], options: Captions) -> Seen:
     told = [o for o in objects if is_told(o, options.min_visibility)]
-    fronts = frozenset(o.id for o in told if has_front(sight.placement(o.id - 1).facts))
+    fronts = frozenset(o.id for o in told if has_front(context.placement(o.id - 1).facts))
     weather, sun_is_low = _weather(around)
-    size = sight.camera.width, sight.camera.height
-    return Seen(told, words_of(sight), fronts, size, weather, sun_is_low, _surroundings(sight), options.plurals, _air(around))
+    size = context.camera.width, context.camera.height
+    return Seen(
+        told, words_of(context), fronts, size, weather, sun_is_low, _surroundings(context), options.plurals, _air(around)
+    )
 
 
-def _weather(around: Around) -> tuple[str, bool]:
+def _weather(around: NeighbourViews) -> tuple[str, bool]:
     """Return the words for the sky, and whether the sun is low. The words are empty without daylight, or where the picture does
     not show the sky.
     """
@@ -160,7 +162,7 @@ def _weather(around: Around) -> tuple[str, bool]:
     return weather, clouds < CLOUDY and scene.sun is not None and scene.sun.elevation < LOW_DEG
 
 
-def _air(around: Around) -> tuple[str, ...]:
+def _air(around: NeighbourViews) -> tuple[str, ...]:
     """Words for what hangs in the air, and what falls: mist that rain makes by itself is not told of."""
     scene = around.shot.scene
     falls = [word for word, what in (("raining", scene.rain), ("snowing", scene.snow)) if what is not None]
@@ -168,9 +170,9 @@ def _air(around: Around) -> tuple[str, ...]:
     return ("foggy", *falls) if is_foggy else tuple(falls)
 
 
-def _surroundings(sight: Sight) -> str:
+def _surroundings(context: LabelContext) -> str:
     """A list of the stuff that is seen."""
-    classes = sight.per_triangle(sight.geometry.triangle_class, SKY)
+    classes = context.per_triangle(context.geometry.triangle_class, SKY)
     pixels = np.bincount(classes.ravel(), minlength=len(STUFF_IDS) + 1)
     return listed([words for name, words in SURROUNDINGS.items() if pixels[STUFF_IDS[name]] >= SEEN_STUFF * classes.size])
 

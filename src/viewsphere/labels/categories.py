@@ -31,7 +31,7 @@ LABEL = ChannelLabel(
     dtype=np.int32,
     unit="category id",
     encoding="png16",
-    compute=lambda sight: sight.per_triangle(sight.geometry.triangle_category, 0),
+    compute=lambda context: context.per_triangle(context.geometry.triangle_category, 0),
     prove=prove,
     ids={"category": by_table},
     drawing=Drawing("categories", pixels=lambda picture, sample: by_number(picture, sample.channels["categories"])),

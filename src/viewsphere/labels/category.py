@@ -29,7 +29,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             )
 
 
-LABEL = ObjectLabel.derived(
+LABEL = ObjectLabel.from_placement(
     of,
     name="category",
     meaning="what kind of thing it is",

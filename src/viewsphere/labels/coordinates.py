@@ -12,19 +12,19 @@ from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-5
 """Share of an object's size by which float32 coordinates may lie outside of its box."""
 
 
-def compute(sight: Sight) -> NDArray[np.float32]:
+def compute(context: LabelContext) -> NDArray[np.float32]:
     """The seen point in its object's axes, (H, W, 3) metres; NaN on scenery, ground and where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out, g = sight.empty(np.float32, 3), sight.geometry
-    seen = sight.visibility.triangle
-    kernels.coordinates(seen, g.triangles, g.triangle_object, sight.corners, sight.rays, g.coordinates, out)
+    out, g = context.empty(np.float32, 3), context.geometry
+    seen = context.visibility.triangle
+    kernels.coordinates(seen, g.triangles, g.triangle_object, context.corners, context.rays, g.coordinates, out)
     return out
 
 

@@ -14,15 +14,15 @@ from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, 
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def along_axis(sight: Sight) -> NDArray[np.float32]:
+def along_axis(context: LabelContext) -> NDArray[np.float32]:
     """z of the seen point, (H, W) metres, infinite where nothing is seen; negative behind the image plane of a fisheye."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out = sight.empty(np.float32)
-    kernels.depths(sight.visibility.inverse_depth, sight.rays, out)
+    out = context.empty(np.float32)
+    kernels.depths(context.visibility.inverse_depth, context.rays, out)
     return out
 
 
@@ -37,15 +37,15 @@ def prove_depth(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected metres where an object is seen; found infinity at {np.isinf(depth[instances > 0]).sum()} pixels"
 
 
-def along_ray(sight: Sight) -> NDArray[np.float32]:
+def along_ray(context: LabelContext) -> NDArray[np.float32]:
     """Distance from the camera's centre to the seen point, (H, W) metres, infinite where nothing is seen.
 
     It is the length of the pixel's ray times 1/s of `truth.raster.visibility`: never negative, behind a fisheye neither.
     """
-    length = np.linalg.norm(pixel_rays(sight.camera.intrinsics), axis=-1)
+    length = np.linalg.norm(pixel_rays(context.camera.intrinsics), axis=-1)
     out = np.full(length.shape, np.inf, np.float32)
-    seen = sight.visibility.inverse_depth > 0
-    out[seen] = length[seen] / sight.visibility.inverse_depth[seen]
+    seen = context.visibility.inverse_depth > 0
+    out[seen] = length[seen] / context.visibility.inverse_depth[seen]
     return out
 
 
@@ -60,7 +60,7 @@ def prove_depth_ray(sample: Sample, models: Models) -> Iterator[str]:
         yield "expected finite distances where depth is finite, and nowhere else; found others"
 
 
-def _label(name: str, compute: Callable[[Sight], Array], meaning: str, prove: Proof) -> ChannelLabel:
+def _label(name: str, compute: Callable[[LabelContext], Array], meaning: str, prove: Proof) -> ChannelLabel:
     """A channel of distances."""
     return ChannelLabel(
         name=name,

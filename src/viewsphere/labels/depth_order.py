@@ -20,7 +20,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Alone, Sight
+    from viewsphere.labels.shared.context import IsolatedMask, LabelContext
 
 
 @dataclass(frozen=True)
@@ -34,24 +34,24 @@ class Overlap:
     nearer: float
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """The objects that overlap with the one of id i + 1, in the order of their ids.
 
     The pairwise orders of amodal data sets: Y. Zhu et al., https://arxiv.org/abs/1509.01329; H. Lee and J. Park, InstaOrder,
     https://arxiv.org/abs/2111.14562, which tells, too, pairs where each is nearer somewhere.
     """
-    others = [j for j, place in enumerate(sight.placements) if place and j != i]
-    if not others or sight.is_unobstructed(i):
+    others = [j for j, place in enumerate(context.placements) if place and j != i]
+    if not others or context.is_unobstructed(i):
         return {"overlaps": ()}
-    found = (_overlap(_inside(sight, i), _inside(sight, j), j + 1) for j in others)
+    found = (_overlap(_inside(context, i), _inside(context, j), j + 1) for j in others)
     return {"overlaps": tuple(one for one in found if one)}
 
 
-def _inside(sight: Sight, i: int) -> Alone:
-    return sight.alone(i).in_image(sight.camera.width, sight.camera.height)
+def _inside(context: LabelContext, i: int) -> IsolatedMask:
+    return context.isolated(i).in_image(context.camera.width, context.camera.height)
 
 
-def _overlap(own: Alone, other: Alone, id: int) -> Overlap | None:
+def _overlap(own: IsolatedMask, other: IsolatedMask, id: int) -> Overlap | None:
     a, b = own.box, other.box
     x0, y0, x1, y1 = max(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), min(a[3], b[3])
     if x0 >= x1 or y0 >= y1:

@@ -19,7 +19,7 @@ from viewsphere.model.numbers import Natural, Number
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 Float = NDArray[np.float64]
 Draw = Callable[[str], Float]
@@ -56,23 +56,23 @@ class Options(Frozen):
     seed: Natural = Limits(default=0, description="what chance follows from; default: the recipe's seed")
 
 
-def compute(sight: Sight) -> NDArray[np.float32]:
+def compute(context: LabelContext) -> NDArray[np.float32]:
     """Measured z-depth, (H, W) metres, infinite where the sensor measures nothing.
 
     C. Nguyen, S. Izadi, D. Lovell, Modeling Kinect Sensor Noise for Improved 3D Reconstruction and Tracking, 3DIMPVT 2012:
     axial and lateral noise. J. Barron, J. Malik, Intrinsic Scene Properties from a Single RGB-D Image, CVPR 2013: steps. A
     point that the projector, or the second camera, does not see because something in its row lies before it is a hole.
     """
-    options, around = sight.options_of("depth_sensor", Options), sight.around
+    options, around = context.options_of("depth_sensor", Options), context.around
     if around is None:
         raise ValueError("depth_sensor: expected a sample of a shot, found none")
-    names, shape = around.drawn_as, sight.visibility.triangle.shape
+    names, shape = around.drawn_as, context.visibility.triangle.shape
 
     def draw(purpose: str) -> Float:
         return generator(options.seed, *names, "depth_sensor", purpose).standard_normal(shape)
 
-    depth, angle = _seen(sight)
-    focal = float(sight.camera.K[0, 0])
+    depth, angle = _seen(context)
+    focal = float(context.camera.K[0, 0])
     hole = ~np.isfinite(depth) | (angle > math.radians(options.grazing_deg)) | _shadow(depth, focal * options.baseline)
     measure = _kinect if options.kind == "kinect" else _stereo
     out = measure(depth, angle, focal, options, draw)
@@ -82,18 +82,18 @@ def compute(sight: Sight) -> NDArray[np.float32]:
     return np.where(hole, np.inf, out).astype(np.float32)
 
 
-def _seen(sight: Sight) -> tuple[Float, Float]:
+def _seen(context: LabelContext) -> tuple[Float, Float]:
     """Depth (H, W), infinite where nothing is before the camera, and the angle (H, W) from the triangle's normal to the ray, a
     right one where the lens has no ray.
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    rays = pixel_rays(sight.camera.intrinsics)
-    normals = sight.empty(np.float32, 3)
-    told = (sight.geometry.triangle_normals, sight.rays, sight.camera_from_ray, sight.camera.R)
-    kernels.normals_geometric(sight.visibility.triangle, *told, normals)
+    rays = pixel_rays(context.camera.intrinsics)
+    normals = context.empty(np.float32, 3)
+    told = (context.geometry.triangle_normals, context.rays, context.camera_from_ray, context.camera.R)
+    kernels.normals_geometric(context.visibility.triangle, *told, normals)
     cosine = np.abs((normals * rays).sum(axis=-1)) / np.sqrt((rays * rays).sum(axis=-1))
-    near = sight.visibility.inverse_depth.astype(np.float64)  # as all frames have it, those that are compared with none, too
+    near = context.visibility.inverse_depth.astype(np.float64)  # as all frames have it, those that are compared with none, too
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where((near > 0) & (rays[..., 2] > 0), rays[..., 2] / near, np.inf)
     return depth, np.arccos(np.clip(np.nan_to_num(cosine), 0.0, 1.0))

@@ -12,22 +12,22 @@ from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Extent, Models,
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(sight: Sight) -> NDArray[np.float32]:
+def compute(context: LabelContext) -> NDArray[np.float32]:
     """fx baseline / z, (H, W) pixels, positive in both pictures of the pair; 0 of the sky.
 
     The other picture is that of the first of the rig's sensors that is rectified with the own one. NaN without such a sensor,
     and where a flat picture is seen.
     """
-    out, baseline, own = sight.empty(np.float32), sight.baseline, sight.neighbour()
+    out, baseline, own = context.empty(np.float32), context.baseline, context.neighbour()
     if baseline is None or own is None:
         out.fill(np.nan)
         return out
-    np.multiply(sight.inverse_depth, sight.camera.intrinsics.fx * baseline, out=out, casting="same_kind")
+    np.multiply(context.inverse_depth, context.camera.intrinsics.fx * baseline, out=out, casting="same_kind")
     if not own.is_sky_endless:
-        out[sight.visibility.triangle < 0] = np.nan
+        out[context.visibility.triangle < 0] = np.nan
     return out
 
 

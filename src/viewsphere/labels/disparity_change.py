@@ -13,21 +13,21 @@ from viewsphere.model.sample import Sample
 from viewsphere.truth.surface_points.raster import in_lens
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(sight: Sight) -> NDArray[np.float32]:
+def compute(context: LabelContext) -> NDArray[np.float32]:
     """The same point's disparity an instant later less that now, (H, W) pixels; 0 of the sky.
 
     NaN where the point is behind the camera then, where it is gone, and without a rectified sensor or a later instant.
     """
-    out, baseline, match = sight.empty(np.float32), sight.baseline, sight.match(1)
+    out, baseline, match = context.empty(np.float32), context.baseline, context.match(1)
     if baseline is None or match is None:
         out.fill(np.nan)
         return out
-    now, then = sight.camera.intrinsics.fx, match.other.camera.intrinsics.fx
-    out[...] = baseline * (then * match.inverse_depth - now * sight.inverse_depth)
-    out[~in_lens(match.xy) & (sight.visibility.triangle >= 0)] = np.nan
+    now, then = context.camera.intrinsics.fx, match.other.camera.intrinsics.fx
+    out[...] = baseline * (then * match.inverse_depth - now * context.inverse_depth)
+    out[~in_lens(match.xy) & (context.visibility.triangle >= 0)] = np.nan
     return out
 
 

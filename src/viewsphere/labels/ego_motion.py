@@ -18,15 +18,15 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-9
 
 
-def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The relative poses, as odometry measures them."""
-    found = (sight.moment(-1), sight.moment(1))
-    before, after = (None if moment is None else relative(sight.camera, moment.camera) for moment in found)
+    found = (context.moment(-1), context.moment(1))
+    before, after = (None if moment is None else relative(context.camera, moment.camera) for moment in found)
     return {"camera_from_previous": before, "camera_from_next": after}
 
 

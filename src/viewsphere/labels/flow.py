@@ -15,19 +15,19 @@ from viewsphere.truth.correspondences.correspondence import pixel_centers
 from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 EDGE = 1e-3
 """Pixels from the picture's border within which the rounding of stored flow decides whether it leads outside."""
 
 
-def flow(sight: Sight, instants: int) -> NDArray[np.float32]:
+def flow(context: LabelContext, instants: int) -> NDArray[np.float32]:
     """Return the motion of each seen point to so many instants later, (H, W, 2) pixels, right and down.
 
     NaN where the point has no pixel then: behind the camera, on a thing that is absent then, on a flat picture.
     """
-    match = sight.match(instants)
-    return np.full((*sight.visibility.triangle.shape, 2), np.nan, np.float32) if match is None else match.flow
+    match = context.match(instants)
+    return np.full((*context.visibility.triangle.shape, 2), np.nan, np.float32) if match is None else match.flow
 
 
 def _prove(sample: Sample, name: str) -> Iterator[str]:
@@ -70,7 +70,7 @@ def _label(name: str, instants: int, when: str) -> ChannelLabel:
         components=2,
         unit="px",
         empty=np.nan,
-        compute=lambda sight: flow(sight, instants),
+        compute=lambda context: flow(context, instants),
         prove=prove,
         drawing=drawing(name),
     )

@@ -30,7 +30,7 @@ LABEL = ChannelLabel(
     unit="object id",
     encoding="png16",
     ids={"object": by_table},
-    compute=lambda sight: sight.instances.ids,
+    compute=lambda context: context.instances.ids,
     prove=prove,
     drawing=Drawing("instances", pixels=lambda picture, sample: by_number(picture, sample.channels["instances"])),
 )

@@ -24,7 +24,7 @@ from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VI
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 Float = NDArray[np.float64]
 
@@ -46,25 +46,25 @@ class Options(Frozen):
     )
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Return every field of the object's points, in the order of its model's points; a model without points gives empty
     fields.
     """
-    states = sight.once("keypoints", lambda: _states(sight))
-    return _fields(sight.placement(i), states[i])
+    states = context.once("keypoints", lambda: _states(context))
+    return _fields(context.placement(i), states[i])
 
 
-def _states(sight: Sight) -> dict[int, tuple[int, ...]]:
+def _states(context: LabelContext) -> dict[int, tuple[int, ...]]:
     """The states of all objects' points by the objects' positions: the triangles are drawn once for all of them.
 
     A point is tested at the place on its ray that lies nearer to the camera by the slack.
     """
-    view, slack = sight.neighbour(), sight.options_of("keypoints", Options).depth_slack
+    view, slack = context.neighbour(), context.options_of("keypoints", Options).depth_slack
     if view is None:
         raise ValueError("keypoints: expected a sample of a shot, found none")
     found, places = dict[int, int](), list[Float]()
-    center = sight.camera.center
-    for i, placement in enumerate(sight.placements):
+    center = context.camera.center
+    for i, placement in enumerate(context.placements):
         if placement is not None:
             away = _in_world(placement) - center
             distance = np.sqrt((away * away).sum(axis=1))

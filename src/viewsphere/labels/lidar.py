@@ -20,7 +20,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.truth.lidar.sweeping import Hits, still_hits, swept_hits
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Around, Sight
+    from viewsphere.labels.shared.context import LabelContext, NeighbourViews
 
 Float = NDArray[np.float64]
 Rays = tuple[NDArray[np.intp], NDArray[np.intp]]
@@ -29,36 +29,36 @@ ROUNDED = 1e-6
 """Share of a point's distance by which float32 may move it."""
 
 
-def compute(sight: Sight) -> NDArray[np.void]:
+def compute(context: LabelContext) -> NDArray[np.void]:
     """One row a point that returns, (N,) of `viewsphere.model.lidar.POINT`, ring by ring. Raises ValueError where the sample's
     sensor is no LiDAR.
     """
-    around = sight.around
+    around = context.around
     lidar = None if around is None else around.sensor.lidar
     if around is None or lidar is None:
         raise ValueError("lidar: expected a sample of a LiDAR, found a camera's")
-    hits, width = _hits(sight, around, lidar), sight.camera.width
+    hits, width = _hits(context, around, lidar), context.camera.width
     ring, column, distance = hits.ring, hits.column, hits.distance
-    intensity = _intensity(lidar, distance, hits.cosine * albedo(sight.geometry, around.painted, hits))
-    draw = partial(_drawn, lidar.seed, around.drawn_as, sight.visibility.triangle.shape, (ring, column))
+    intensity = _intensity(lidar, distance, hits.cosine * albedo(context.geometry, around.painted, hits))
+    draw = partial(_drawn, lidar.seed, around.drawn_as, context.visibility.triangle.shape, (ring, column))
     returns = _returns(lidar, distance, intensity, draw)
     distance = distance + lidar.sigma * draw("range", np.random.Generator.standard_normal) if lidar.sigma else distance
     out = np.empty(len(ring), POINT)
     out["range"], out["incidence"], out["intensity"] = distance, hits.incidence, intensity
-    out["xyz"] = in_lidar_axes(sight.rays[ring, column]) * distance[:, None]
+    out["xyz"] = in_lidar_axes(context.rays[ring, column]) * distance[:, None]
     out["time"] = ((column + 0.5) / width - 0.5) * lidar.sweep
-    objects = len(sight.geometry.triangle_category)  # their triangles come first
-    out["instance"] = sight.geometry.triangle_object[hits.triangle]
-    out["category"] = np.append(sight.geometry.triangle_category, 0)[np.minimum(hits.triangle, objects)]
+    objects = len(context.geometry.triangle_category)  # their triangles come first
+    out["instance"] = context.geometry.triangle_object[hits.triangle]
+    out["category"] = np.append(context.geometry.triangle_category, 0)[np.minimum(hits.triangle, objects)]
     out["ring"], out["column"] = ring, column
     low, high = lidar.range
     return out[returns & (out["range"] > 0) & (out["range"] >= low) & (out["range"] <= high)]
 
 
-def _hits(sight: Sight, around: Around, lidar: Lidar) -> Hits:
+def _hits(context: LabelContext, around: NeighbourViews, lidar: Lidar) -> Hits:
     if lidar.sweep:
-        return swept_hits(sight.geometry, sight.camera, around.turning(lidar.sweep))
-    return still_hits(sight.geometry, sight.camera, sight.visibility)
+        return swept_hits(context.geometry, context.camera, around.turning(lidar.sweep))
+    return still_hits(context.geometry, context.camera, context.visibility)
 
 
 def _intensity(lidar: Lidar, distance: Float, reflected: Float) -> Float:
@@ -144,5 +144,7 @@ LABEL = ChannelLabel(
     compute=compute,
     ids={"category": in_column("category"), "object": in_column("instance")},
     prove=prove,
-    drawing=Drawing("lidar", alone=from_above, key=(("LiDAR from above: objects in their colours, else high is light", None),)),
+    drawing=Drawing(
+        "lidar", stand_in=from_above, key=(("LiDAR from above: objects in their colours, else high is light", None),)
+    ),
 )

@@ -17,12 +17,12 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """The words that hold for most of the model's surface, as the shot paints it."""
-    color, material = words_of(sight)[i + 1]
+    color, material = words_of(context)[i + 1]
     return {"color": color or None, "material": material or None}
 
 

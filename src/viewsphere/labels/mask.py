@@ -15,12 +15,12 @@ from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, P
 from viewsphere.model.sample import ObjectAnnotation, Rle, Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Run lengths and area of the pixels that show the object."""
-    seen, camera = sight.instances, sight.camera
+    seen, camera = context.instances, context.camera
     area = int(seen.area[i + 1])
     if not area:
         return {"rle": _nothing(camera.height, camera.width), "area": 0}

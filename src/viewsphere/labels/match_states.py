@@ -14,15 +14,15 @@ from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.surface_points.raster import INVALID
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 MEANING = "0 visible, 1 occluded, 2 outside the picture, 3 behind the camera, 4 invalid"
 COLORS = np.array([(235, 235, 235), (200, 60, 50), (60, 110, 200), (120, 70, 160), (0, 0, 0)], np.uint8)
 
 
-def states(sight: Sight, match: Match | None) -> NDArray[np.uint8]:
+def states(context: LabelContext, match: Match | None) -> NDArray[np.uint8]:
     """The states of the seen points in another view, (H, W); all invalid without one."""
-    return np.full(sight.visibility.triangle.shape, INVALID, np.uint8) if match is None else match.state
+    return np.full(context.visibility.triangle.shape, INVALID, np.uint8) if match is None else match.state
 
 
 def drawing(channel: str) -> Drawing:
@@ -41,7 +41,7 @@ def picture(states: NDArray[np.uint8]) -> Picture:
     return COLORS[np.minimum(states, INVALID)]
 
 
-def _label(name: str, where: str, needs: Needs, match: Callable[[Sight], Match | None]) -> ChannelLabel:
+def _label(name: str, where: str, needs: Needs, match: Callable[[LabelContext], Match | None]) -> ChannelLabel:
     """The states in one other picture."""
 
     def prove(sample: Sample, models: Models) -> Iterator[str]:
@@ -57,14 +57,16 @@ def _label(name: str, where: str, needs: Needs, match: Callable[[Sight], Match |
         ids={},
         empty=4,
         encoding="png",
-        compute=lambda sight: states(sight, match(sight)),
+        compute=lambda context: states(context, match(context)),
         prove=prove,
         drawing=drawing(name),
     )
 
 
 LABELS = (
-    _label("flow_state", "one instant later", Needs(instants=(1,)), lambda sight: sight.match(1)),
-    _label("flow_backward_state", "one instant earlier", Needs(instants=(-1,)), lambda sight: sight.match(-1)),
-    _label("disparity_state", "in the rectified sensor's picture", Needs(rectified=True), lambda sight: sight.partner_match()),
+    _label("flow_state", "one instant later", Needs(instants=(1,)), lambda context: context.match(1)),
+    _label("flow_backward_state", "one instant earlier", Needs(instants=(-1,)), lambda context: context.match(-1)),
+    _label(
+        "disparity_state", "in the rectified sensor's picture", Needs(rectified=True), lambda context: context.partner_match()
+    ),
 )

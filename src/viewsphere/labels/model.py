@@ -31,7 +31,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected track {facts.track!r} of model {o.key}, found {o.track!r}"
 
 
-LABEL = ObjectLabel.derived(
+LABEL = ObjectLabel.from_placement(
     of,
     name="model",
     meaning="which model it is",

@@ -65,7 +65,7 @@ def _label(name: str, meaning: str, unit: str, table: str, prove: Proof) -> Chan
         unit=unit,
         encoding="png16",
         ids={"part": by_table},
-        compute=lambda sight: sight.per_triangle(getattr(sight.geometry, table), 0),
+        compute=lambda context: context.per_triangle(getattr(context.geometry, table), 0),
         prove=prove,
         drawing=Drawing(name, pixels=lambda picture, sample: by_number(picture, sample.channels[name])),
     )

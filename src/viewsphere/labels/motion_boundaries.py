@@ -13,7 +13,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.truth.correspondences.correspondence import pixel_centers
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 APART = 1.5
 """Pixels by which flows differ at a boundary (Mayer et al. 2016, "A Large Dataset to Train Convolutional Networks for
@@ -27,19 +27,19 @@ JOINED = 0.05
 """Greatest relative difference of the 1/s of neighbouring pixels of one thing that are one surface."""
 
 
-def compute(sight: Sight) -> NDArray[np.uint8]:
+def compute(context: LabelContext) -> NDArray[np.uint8]:
     """1 on both sides of a boundary, else 0, (H, W).
 
     A boundary is between two pixels, one beside or below the other, of different things, or of surfaces that do not join, whose
     flows to the next instant differ by more than `APART`.
     """
-    out = np.zeros(sight.visibility.triangle.shape, np.uint8)
-    own, match = sight.neighbour(), sight.match(1)
+    out = np.zeros(context.visibility.triangle.shape, np.uint8)
+    own, match = context.neighbour(), context.match(1)
     if own is None or match is None:
         return out
     vectors = match.xy - pixel_centers(out.shape)
-    thing = np.append(own.owners, -1)[sight.visibility.triangle]
-    inverse = sight.visibility.inverse_depth
+    thing = np.append(own.owners, -1)[context.visibility.triangle]
+    inverse = context.visibility.inverse_depth
     for axis in (0, 1):
         a, b = _sides(axis)
         u, v = (vectors[b] - vectors[a]).transpose(2, 0, 1)

@@ -14,13 +14,13 @@ from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, 
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-6
 """By how much float32 may lie outside of 0 to 1."""
 
 
-def compute(sight: Sight) -> NDArray[np.float32]:
+def compute(context: LabelContext) -> NDArray[np.float32]:
     """Normalised object coordinates (H, W, 3), 0 to 1 in the object's axes; NaN on scenery, ground and where nothing is seen.
 
     Wang et al. 2019, "Normalized Object Coordinate Space for Category-Level 6D Object Pose and Size Estimation": the diagonal
@@ -29,12 +29,12 @@ def compute(sight: Sight) -> NDArray[np.float32]:
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out, g = sight.empty(np.float32, 3), sight.geometry
+    out, g = context.empty(np.float32, 3), context.geometry
     boxes = np.zeros((g.object_count + 1, 2, 3))
-    kernels.own_boxes(g.coordinates, g.is_used, np.array(g.vertex_start, np.int64), sight.instances.area, boxes)
+    kernels.own_boxes(g.coordinates, g.is_used, np.array(g.vertex_start, np.int64), context.instances.area, boxes)
     middle, (x, y, z) = (boxes[:, 0] + boxes[:, 1]) / 2, (boxes[:, 1] - boxes[:, 0]).T
-    seen, diagonal = sight.visibility.triangle, np.sqrt(x * x + y * y + z * z)
-    kernels.nocs(seen, g.triangles, g.triangle_object, sight.corners, sight.rays, g.coordinates, middle, diagonal, out)
+    seen, diagonal = context.visibility.triangle, np.sqrt(x * x + y * y + z * z)
+    kernels.nocs(seen, g.triangles, g.triangle_object, context.corners, context.rays, g.coordinates, middle, diagonal, out)
     return out
 
 

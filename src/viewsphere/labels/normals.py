@@ -12,32 +12,34 @@ from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, 
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-5
 """Length by which stored float32 directions may differ from 1: rounding alone gives some 1e-7."""
 
 
-def shading_normals(sight: Sight) -> NDArray[np.float32]:
+def shading_normals(context: LabelContext) -> NDArray[np.float32]:
     """Interpolated vertex normals (H, W, 3) on the visible side of their triangle, bent to at most perpendicular to the ray
     where interpolation turns them away.
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out, g = sight.empty(np.float32, 3), sight.geometry
+    out, g = context.empty(np.float32, 3), context.geometry
     kernels.normals_shading(
-        sight.visibility.triangle, g.triangles, sight.corners, sight.rays, g.normals, g.triangle_side, g.triangle_normals,
-        sight.camera_from_ray, sight.camera.R, out,
+        context.visibility.triangle, g.triangles, context.corners, context.rays, g.normals, g.triangle_side, g.triangle_normals,
+        context.camera_from_ray, context.camera.R, out,
     )  # fmt: skip
     return out
 
 
-def triangle_normals(sight: Sight) -> NDArray[np.float32]:
+def triangle_normals(context: LabelContext) -> NDArray[np.float32]:
     """The triangle's normal (H, W, 3) in camera axes, towards the camera; 0 where nothing is seen."""
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out, seen = sight.empty(np.float32, 3), sight.visibility.triangle
-    kernels.normals_geometric(seen, sight.geometry.triangle_normals, sight.rays, sight.camera_from_ray, sight.camera.R, out)
+    out, seen = context.empty(np.float32, 3), context.visibility.triangle
+    kernels.normals_geometric(
+        seen, context.geometry.triangle_normals, context.rays, context.camera_from_ray, context.camera.R, out
+    )
     return out
 
 
@@ -60,7 +62,7 @@ def picture(normals: Array) -> Picture:
     return np.where(is_seen[..., None], shares * 255, 0).round().astype(np.uint8)
 
 
-def _label(name: str, compute: Callable[[Sight], Array], what: str) -> ChannelLabel:
+def _label(name: str, compute: Callable[[LabelContext], Array], what: str) -> ChannelLabel:
     """A channel of directions."""
 
     def prove(sample: Sample, models: Models) -> Iterator[str]:

@@ -19,21 +19,21 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-6
 """Pixels by which rounding may push a corner."""
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Both rectangles; that of the model where the lens shows all of its vertices."""
-    seen = sight.instances
+    seen = context.instances
     x0, y0, x1, y1 = seen.box[i + 1].tolist() if seen.area[i + 1] else (0, 0, 0, 0)
-    return {"obb": _around(seen.ids[y0:y1, x0:x1] == i + 1, x0, y0), "obb_projected": _projected(sight, i)}
+    return {"obb": _around(seen.ids[y0:y1, x0:x1] == i + 1, x0, y0), "obb_projected": _projected(context, i)}
 
 
-def _projected(sight: Sight, i: int) -> Any:
-    g, camera = sight.geometry, sight.camera
+def _projected(context: LabelContext, i: int) -> Any:
+    g, camera = context.geometry, context.camera
     own = slice(g.vertex_start[i], g.vertex_start[i + 1])
     vertices = g.places(i)[g.is_used[own]]
     pixels, in_front = project(camera.intrinsics, transform(rigid(camera.R, camera.t), vertices))

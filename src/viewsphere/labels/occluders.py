@@ -20,7 +20,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,14 @@ class Occluder:
     share: float
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Return the things that the hidden pixels of the object show; of several things before it, the nearest counts."""
-    if sight.is_unobstructed(i):
+    if context.is_unobstructed(i):
         return {"occluders": ()}
-    alone = sight.alone(i).in_image(sight.camera.width, sight.camera.height)
+    alone = context.isolated(i).in_image(context.camera.width, context.camera.height)
     x0, y0, x1, y1 = alone.box
     own = alone.inverse_depth > 0
-    shown = np.bincount(sight.instances.ids[y0:y1, x0:x1][own], minlength=i + 2).tolist()
+    shown = np.bincount(context.instances.ids[y0:y1, x0:x1][own], minlength=i + 2).tolist()
     total = sum(shown)
     found = [Occluder(id, pixels / total) for id, pixels in enumerate(shown) if pixels and id != i + 1]
     return {"occluders": tuple(sorted(found, key=lambda one: (-one.share, one.id)))}

@@ -17,7 +17,7 @@ from viewsphere.model.classes import SKY
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 BITS = 16
 """Of an object's id; the class is above them."""
@@ -26,19 +26,19 @@ MOST = (1 << BITS) - 1, (1 << (31 - BITS)) - 1
 """The greatest id of an object, and of a class."""
 
 
-def compute(sight: Sight) -> NDArray[np.int32]:
+def compute(context: LabelContext) -> NDArray[np.int32]:
     """class * 65536 + object id, (H, W): the class is that of `semantic`, the id that of `instances`, 0 of stuff.
 
     So it has the segments of Kirillov et al. 2019, "Panoptic Segmentation". Raises StoreError for more than 65535 objects, or
     classes above 32767, which the number has no room for.
     """
-    classes = sight.geometry.triangle_class
-    found = sight.geometry.object_count, int(classes.max(initial=0))
+    classes = context.geometry.triangle_class
+    found = context.geometry.object_count, int(classes.max(initial=0))
     if found[0] > MOST[0] or found[1] > MOST[1]:
         raise StoreError(f"channel panoptic: expected objects of 0..{MOST[0]}, classes of 0..{MOST[1]}; found {found}")
-    out = sight.per_triangle(classes, SKY)
+    out = context.per_triangle(classes, SKY)
     out <<= BITS
-    out |= sight.instances.ids
+    out |= context.instances.ids
     return out
 
 

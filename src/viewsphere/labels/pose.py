@@ -49,7 +49,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
         axes(pen, sample, scale, o.camera_from_object, max(o.size) / 2)
 
 
-LABEL = ObjectLabel.derived(
+LABEL = ObjectLabel.from_placement(
     of,
     name="pose",
     meaning="where it is and how it is turned",

@@ -30,7 +30,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected a pose category for an elevation of {elevation}, found {name!r}"
 
 
-LABEL = ObjectLabel.derived(
+LABEL = ObjectLabel.from_placement(
     of,
     name="pose_category",
     meaning="which side of it is seen",

@@ -14,23 +14,23 @@ from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, 
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 STRIPES = 2
 """Colours of a picture begin anew so often in a metre, divided by two."""
 
 
-def compute(sight: Sight) -> NDArray[np.float32]:
+def compute(context: LabelContext) -> NDArray[np.float32]:
     """The seen point in the world's axes, (H, W, 3) metres: of objects, scenery and ground; NaN where nothing is seen.
 
     It is the pixel's ray from the camera's centre, times 1/s of `truth.raster.visibility`: it lies on that ray and at `depth`.
     """
     from viewsphere.truth.raster import kernels_channels as kernels
 
-    out, world_from_camera = sight.empty(np.float32, 3), inverse(sight.camera.R)
-    center = -transform(world_from_camera, sight.camera.t)
-    world_from_ray = product(world_from_camera, sight.camera_from_ray)
-    kernels.positions(sight.visibility.inverse_depth, sight.rays, world_from_ray, center, out)
+    out, world_from_camera = context.empty(np.float32, 3), inverse(context.camera.R)
+    center = -transform(world_from_camera, context.camera.t)
+    world_from_ray = product(world_from_camera, context.camera_from_ray)
+    kernels.positions(context.visibility.inverse_depth, context.rays, world_from_ray, center, out)
     return out
 
 

@@ -37,7 +37,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 APART = 0.02
 """Share of the picture's width by which the leftmost and the rightmost are apart from the next."""
@@ -184,15 +184,15 @@ def _used(own: Words) -> int:
     return sum(map(bool, own))
 
 
-def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The expressions, in the order of the objects' ids; of a LiDAR's picture none."""
-    options, around = sight.options_of("referring", Referring), sight.around
+    options, around = context.options_of("referring", Referring), context.around
     if around is None:
         raise ValueError("referring: expected a sample of a shot, found none")
     if around.sensor.lidar is not None:
         return {"referring": ()}
     visible = [o for o in objects if o.box2d is not None]
-    scene = Scene(visible, words_of(sight), (sight.camera.width, sight.camera.height))
+    scene = Scene(visible, words_of(context), (context.camera.width, context.camera.height))
     found = (scene.expression(i) for i, o in enumerate(visible) if is_told(o, options.min_visibility))
     return {"referring": tuple(one for one in found if one)}
 

@@ -14,15 +14,15 @@ from viewsphere.model.sample import Sample
 from viewsphere.truth.surface_points.raster import INVALID
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def scene_flow(sight: Sight, instants: int) -> NDArray[np.float32]:
+def scene_flow(context: LabelContext, instants: int) -> NDArray[np.float32]:
     """Return X so many instants later less X now, (H, W, 3) metres, each in its own instant's camera axes: the camera's motion
     is in it. NaN of the sky, and of what is not there then.
     """
-    match = sight.match(instants)
-    return np.full((*sight.visibility.triangle.shape, 3), np.nan, np.float32) if match is None else match.scene_flow
+    match = context.match(instants)
+    return np.full((*context.visibility.triangle.shape, 3), np.nan, np.float32) if match is None else match.scene_flow
 
 
 def _prove(sample: Sample, name: str, state: str) -> Iterator[str]:
@@ -56,7 +56,7 @@ def _label(name: str, instants: int, when: str, state: str) -> ChannelLabel:
         components=3,
         unit="m",
         empty=np.nan,
-        compute=lambda sight: scene_flow(sight, instants),
+        compute=lambda context: scene_flow(context, instants),
         prove=prove,
         drawing=drawing(name, NEAR),
     )

@@ -27,7 +27,7 @@ LABEL = ChannelLabel(
     empty=SKY,
     encoding="png16",
     colors=tuple(map(tuple, class_colors().tolist())),
-    compute=lambda sight: sight.per_triangle(sight.geometry.triangle_class, SKY),
+    compute=lambda context: context.per_triangle(context.geometry.triangle_class, SKY),
     prove=prove,
     ids={"category": with_classes},
     drawing=Drawing("semantic", beside=lambda sample: colored(sample.channels["semantic"]), key=KEY),

@@ -19,17 +19,17 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 TOLERANCE = 1e-9
 
 
-def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The poses of all sensors at the picture's instant, its own among them."""
-    now = sight.moment()
+    now = context.moment()
     if now is None:
         raise ValueError("sensor_poses: expected a sample of a rig, found none")
-    own = rigid(sight.camera.R, sight.camera.t)
+    own = rigid(context.camera.R, context.camera.t)
     return {"camera_from_sensors": np.stack([compose(own, rigid(one.R.T, one.center)) for one in now.cameras])}
 
 

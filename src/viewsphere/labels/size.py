@@ -31,7 +31,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected real_size {models[o.key].real_size} of model {o.key}, found {o.real_size}"
 
 
-LABEL = ObjectLabel.derived(
+LABEL = ObjectLabel.from_placement(
     of,
     name="size",
     meaning="how large it is: width along X, height along Z, length along Y of its own axes",

@@ -20,7 +20,7 @@ from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE, VISIBLE
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 Float = NDArray[np.float64]
 
@@ -34,17 +34,17 @@ UNIT = 1e-5
 """By how much the components of float32 normals may differ."""
 
 
-def compute(sight: Sight) -> NDArray[np.void]:
+def compute(context: LabelContext) -> NDArray[np.void]:
     """As many rows an object as the option `count` says, in the order of the ids, (N,) of
     `viewsphere.model.surface_samples.SURFACE_SAMPLE`; none of an object that is not there, or has no surface.
 
     The points are drawn evenly by area on the model as it is then, the same on all instances and wherever these stand. Whether
     one is seen is said as `tracks` say it: the segment from the camera's centre to the point meets no other surface.
     """
-    own = sight.neighbour()
-    if own is None or sight.around is None:
+    own = context.neighbour()
+    if own is None or context.around is None:
         raise ValueError("surface_samples: expected a sample of a shot, found none")
-    points = sight.around.surface
+    points = context.around.surface
     now, g = points.in_view(own), own.geometry
     out = np.zeros(len(points), SURFACE_SAMPLE)
     start, ids = np.array(g.triangle_start), np.array([thing.id for thing in own.things], np.int32)

@@ -21,7 +21,7 @@ from viewsphere.truth.surface_points.raster import OCCLUDED, VISIBLE
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 RADIUS = 3.0
 """Pixels of a point's radius in a picture that is 640 pixels wide."""
@@ -30,10 +30,12 @@ WORST = 4
 """The last of the states."""
 
 
-def compute(sight: Sight) -> NDArray[np.void]:
+def compute(context: LabelContext) -> NDArray[np.void]:
     """One row a point, (N,) of `viewsphere.model.tracks.TRACK`. Raises ValueError where the sample's shot follows none."""
-    followed = None if sight.around is None else sight.around.followed  # first: its triangles may take the place of a view's
-    own = sight.neighbour()
+    followed = (
+        None if context.around is None else context.around.followed
+    )  # first: its triangles may take the place of a view's
+    own = context.neighbour()
     if own is None or followed is None:
         raise ValueError("tracks: expected a sample of a sequence, found none")
     now = followed.points.in_view(own)

@@ -15,16 +15,16 @@ from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(sight: Sight) -> NDArray[np.int32]:
+def compute(context: LabelContext) -> NDArray[np.int32]:
     """Index (H, W) of the triangle within its object; -1 on scenery, ground and where nothing is seen."""
-    g = sight.geometry
+    g = context.geometry
     index = np.full(len(g.triangles), -1, np.int32)
     for first, last in pairwise(g.triangle_start[: g.object_count + 1]):
         index[first:last] = np.arange(last - first)
-    return sight.per_triangle(index, -1)
+    return context.per_triangle(index, -1)
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:

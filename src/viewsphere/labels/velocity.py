@@ -19,23 +19,23 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 Float = NDArray[np.float64]
 
 FIELDS = ("velocity", "angular_velocity", "acceleration")
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Differences of the poses at the instants next to this one, of the middle of the object's box: central ones; at a
     sequence's ends, and where the object comes or goes, one-sided ones without an acceleration.
 
     Of a model that deforms the point is the middle of the box at this instant and moves with the pose: its own motion counts,
     that of its surface does not.
     """
-    placement, now = sight.placement(i), sight.moment()
+    placement, now = context.placement(i), context.moment()
     middle = (placement.box[2] + placement.box[4]) / 2
-    known = [(m.seconds, np.array(m.poses[i])) for m in (sight.moment(-1), now, sight.moment(1)) if m and m.poses[i]]
+    known = [(m.seconds, np.array(m.poses[i])) for m in (context.moment(-1), now, context.moment(1)) if m and m.poses[i]]
     if len(known) < 2:
         return dict.fromkeys(FIELDS)
     (start, before), (end, after) = known[0], known[-1]

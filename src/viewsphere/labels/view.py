@@ -25,7 +25,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: its view (azimuth {view.azimuth_deg}, ...) is not where the camera stands"
 
 
-LABEL = ObjectLabel.derived(
+LABEL = ObjectLabel.from_placement(
     lambda placement: {"view": placement.view},
     name="view",
     meaning="the camera's orbit around the centre of its box",

@@ -14,45 +14,45 @@ from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, r
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 
-def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     """Both shares of one object.
 
     Visibility is the object's visible pixels over all pixels that it would cover alone, on a canvas of three times the image's
     width and height (BOP's visib_fract, https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md);
     truncation is the share of the latter outside the image. An object that covers no pixel has visibility 0.
     """
-    visible, truncated = _shares(sight, i, int(sight.instances.area[i + 1]))
+    visible, truncated = _shares(context, i, int(context.instances.area[i + 1]))
     return {"visibility": visible, "truncation": truncated}
 
 
-def _shares(sight: Sight, i: int, area: int) -> tuple[float, float]:
-    own, whole = sight.projected[i]
+def _shares(context: LabelContext, i: int, area: int) -> tuple[float, float]:
+    own, whole = context.projected[i]
     if own is None:
         if not area:
             return 0.0, 1.0
         own = EVERYWHERE  # the object is visible, but all nearer than the distance at which projected boxes begin
-    width, height = sight.camera.width, sight.camera.height
+    width, height = context.camera.width, context.camera.height
     image = (0.0, 0.0, float(width), float(height))
     if whole and not overlap(own, image):
         return 0.0, 1.0
     inside = whole and own[0] >= 0 and own[1] >= 0 and own[2] <= width and own[3] <= height
     if inside and not area:
         return 0.0, 0.0
-    if inside and sight.is_unobstructed(i):
+    if inside and context.is_unobstructed(i):
         return 1.0, 0.0
-    total, kept = _pixels_alone(sight, i)
+    total, kept = _pixels_alone(context, i)
     if total == 0:
         return 0.0, 0.0 if overlap(own, image) else 1.0
     return area / total, (total - kept) / total
 
 
-def _pixels_alone(sight: Sight, i: int) -> tuple[int, int]:
+def _pixels_alone(context: LabelContext, i: int) -> tuple[int, int]:
     """Number of pixels that the object alone would cover on the large canvas, and how many of these lie in the image."""
-    alone = sight.alone(i)
-    inside = alone.in_image(sight.camera.width, sight.camera.height)
+    alone = context.isolated(i)
+    inside = alone.in_image(context.camera.width, context.camera.height)
     return int(np.count_nonzero(alone.inverse_depth)), int(np.count_nonzero(inside.inverse_depth))
 
 

@@ -26,7 +26,7 @@ from viewsphere.model.voxels import EMPTY, FREE, INSIDE, OCCLUDED, OUTSIDE, RUN,
 from viewsphere.truth.raster.alpha_masks import NEVER
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 Float = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -41,7 +41,7 @@ MESHES = 256
 """Meshes of which it is kept which of their pieces are closed."""
 
 
-def compute(sight: Sight) -> NDArray[np.void]:
+def compute(context: LabelContext) -> NDArray[np.void]:
     """The cells of the grid, its first axis slowest, as runs of equal ones, (N,) of `viewsphere.model.voxels.RUN`.
 
     A cell is an object's where a triangle has a part in it, or, for pieces of objects that are closed, where its centre is
@@ -50,18 +50,18 @@ def compute(sight: Sight) -> NDArray[np.void]:
     """
     from viewsphere.geometry import kernels_voxels as kernels
 
-    grid = Grid.of(sight.options_of("voxels", Voxels), sight.camera)
+    grid = Grid.of(context.options_of("voxels", Voxels), context.camera)
     owner, filled = np.full(grid.size, -1, np.int32), np.zeros(grid.size, np.uint8)
-    points = grid.cells(sight.geometry.vertices)
-    _occupy(sight, points, owner, filled)
-    indoors = _indoors(sight, points, grid)
-    state = _state(sight, grid)
-    cells, pixels = _seen_cells(sight, grid)
-    triangles = sight.visibility.triangle[pixels]
+    points = grid.cells(context.geometry.vertices)
+    _occupy(context, points, owner, filled)
+    indoors = _indoors(context, points, grid)
+    state = _state(context, grid)
+    cells, pixels = _seen_cells(context, grid)
+    triangles = context.visibility.triangle[pixels]
     state.reshape(-1)[cells] = SURFACE
     missed = owner.reshape(-1)[cells] < 0  # a point of a triangle in a cell's border, by rounding in the next one
     owner.reshape(-1)[cells[missed]], filled.reshape(-1)[cells[missed]] = triangles[missed], TOUCHED
-    table = np.column_stack((sight.geometry.triangle_class, sight.geometry.triangle_object))
+    table = np.column_stack((context.geometry.triangle_class, context.geometry.triangle_object))
     flat = [array.reshape(-1) for array in (owner, filled, state, indoors)]
     first = np.empty(1 << 18, np.int64)
     while (count := int(kernels.starts(flat[0], table, *flat[1:], first))) > len(first):
@@ -78,34 +78,34 @@ def _runs(first: Rows, table: Array, owner: Array, filled: Array, state: Array, 
     return out
 
 
-def _occupy(sight: Sight, points: Float, owner: NDArray[np.int32], filled: NDArray[np.uint8]) -> None:
-    g = sight.geometry
+def _occupy(context: LabelContext, points: Float, owner: NDArray[np.int32], filled: NDArray[np.uint8]) -> None:
+    g = context.geometry
     for i in range(g.object_count):
-        rows = _shown(sight, np.arange(g.triangle_start[i], g.triangle_start[i + 1]))
+        rows = _shown(context, np.arange(g.triangle_start[i], g.triangle_start[i + 1]))
         if len(rows):
             voxels.touch(points, g.triangles, rows, owner, filled, TOUCHED)
-            voxels.fill(points, g.triangles, rows[_closed(sight, i, rows)], owner, filled, INSIDE)
-    voxels.touch(points, g.triangles, _scenery(sight), owner, filled, TOUCHED)
+            voxels.fill(points, g.triangles, rows[_closed(context, i, rows)], owner, filled, INSIDE)
+    voxels.touch(points, g.triangles, _scenery(context), owner, filled, TOUCHED)
     layer = -1 if g.ground_z is None else math.floor(points[g.vertex_start[-1], 1])
     if 0 <= layer < owner.shape[1]:
         free = owner[:, layer] < 0
         owner[:, layer][free], filled[:, layer][free] = g.triangle_start[-1], TOUCHED
 
 
-def _shown(sight: Sight, rows: Rows) -> Rows:
+def _shown(context: LabelContext, rows: Rows) -> Rows:
     """Return the rows of triangles that may be visible."""
-    return rows[sight.geometry.triangle_cutout[rows] != NEVER]
+    return rows[context.geometry.triangle_cutout[rows] != NEVER]
 
 
-def _scenery(sight: Sight) -> Rows:
+def _scenery(context: LabelContext) -> Rows:
     """The triangles of scenery, without the ground's."""
-    start = sight.geometry.triangle_start
-    return _shown(sight, np.arange(start[sight.geometry.object_count], start[-1]))
+    start = context.geometry.triangle_start
+    return _shown(context, np.arange(start[context.geometry.object_count], start[-1]))
 
 
-def _closed(sight: Sight, i: int, rows: Rows) -> NDArray[np.bool_]:
+def _closed(context: LabelContext, i: int, rows: Rows) -> NDArray[np.bool_]:
     """Return a mask of these triangles of thing i: True for triangles of pieces that are closed without others."""
-    g = sight.geometry
+    g = context.geometry
     vertices = g.coordinates[g.vertex_start[i] : g.vertex_start[i + 1]]
     triangles = g.triangles[rows] - np.int32(g.vertex_start[i])
     key, known = xxhash.xxh3_128(vertices.tobytes() + triangles.tobytes()).digest(), _known()
@@ -122,28 +122,28 @@ def _known() -> dict[bytes, NDArray[np.bool_]]:
     return {}
 
 
-def _indoors(sight: Sight, points: Float, grid: Grid) -> NDArray[np.bool_]:
+def _indoors(context: LabelContext, points: Float, grid: Grid) -> NDArray[np.bool_]:
     """Return a mask of the cells that have scenery above their centres, and scenery or ground below."""
-    g, (x, y, z) = sight.geometry, grid.size
+    g, (x, y, z) = context.geometry, grid.size
     if not g.has_scenery:
         return np.zeros(grid.size, np.bool_)
-    low, high = voxels.heights(points, g.triangles, _scenery(sight), (x, z))
+    low, high = voxels.heights(points, g.triangles, _scenery(context), (x, z))
     if g.ground_z is not None:
         low = np.minimum(low, points[g.vertex_start[-1], 1])
     height = np.arange(y)[:, None] + 0.5
     return (low[:, None] < height) & (height < high[:, None])
 
 
-def _state(sight: Sight, grid: Grid) -> NDArray[np.uint8]:
+def _state(context: LabelContext, grid: Grid) -> NDArray[np.uint8]:
     """Return the visibility state of each cell's centre."""
     from viewsphere.geometry import kernels_voxels as kernels
 
     codes, (ahead, up, right) = np.array([OUTSIDE, FREE, OCCLUDED], np.uint8), grid.size
     out = np.empty((ahead, up * right), np.uint8)
-    for part, centers in _slabs(sight.camera, grid):
-        pixels, _ = project(sight.camera.intrinsics, centers)
+    for part, centers in _slabs(context.camera, grid):
+        pixels, _ = project(context.camera.intrinsics, centers)
         own = np.empty(len(centers), np.uint8)
-        kernels.seen(pixels, _along(sight.camera, centers), sight.visibility.inverse_depth, codes, own)
+        kernels.seen(pixels, _along(context.camera, centers), context.visibility.inverse_depth, codes, own)
         out[part] = own.reshape(out[part].shape)
     return out.reshape(grid.size)
 
@@ -170,12 +170,12 @@ def _along(camera: Camera, points: Float) -> Float:
     return np.sqrt(x * x + y * y + z * z) if has_unit_rays(camera.distortion) else np.ascontiguousarray(z)
 
 
-def _seen_cells(sight: Sight, grid: Grid) -> tuple[Rows, tuple[Rows, Rows]]:
+def _seen_cells(context: LabelContext, grid: Grid) -> tuple[Rows, tuple[Rows, Rows]]:
     """The cells of the points that pixels show, as numbers of flat arrays, and these pixels; without those beyond the grid."""
-    where = np.nonzero(sight.visibility.inverse_depth > 0)
-    rays = pixel_rays(sight.camera.intrinsics)[where]
-    depth = 1.0 / sight.visibility.inverse_depth[where].astype(np.float64)
-    cells = np.floor(_lifted(sight.camera, grid, rays * depth[:, None]))
+    where = np.nonzero(context.visibility.inverse_depth > 0)
+    rays = pixel_rays(context.camera.intrinsics)[where]
+    depth = 1.0 / context.visibility.inverse_depth[where].astype(np.float64)
+    cells = np.floor(_lifted(context.camera, grid, rays * depth[:, None]))
     inside = ((cells >= 0) & (cells < grid.size)).all(axis=1)
     i, j, k = cells[inside].astype(np.int64).T
     return (i * grid.size[1] + j) * grid.size[2] + k, (where[0][inside], where[1][inside])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from viewsphere.errors import StoreError
-from viewsphere.labels import Drawing, Extent, alone, channels, drawable, is_in
+from viewsphere.labels import Drawing, Extent, channels, drawable, is_in, stand_in_for
 from viewsphere.model.channel import picture_of
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.sample import Sample
@@ -102,7 +102,7 @@ def _pictures(sample: Sample, draw: Sequence[str], width: int | None, before: Be
     """The picture, and what is drawn beside it, all of one size."""
     chosen = drawn(sample, draw)
     if picture_of(sample.channels) is None:
-        if (stand_in := alone(sample.channels)) is not None:
+        if (stand_in := stand_in_for(sample.channels)) is not None:
             return [stand_in(sample, width or SIZE)]
         raise StoreError(
             "preview: expected pictures (rgb or rgba), found a data set that keeps neither: preview its recipe instead"

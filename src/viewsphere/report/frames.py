@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from viewsphere.geometry.box import FACES
-from viewsphere.labels import alone
+from viewsphere.labels import stand_in_for
 from viewsphere.model.camera import Camera
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -20,7 +20,7 @@ def frame_data(sample: Sample) -> dict[str, Any]:
     """Frame index, split, picture's path and size, pose, camera and objects, of a sequence also its moment; unknown values are
     null. Of a LiDAR, which has no picture, `scan` are its rings and columns, and the size is that of what stands for one.
     """
-    pose, camera, stands_in = sample.known_pose, sample.known_camera, alone(sample.channels) is not None
+    pose, camera, stands_in = sample.known_pose, sample.known_camera, stand_in_for(sample.channels) is not None
     return {
         "index": sample.index,
         "split": sample.split,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from viewsphere.errors import UserError
-from viewsphere.labels import Extent, alone, channel_labels
+from viewsphere.labels import Extent, channel_labels, stand_in_for
 from viewsphere.labels.disparity import extent as disparity_extent
 from viewsphere.labels.match_states import picture as state_colors
 from viewsphere.labels.motion_boundaries import COLOR as BOUNDARY
@@ -158,7 +158,7 @@ Painter = Callable[[Sample, Scale, Mapping[str, Extent]], Layer]
 
 def layer_names(sample: Sample) -> list[str]:
     """Return the names of the layers that can be drawn of a sample; only the picture's, if a stand-in replaces it."""
-    if alone(sample.channels) is not None:
+    if stand_in_for(sample.channels) is not None:
         return ["rgb"]
     drawable = ({*PAINTERS} - {"rgb", "coordinates"}) & {*sample.channels}
     drawable |= {"rgb"} if picture_of(sample.channels) else set()
@@ -194,7 +194,7 @@ def scan_size(sample: Sample) -> tuple[int, int]:
 
 def scan_picture(sample: Sample, scale: Scale) -> Picture:
     """A LiDAR's range image, a row each ring, near light, above its points from above; (H, W, 3)."""
-    paint = alone(sample.channels)
+    paint = stand_in_for(sample.channels)
     assert paint is not None
     width, height = (round(side * min(1.0, scale.width / SCAN)) for side in scan_size(sample))
     rows = sample.channels["lidar"]

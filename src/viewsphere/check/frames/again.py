@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError, ViewsphereError
-from viewsphere.labels import ChannelLabel, Sight, annotated, channel_labels, labels_of, sample_labels, sample_values
+from viewsphere.labels import ChannelLabel, LabelContext, annotated, channel_labels, labels_of, sample_labels, sample_values
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.run.shots.reconstruct import ViewReconstructor
 from viewsphere.run.shots.scenery import Scenery
@@ -34,21 +34,21 @@ class Again:
 
     def differences(self, sample: Sample) -> Findings:
         """Yield the differences between a sample's stored and recomputed labels; none if the scenery has changed."""
-        sight = self._reconstructor.of(sample, sample.files)
-        if sight is None:
+        context = self._reconstructor.of(sample, sample.files)
+        if context is None:
             return
         for name, label in channel_labels().items():
             if name in sample.files:
-                yield from ((name, problem) for problem in self._pixels(sample, name, self._computed(label, sight)))
-        objects = annotated(sight)
+                yield from ((name, problem) for problem in self._pixels(sample, name, self._computed(label, context)))
+        objects = annotated(context)
         for o, again in zip(sample.objects, objects, strict=True):
-            yield from _fields(o, again, sight.asked)
-        yield from _of_picture(sample.extra, sample_values(sight, objects))
+            yield from _fields(o, again, context.asked)
+        yield from _of_picture(sample.extra, sample_values(context, objects))
 
-    def _computed(self, label: ChannelLabel, sight: Sight) -> NDArray[Any] | None:
+    def _computed(self, label: ChannelLabel, context: LabelContext) -> NDArray[Any] | None:
         """A channel, computed again; None where a picture of the scene is no longer there: it is no part of the data set."""
         try:
-            return label.compute(sight)
+            return label.compute(context)
         except RecipeError as error:
             self.not_run[label.name] = str(error)
             return None

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels import channel_labels, labels_of, makers, sample_labels
-from viewsphere.labels.shared.context import Around, Sight
+from viewsphere.labels.shared.context import LabelContext, NeighbourViews
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.record import Makers, computed
-from viewsphere.labels.shared.spec import later
+from viewsphere.labels.shared.spec import derived
 from viewsphere.model.camera import Camera
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.looks import Looks
@@ -32,7 +32,7 @@ def observe(
     camera: Camera,
     visibility: Visibility,
     names: Iterable[str],
-    around: Around | None = None,
+    around: NeighbourViews | None = None,
     options: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """The named labels of pixels, each (H, W) or (H, W, components) as its file says.
@@ -42,14 +42,14 @@ def observe(
     to. Raises ValueError for names that are no labels of pixels.
     """
     known, names = channel_labels(), tuple(names)
-    sight = Sight(geometry, camera, visibility, around=around, options=options or {})
+    context = LabelContext(geometry, camera, visibility, around=around, options=options or {})
     unknown = [name for name in names if name not in known]
     if unknown:
         raise ValueError(f"channel {unknown[0]!r}: expected one of {', '.join(known)}")
-    return {name: known[name].compute(sight) for name in names}
+    return {name: known[name].compute(context) for name in names}
 
 
-def sight_of(
+def context_of(
     shot: Shot,
     instant: int,
     camera: Camera,
@@ -58,9 +58,9 @@ def sight_of(
     boxes: Sequence[NDArray[np.float64]],
     models: Sequence[str],
     real_sizes: Sequence[Size | None] | None = None,
-    around: Around | None = None,
+    around: NeighbourViews | None = None,
     traits: Sequence[Callable[[], Traits]] | None = None,
-) -> Sight:
+) -> LabelContext:
     """Return the view that a camera has of a shot at an instant (counted from 0 there), with the places of its objects.
 
     `boxes[i]` is the 3D box (8, 3) of object i + 1's model at that instant, in the object's axes. `models[i]` is the path of
@@ -71,7 +71,7 @@ def sight_of(
     objects = shot.objects
     if not len(objects) == len(boxes) == len(models) == geometry.object_count:
         raise ValueError(
-            f"sight_of: shot {shot.key}: expected {geometry.object_count} objects, boxes and models, "
+            f"context_of: shot {shot.key}: expected {geometry.object_count} objects, boxes and models, "
             f"got {len(objects)}, {len(boxes)}, {len(models)}"
         )
     sizes = real_sizes or [None if isinstance(thing.model.real_size, str) else thing.model.real_size for thing in objects]
@@ -84,11 +84,11 @@ def sight_of(
         for thing, known in zip(objects, facts, strict=True)
         for pose, step in ((thing.motion.at(instant), thing.motion.step_at(instant)),)
     )
-    return Sight(geometry, camera, visibility, places, around, shot.annotations, shot.labels)
+    return LabelContext(geometry, camera, visibility, places, around, shot.annotations, shot.labels)
 
 
 def _unsaid() -> Traits:
-    raise ValueError("expected what the model says of itself; sight_of() was not given it")
+    raise ValueError("expected what the model says of itself; context_of() was not given it")
 
 
 def _track(thing: Thing, instant: int) -> str:
@@ -96,25 +96,25 @@ def _track(thing: Thing, instant: int) -> str:
     return thing.model.key if thing.motion.step_at(instant) else ""
 
 
-def annotated(sight: Sight) -> tuple[ObjectAnnotation, ...]:
-    """Annotations of the objects that are placed in a sight, visible or not, in the order of their ids. An object that covers
+def annotated(context: LabelContext) -> tuple[ObjectAnnotation, ...]:
+    """Annotations of the objects that are placed in a context, visible or not, in the order of their ids. An object that covers
     no pixel has an empty mask, no `box2d` and visibility 0.
     """
-    seen = [label for label in labels_of(sight.asked) if label.compute is not later]
-    every = Makers(makers(), sight.asked, "this frame")
+    seen = [label for label in labels_of(context.asked) if label.compute is not derived]
+    every = Makers(makers(), context.asked, "this frame")
     return tuple(
-        computed(i + 1, [label.compute(sight, i) for label in seen], place, every)
-        for i, place in enumerate(sight.placements)
+        computed(i + 1, [label.compute(context, i) for label in seen], place, every)
+        for i, place in enumerate(context.placements)
         if place
     )
 
 
-def sample_values(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
-    """The fields of the labels of whole pictures that were asked for; `objects` are `annotated(sight)`."""
+def sample_values(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+    """The fields of the labels of whole pictures that were asked for; `objects` are `annotated(context)`."""
     found: dict[str, Any] = {}
     for name, label in sample_labels().items():
-        if name in sight.asked:
-            found |= label.compute(sight, objects)
+        if name in context.asked:
+            found |= label.compute(context, objects)
     return found
 
 

@@ -28,7 +28,7 @@ from viewsphere.truth.surface_points.points import SurfacePoints
 from viewsphere.truth.view import View
 
 
-class Around(Protocol):
+class NeighbourViews(Protocol):
     """The views beside that of a picture."""
 
     @property
@@ -92,7 +92,7 @@ EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
 
 @dataclass(frozen=True, eq=False)
-class Alone:
+class IsolatedMask:
     """An object as the camera would see it alone, on a canvas of three times the image's width and height: 1/s (h, w) float32
     of `truth.raster.visibility`, 0 where a pixel does not show it, from the pixel (left, top) on.
     """
@@ -101,10 +101,10 @@ class Alone:
     top: int
     inverse_depth: NDArray[np.float32]
 
-    def in_image(self, width: int, height: int) -> Alone:
+    def in_image(self, width: int, height: int) -> IsolatedMask:
         """The part of it that lies in the image."""
         x, y = max(-self.left, 0), max(-self.top, 0)
-        return Alone(
+        return IsolatedMask(
             max(self.left, 0),
             max(self.top, 0),
             self.inverse_depth[y : max(height - self.top, 0), x : max(width - self.left, 0)],
@@ -118,7 +118,7 @@ class Alone:
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class LabelContext:
     """A camera's view of a geometry: `visibility` is `rasterize(geometry, camera)`. `placements` belong to the objects 1, 2,
     ...; an absent object's is None; labels of pixels need no placements. `around`: what the picture is compared with; `asked`:
     the annotations that were asked for; `options`: those of labels, by their names.
@@ -128,10 +128,10 @@ class Sight:
     camera: Camera
     visibility: Visibility
     placements: Sequence[Placement | None] = ()
-    around: Around | None = None
+    around: NeighbourViews | None = None
     asked: tuple[str, ...] = ()
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
-    _alone: dict[int, Alone] = field(default_factory=dict[int, "Alone"], repr=False)
+    _isolated: dict[int, IsolatedMask] = field(default_factory=dict[int, "IsolatedMask"], repr=False)
     _made: dict[str, Any] = field(default_factory=dict[str, Any], repr=False)
     _matches: dict[tuple[int, str | None], Match | None] = field(
         default_factory=dict[tuple[int, str | None], "Match | None"], repr=False
@@ -242,24 +242,24 @@ class Sight:
         boxes = (NOWHERE if box is None else box if whole else EVERYWHERE for box, whole in self.projected)
         return np.array([*boxes], np.float64).reshape(-1, 4)
 
-    def alone(self, i: int) -> Alone:
+    def isolated(self, i: int) -> IsolatedMask:
         """Return the camera's view of the object of id i + 1 alone; it is drawn once."""
-        if i not in self._alone:
-            self._alone[i] = self._drawn_alone(i)
-        return self._alone[i]
+        if i not in self._isolated:
+            self._isolated[i] = self._draw_isolated(i)
+        return self._isolated[i]
 
-    def _drawn_alone(self, i: int) -> Alone:
+    def _draw_isolated(self, i: int) -> IsolatedMask:
         width, height = self.camera.width, self.camera.height
         own, whole = self.projected[i]
         x0, y0, x1, y1 = own if own and whole else EVERYWHERE
         left, top = math.floor(max(x0, -width)), math.floor(max(y0, -height))
         right, bottom = math.ceil(min(x1, 2 * width)), math.ceil(min(y1, 2 * height))
         if right <= left or bottom <= top:
-            return Alone(0, 0, np.zeros((0, 0), np.float32))
+            return IsolatedMask(0, 0, np.zeros((0, 0), np.float32))
         window = (left, top, right, bottom)
         corners = self.visibility.corners
         drawn = rasterize(self.geometry, self.camera, object_id=i + 1, window=window, corners=corners)
-        return Alone(left, top, drawn.inverse_depth)
+        return IsolatedMask(left, top, drawn.inverse_depth)
 
     def placement(self, i: int) -> Placement:
         """Placement of the object of id i + 1; raises ValueError for an absent object."""

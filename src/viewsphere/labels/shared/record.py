@@ -11,7 +11,7 @@ from typing import Any
 from viewsphere.errors import StoreError
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.placement import Placement
-from viewsphere.labels.shared.spec import ObjectLabel, later, nothing
+from viewsphere.labels.shared.spec import ObjectLabel, derived, no_record
 from viewsphere.model.sample import ObjectAnnotation
 
 _OWN = frozenset(f.name for f in fields(ObjectAnnotation))
@@ -83,7 +83,9 @@ class Makers:
     @cached_property
     def requested(self) -> tuple[str, ...]:
         """The fields of labels that were asked for and follow from others."""
-        return tuple(name for name, label in self.of.items() if label.on_request and label.compute is later and self.has(name))
+        return tuple(
+            name for name, label in self.of.items() if label.on_request and label.compute is derived and self.has(name)
+        )
 
     def has(self, field: str) -> bool:
         """Return whether an object is told to have a field."""
@@ -115,7 +117,7 @@ class _Restored(ObjectAnnotation):
             return self._other(name)
         try:
             restored = label.restore(own["_record"].get(label.name), own["_placement"], self)
-            if label.keep is not nothing:  # all others follow from what is whole
+            if label.keep is not no_record:  # all others follow from what is whole
                 for field in label.fields:
                     field.check(restored[field.name])
             own.update(restored)

@@ -23,9 +23,11 @@ from viewsphere.plugins.spec import Spec
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 else:
-    ImageDraw = Sight = Any  # these load Pillow and the rasterizer; the fields' types are evaluated when the classes are made
+    ImageDraw = LabelContext = (
+        Any  # these load Pillow and the rasterizer; the fields' types are evaluated when the classes are made
+    )
 
 Array = NDArray[Any]
 Picture = NDArray[np.uint8]
@@ -38,7 +40,7 @@ Proof = Callable[[Sample, Models], Iterator[str]]
 """Yields a message for each value of a stored sample that contradicts the rest of the sample."""
 
 
-def trusted(sample: Sample, models: Models) -> Iterator[str]:
+def no_proof(sample: Sample, models: Models) -> Iterator[str]:
     """The proof of a label about which nothing else in a sample says anything: only computing the label again proves it."""
     yield from ()
 
@@ -85,7 +87,7 @@ class Drawing:
 
     `trails` are lines that show the past, too. They receive the sensor's samples so far, the sample itself last; none is more
     than `labels.TAIL` instants before it. Instead of `beside`, `within` gives a picture that distinguishes the values of an
-    extent. `extent` is a sample's own extent, so that all pictures of a sequence may have the same colours. `alone` replaces
+    extent. `extent` is a sample's own extent, so that all pictures of a sequence may have the same colours. `stand_in` replaces
     the picture of a sample that has none, at this size. `key` gives the meaning of colours; None is words alone.
     """
 
@@ -96,7 +98,7 @@ class Drawing:
     beside: Callable[[Sample], Picture] | None = None
     extent: Callable[[Sample], Extent] | None = None
     within: Callable[[Sample, Extent], Picture] | None = None
-    alone: Callable[[Sample, int], Picture] | None = None
+    stand_in: Callable[[Sample, int], Picture] | None = None
     key: tuple[tuple[str, Color | None], ...] = ()
 
     def picture(self, sample: Sample, extent: Extent | None = None) -> Picture | None:
@@ -122,7 +124,7 @@ class Label(Spec):
     axes: str = ""
     needs: InstanceOf[Needs] = Needs()
     options: type[Frozen] | None = None
-    prove: Proof = trusted
+    prove: Proof = no_proof
     drawing: InstanceOf[Drawing] | None = None
 
     def is_in(self, sample: Sample) -> bool:
@@ -139,7 +141,7 @@ class ChannelLabel(Label):
     have to declare them; raises ValueError for those that do not.
     """
 
-    compute: Callable[[Sight], Array]
+    compute: Callable[[LabelContext], Array]
     dtype: Any
     components: int = 1
     unit: str = "1"
@@ -166,12 +168,12 @@ class ChannelLabel(Label):
         return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning, self.colors)
 
 
-def later(sight: Sight, i: int) -> Mapping[str, Any]:
+def derived(context: LabelContext, i: int) -> Mapping[str, Any]:
     """The `compute` of labels that follow from placements or from other labels: `restore` gives their fields."""
     return {}
 
 
-def nothing(annotation: ObjectAnnotation) -> None:
+def no_record(annotation: ObjectAnnotation) -> None:
     """The `keep` of labels that follow from the shot and its models: nothing is stored."""
     return
 
@@ -179,7 +181,7 @@ def nothing(annotation: ObjectAnnotation) -> None:
 class ObjectLabel(Label):
     """A label of objects: one field or several that are computed together.
 
-    `compute(sight, i)` gives the fields of the object of id i + 1; `later`: `restore` does. `keep` gives, as JSON, the part
+    `compute(context, i)` gives the fields of the object of id i + 1; `derived`: `restore` does. `keep` gives, as JSON, the part
     of them that does not follow from the shot and its models, None if everything follows. `restore(kept, placement,
     annotation)` computes all fields from this part again, equal to the last bit; other labels' fields are available as
     attributes of the annotation.
@@ -188,28 +190,28 @@ class ObjectLabel(Label):
     """
 
     fields: tuple[InstanceOf[Field], ...]
-    compute: Callable[[Sight, int], Mapping[str, Any]] = later
+    compute: Callable[[LabelContext, int], Mapping[str, Any]] = derived
     restore: Callable[[Any, Placement, ObjectAnnotation], Mapping[str, Any]]
-    keep: Callable[[ObjectAnnotation], Any] = nothing
+    keep: Callable[[ObjectAnnotation], Any] = no_record
     on_request: bool = False
 
     @property
     def follows(self) -> bool:
         """Return whether it follows from what every data set has: it is there whether it was asked for or not."""
-        return self.keep is nothing and self.options is None and not self.needs.is_some
+        return self.keep is no_record and self.options is None and not self.needs.is_some
 
     def is_in(self, sample: Sample) -> bool:
         """Return whether the sample's objects have it: it was asked for, or did not have to be."""
         return not self.on_request or self.name in sample.requested or (self.follows and sample.origin is not None)
 
     @staticmethod
-    def derived(
+    def from_placement(
         of: Callable[[Placement], Mapping[str, Any]],
         *,
         name: str,
         meaning: str,
         fields: Sequence[Field],
-        prove: Proof = trusted,
+        prove: Proof = no_proof,
         axes: str = "",
         drawing: Drawing | None = None,
         on_request: bool = False,
@@ -230,11 +232,11 @@ class ObjectLabel(Label):
 class SampleLabel(Label):
     """A label of a whole picture, computed where a recipe's `annotations` name it.
 
-    `compute(sight, objects)` gives its fields. The store keeps them as they are.
+    `compute(context, objects)` gives its fields. The store keeps them as they are.
     """
 
     fields: tuple[InstanceOf[Field], ...]
-    compute: Callable[[Sight, Sequence[ObjectAnnotation]], Mapping[str, Any]]
+    compute: Callable[[LabelContext, Sequence[ObjectAnnotation]], Mapping[str, Any]]
 
 
 def rendered(sample: Sample) -> list[ObjectAnnotation]:

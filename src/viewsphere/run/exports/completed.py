@@ -11,7 +11,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError, UserError
-from viewsphere.labels import Sight, annotated, channel_labels, labels, on_request, sample_values
+from viewsphere.labels import LabelContext, annotated, channel_labels, labels, on_request, sample_values
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
@@ -83,38 +83,40 @@ class Completed(Exported):
                 f"frame {sample.index}: expected a shot of which {names[0]} is computed; found an imported picture"
             )
         asked = tuple(name for name in names if name in on_request())
-        channels = _Computed(sample.channels, [n for n in names if n in channel_labels()], partial(self._sight, sample, names))
+        channels = _Computed(
+            sample.channels, [n for n in names if n in channel_labels()], partial(self._context, sample, names)
+        )
         if not asked:
             return replace(sample, channels=channels)
-        sight = self._sight(sample, names)
-        objects = annotated(sight)
-        more = {**sample.extra, **sample_values(sight, objects)}
+        context = self._context(sample, names)
+        objects = annotated(context)
+        more = {**sample.extra, **sample_values(context, objects)}
         return replace(sample, channels=channels, objects=objects, extra=more, requested=(*sample.requested, *asked))
 
-    def _sight(self, sample: Sample, names: list[str]) -> Sight:
+    def _context(self, sample: Sample, names: list[str]) -> LabelContext:
         asked = [name for name in names if name in on_request()]
         needs = [labels()[name].needs for name in names]
         compares = any(need.instants or need.poses for need in needs)
-        sight = self.reconstructor.of(sample, names, asked, continued=compares)
-        if sight is None:
+        context = self.reconstructor.of(sample, names, asked, continued=compares)
+        if context is None:
             raise StoreError(
                 f"frame {sample.index}: expected scenery as it was rendered: {'; '.join(self.reconstructor.notes)}"
             )
-        return sight
+        return context
 
 
 class _Computed(Mapping[str, NDArray[Any]]):
     """A sample's channels, and others that are computed when they are first asked for."""
 
-    def __init__(self, kept: Mapping[str, NDArray[Any]], names: list[str], sight: Callable[[], Sight]) -> None:
-        self._kept, self._names, self._sight = kept, names, sight
+    def __init__(self, kept: Mapping[str, NDArray[Any]], names: list[str], context: Callable[[], LabelContext]) -> None:
+        self._kept, self._names, self._context = kept, names, context
         self._made: dict[str, NDArray[Any]] = {}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self._names:
             return self._kept[name]
         if name not in self._made:
-            self._made[name] = channel_labels()[name].compute(self._sight())
+            self._made[name] = channel_labels()[name].compute(self._context())
         return self._made[name]
 
     def __contains__(self, name: object) -> bool:

@@ -18,7 +18,7 @@ from viewsphere.composing.composition import BoxOf
 from viewsphere.composing.redraws import redraws_frames
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels import Sight
+from viewsphere.labels import LabelContext
 from viewsphere.labels.visibility import LABEL as VISIBILITY
 from viewsphere.limits import limits
 from viewsphere.model.camera import Camera
@@ -164,8 +164,8 @@ class Framing:
             return 1.0 if recipe.wanted is None else 0.0
         views = ShotViews(shot, lambda i: self._geometry(shot, i, ring))
         view = views.view(instant, 0)
-        sight = Sight(view.geometry, view.camera, view.visibility)
-        labels = [VISIBILITY.compute(sight, thing.id - 1) for thing in wanted]
+        context = LabelContext(view.geometry, view.camera, view.visibility)
+        labels = [VISIBILITY.compute(context, thing.id - 1) for thing in wanted]
         visibility, truncation = min(o["visibility"] for o in labels), max(o["truncation"] for o in labels)
         return visibility if recipe.wanted is None else -recipe.wanted.miss(visibility, truncation)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
-from viewsphere.labels import Needs, Placement, Sight, labels
+from viewsphere.labels import LabelContext, Needs, Placement, labels
 from viewsphere.model.model_spec import ModelSpec, step_key
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4
@@ -31,8 +31,8 @@ MODELS = 200
 
 
 class ViewReconstructor:
-    """Gives the sights of a data set's samples; the last geometry, and the last sight, are kept: samples of one geometry follow
-    one another, and several ask for the same sample.
+    """The label contexts of a data set's samples. The last geometry and the last context are kept, because samples of one
+    geometry follow one another, and several callers read the same sample.
     """
 
     def __init__(self, dataset: Dataset, scenery: Scenery, models: Mapping[str, ModelInfo]) -> None:
@@ -40,7 +40,7 @@ class ViewReconstructor:
         self._mesh = lru_cache(maxsize=MODELS)(self._read)
         self._geometry: tuple[object, Geometry | None] = None, None
         self._views: tuple[object, ShotViews | None] = None, None
-        self._last: tuple[object, Sight | None] | None = None
+        self._last: tuple[object, LabelContext | None] | None = None
         self._continued = lru_cache(maxsize=4)(self._joined)
         self._keys: dict[int, str] = {}  # of the objects of the views' shot: merged data sets have names of their own
 
@@ -54,7 +54,9 @@ class ViewReconstructor:
         """The notes about changed scenery."""
         return self._scenery.notes
 
-    def of(self, sample: Sample, names: Iterable[str], asked: Iterable[str] = (), continued: bool = False) -> Sight | None:
+    def of(
+        self, sample: Sample, names: Iterable[str], asked: Iterable[str] = (), continued: bool = False
+    ) -> LabelContext | None:
         """Return the view of a sample's sensor, for labels of these names and for the labels on request in `asked`.
         It is None where scenery has changed. `continued`: labels may compare it with instants of the shots before and after.
         """
@@ -65,7 +67,7 @@ class ViewReconstructor:
             self._last = key, self._seen(sample, needs, tuple(asked), continued)
         return self._last[1]
 
-    def _seen(self, sample: Sample, needs: Sequence[Needs], asked: tuple[str, ...], continued: bool) -> Sight | None:
+    def _seen(self, sample: Sample, needs: Sequence[Needs], asked: tuple[str, ...], continued: bool) -> LabelContext | None:
         key = self._scenery.key_of(sample.index)
         made = self._continued(key) if continued else self._made(key)
         assert made is not None
@@ -79,7 +81,7 @@ class ViewReconstructor:
         visibility = rasterize(geometry, camera, keeps_exact=True)
         annotations = tuple(dict.fromkeys((*shot.annotations, *asked)))
         views = self._compared(key, sample, shot, around, (*needs, *(labels()[name].needs for name in shot.annotations)))
-        return Sight(geometry, camera, visibility, placed, views, annotations, shot.labels)
+        return LabelContext(geometry, camera, visibility, placed, views, annotations, shot.labels)
 
     def _made(self, key: str) -> _Made | None:
         shot = self._scenery.shot(key)

@@ -19,7 +19,7 @@ from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
 from viewsphere.geometry.box import box_size, box_vertices
-from viewsphere.labels import annotated, labels, observe, sample_values, sight_of
+from viewsphere.labels import annotated, context_of, labels, observe, sample_values
 from viewsphere.model.channel import PASSES
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
 from viewsphere.model.sample import Float, Origin, Sample
@@ -208,8 +208,8 @@ def render_sample(
         observed |= stage.paint(instant, sensor, painted, passes)
     steps = [thing.motion.step_at(instant) for thing in shot.objects]
     files = [model_files(p.model.key, step and step.frame)[0] for p, step in zip(shot.objects, steps, strict=True)]
-    sight = sight_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, around, traits)
-    objects = annotated(sight)
+    context = context_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, around, traits)
+    objects = annotated(context)
     return Sample(
         index=number,
         split=now.split,
@@ -225,7 +225,7 @@ def render_sample(
         time=now.seconds,
         origin=Origin(instant, sensor, shot),
         requested=shot.annotations,
-        extra=sample_values(sight, objects),
+        extra=sample_values(context, objects),
         options=shot.labels,
     )
 

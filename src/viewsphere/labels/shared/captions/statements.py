@@ -18,7 +18,7 @@ from viewsphere.labels.shared.placement import ModelFacts
 from viewsphere.model.sample import ObjectAnnotation
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import Sight
+    from viewsphere.labels.shared.context import LabelContext
 
 SEEN = 16
 """Visible pixels from which on an object is told of, if enough of it is visible."""
@@ -61,21 +61,21 @@ Words = tuple[str, str]
 Truths = NDArray[np.bool_]
 
 
-def words_of(sight: Sight) -> Mapping[int, Words]:
+def words_of(context: LabelContext) -> Mapping[int, Words]:
     """For each id the words for what the object looks like, as the shot paints it."""
 
     def all_words() -> Mapping[int, Words]:
-        if sight.around is None:
+        if context.around is None:
             raise ValueError("expected a sample of a shot, whose materials are known; found none")
         found = dict[int, Words]()
-        for thing in sight.around.shot.objects:
-            place = sight.placements[thing.id - 1]
+        for thing in context.around.shot.objects:
+            place = context.placements[thing.id - 1]
             looks = place and place.facts.looks
             color, material = words(looks, thing.repaints) if looks else (None, None)
             found[thing.id] = color or "", material or ""
         return found
 
-    return sight.once("looks", all_words)
+    return context.once("looks", all_words)
 
 
 def is_told(o: ObjectAnnotation, least: float) -> bool:
