@@ -145,15 +145,16 @@ class Modules:
 
     def _implied(self) -> dict[str, set[str]]:
         """By the module that loads them: the plug-ins that a recipe means without naming them, and the program for Blender."""
-        samplers, worker = (
+        samplers, readers, worker = (
             {module for module in self.all if module.startswith(f"{package}.")}
-            for package in (SEAMS["samplers"].package, "viewsphere.blender.worker")
+            for package in (SEAMS["samplers"].package, SEAMS["readers"].package, "viewsphere.blender.worker")
         )
         defaults = self.plugins[Shot.model_fields["engine"].default].union(
             *(self.plugins[name] for name in DEFAULT_CHANNELS if name not in PICTURES)
         )
         return {
             "viewsphere.planning.plan": samplers,
+            "viewsphere.assets.readers": readers,
             "viewsphere.planning.checks.models": defaults,
             "viewsphere.run.shots.stages": defaults,
             "viewsphere.blender.process": worker,

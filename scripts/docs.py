@@ -13,11 +13,11 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from enum import Enum
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 import site_links
@@ -25,6 +25,7 @@ from figures import FIGURES, HISTORY
 from typer.models import ArgumentInfo
 
 from viewsphere import plugins
+from viewsphere.assets import readers as model_readers
 from viewsphere.cli.commands import app
 from viewsphere.labels import ChannelLabel, Field, Label, ObjectLabel, SampleLabel, channels, labels, object_labels, on_request
 from viewsphere.limits import table
@@ -229,6 +230,20 @@ def plugins_page() -> str:
     return text
 
 
+KINDS = re.compile(r"(<!-- kinds of model files, written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
+
+
+def model_files_page() -> str:
+    """The hand-written page with a table of what each reader reads."""
+    rows = "".join(
+        f"| {reader.about} | {', '.join(reader.axes) if reader.axes else 'from the file'} | {reader.unit} |\n"
+        for name, reader in sorted(model_readers.readers().items(), key=lambda item: item[1].about.lower())
+        if not plugins.is_third_party("readers", name)
+    )
+    table = "\n| Kind | Up, front | Unit |\n|---|---|---|\n" + rows
+    return KINDS.sub(lambda found: found[1] + table, (DOCS / "formats-in.md").read_text("utf-8"))
+
+
 FIELDS = re.compile(r"(<!-- fields of (.+?), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
 
 
@@ -260,6 +275,8 @@ def value(default: Any) -> str:
         return f"[{', '.join(map(value, default))}]"
     if isinstance(default, str):
         return f"`{default}`"
+    if isinstance(default, Mapping):
+        return ", ".join(map(str, cast(Mapping[object, object], default)))
     return "" if default is None else str(default).lower() if isinstance(default, bool) else f"{default:g}"
 
 
@@ -462,6 +479,7 @@ PAGES = {
     "plugins.md": plugins_page,
     "proofs.md": proofs_page,
     "formats.md": partial(options_page, "formats", "formats.md"),
+    "formats-in.md": model_files_page,
     "motion.md": partial(options_page, "motions", "motion.md"),
     "layouts.md": partial(options_page, "placers", "layouts.md"),
     "recipe.md": recipe_page,

@@ -23,8 +23,10 @@ from sealing import seal_again
 from sequence_recipe import eventful_recipe
 from small import small_recipe, tree_hash
 from viewsphere import Dataset, Recipe, generate, labels, plan, plugins, render
+from viewsphere.assets.inspect import describe
+from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.check import check
-from viewsphere.errors import PluginError, RecipeError, UserError
+from viewsphere.errors import ModelError, PluginError, RecipeError, UserError
 from viewsphere.formats import coco
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exports.exporting import export
@@ -198,6 +200,7 @@ GROUPS = {
     "bounce": ("motions", "Falls from a height, and bounces."),
     "pairs": ("samplers", "Every model beside the next one, from all poses."),
     "dots": ("materials", "dots"),
+    "tri": ("readers", "Triangles as text"),
 }
 """The plug-ins of the page: their groups, and how their examples begin."""
 
@@ -403,6 +406,70 @@ def test_a_broken_package_is_listed_with_its_reason_and_breaks_nothing_else(smal
         assert check(small_dataset, rays=False, sample=0).ok
         with pytest.raises(PluginError, match=f"broken cannot be imported: {error}"):
             export(small_dataset.root, ["broken"])
+
+
+TETRAHEDRON = "0 0 0 1 0 0 0 0 1\n0 0 0 0 1 0 1 0 0\n0 0 0 0 0 1 0 1 0\n1 0 0 0 1 0 0 0 1\n"
+
+
+@pytest.fixture
+def tri(install, monkeypatch, tmp_path):
+    """Installs the page's reader; returns a function that writes a model file. Files are read in processes of their own."""
+    install("readers", "tri", EXAMPLES["Triangles as text"])
+    monkeypatch.delenv(READ_HERE)
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+
+    def write(name: str, text: str = TETRAHEDRON) -> Path:
+        file = tmp_path / "models" / name
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(text)
+        return file
+
+    return write
+
+
+def test_a_reader_is_one_file(tri, tmp_path):
+    for name in ("a.tri", "b.TRI"):
+        tri(name)
+    recipe = small_recipe(
+        models=[{"source": str(tmp_path / "models"), "category": "part"}], channels=["rgb", "instances"], formats=[]
+    )
+    samples = list(render(recipe))
+    assert {Path(sample.objects[0].model).stem for sample in samples} == {"a", "b"}
+    assert all((sample.instances > 0).any() for sample in samples)
+    report = describe(tmp_path / "models" / "a.tri")
+    assert (report.format, report.triangles, report.up) == ("tri", 4, "+z")
+
+
+def test_a_reader_of_a_third_party_has_the_sandbox_s_limits(tri, install, monkeypatch, tmp_path):
+    with pytest.raises(ModelError, match=r"text\.tri: expected nine numbers a line; found something else$"):
+        describe(tri("text.tri", "one two"))
+    monkeypatch.setenv("VIEWSPHERE_MAX_TRIANGLES", "4")
+    with pytest.raises(ModelError, match="expected at most 4 triangles"):
+        describe(tri("many.tri", TETRAHEDRON + "0 0 0 2 0 0 0 0 2\n"))
+    code = EXAMPLES["Triangles as text"].replace("tri", "bad")
+    install("readers", "bad", code.replace("    lines =", "    import os\n\n    os.abort()\n    lines ="))
+    with pytest.raises(ModelError, match=r"crash\.bad: reading it crashed \(SIGABRT\)"):
+        describe(tri("crash.bad"))
+
+
+def test_files_of_a_suffix_that_viewsphere_reads_stay_its_own(install, tri):
+    code = EXAMPLES["Triangles as text"].replace('suffixes=("tri",)', 'suffixes=("obj",)')
+    install("readers", "other", code)
+    assert describe(tri("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n")).triangles == 1
+
+
+def test_a_reader_without_its_packages_names_what_to_install(install, tri):
+    code = EXAMPLES["Triangles as text"].replace('("tri",)', '("far",)')
+    install("readers", "far", code.replace("read=read", 'packages=("no_such",), install="far", read=read'))
+    with pytest.raises(ModelError, match=r"a\.far: needs no_such, which is not installed: pip install 'far'"):
+        describe(tri("a.far"))
+
+
+def test_a_reader_that_cannot_be_loaded_is_named_where_its_suffix_is_unknown(install, tri):
+    install("readers", "broken", EXAMPLES["Triangles as text"].replace("suffixes=", "sufixes="))
+    with pytest.raises(ModelError, match=r"found '\.bro'; broken cannot be loaded: see `viewsphere plugins`"):
+        describe(tri("a.bro"))
+    assert describe(tri("a.tri")).triangles == 4
 
 
 def test_any_material_is_one_that_is_shipped(tmp_path):

@@ -15,7 +15,8 @@ import pytest
 
 from deadline import DEADLINE
 from viewsphere.assets.cache import load
-from viewsphere.assets.load import BLENDER_SUFFIXES, KNOWN, PICTURE_SUFFIXES, SUFFIXES, load_model
+from viewsphere.assets.load import KNOWN, load_model
+from viewsphere.assets.readers import readers, suffixes
 from viewsphere.assets.sandbox import server as reader_process
 from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.blender.interpreter import find_blender
@@ -74,7 +75,7 @@ def has_blender():
 def kind(path):
     """The row of the broken files' table that a file belongs to."""
     suffix = path.suffix[1:].lower()
-    return KINDS.get(suffix) or ("pictures" if suffix in PICTURE_SUFFIXES else "other endings")
+    return KINDS.get(suffix) or ("pictures" if suffix in readers()["picture"].suffixes else "other endings")
 
 
 def broken_files():
@@ -93,7 +94,7 @@ def broken_rows(outcomes):
 def test_every_kind_that_is_read_is_named():
     text = " ".join(row[0] for row in table("| Kind | Up, front | Unit |")).lower()
     names = {"3mf": "3mf", "jpg": "jpeg", "tif": "tiff"}
-    assert all(names.get(suffix, suffix) in text for suffix in (*SUFFIXES, *BLENDER_SUFFIXES, *PICTURE_SUFFIXES))
+    assert all(names.get(suffix, suffix) in text for suffix in (*suffixes(), *readers()["picture"].suffixes))
 
 
 def test_axes_are_those_of_the_code(write):
@@ -123,8 +124,8 @@ def test_awkward_files_become_what_the_page_says(monkeypatch, tmp_path):
     rows = awkward_rows()
     said = table("| File | Outcome | Remark |")
     if not has_blender():
-        said = [row for row in said if Path(row[0].strip("`")).suffix[1:] not in BLENDER_SUFFIXES]
-        rows = [row for row in rows if Path(row[0]).suffix[1:] not in BLENDER_SUFFIXES]
+        said = [row for row in said if Path(row[0].strip("`")).suffix[1:] not in suffixes(by_blender=True)]
+        rows = [row for row in rows if Path(row[0]).suffix[1:] not in suffixes(by_blender=True)]
     assert [tuple(row[:2]) for row in said] == [(f"`{name}`", outcome) for name, outcome, _ in rows]
     for (name, outcome, error), (_, _, remark) in zip(rows, said, strict=True):
         if outcome == "refused":

@@ -28,9 +28,10 @@ PATCH = """
 import sys
 if "-m" in sys.orig_argv and "viewsphere.assets.sandbox.worker" in sys.orig_argv:
     import viewsphere.assets.load as load
-    def read(folder, suffix, node):
+    from types import SimpleNamespace
+    def read(folder):
 {body}
-    load._read = read
+    load._reader = lambda path: SimpleNamespace(read=read)
 """
 """A `sitecustomize` that puts another reader into the child."""
 
@@ -293,14 +294,14 @@ state = [
     *(signal.getsignal(kind) for kind in (signal.SIGUSR1, signal.SIGCHLD, signal.SIGINT)),
     *(resource.getrlimit(kind) for kind in (resource.RLIMIT_NOFILE, resource.RLIMIT_AS, resource.RLIMIT_CPU)),
     *([file for file in range(64) if os.path.exists(f"/proc/self/fd/{file}")], os.readlink("/proc/self/fd/0")),
-    *(numpy.geterr(), threading.active_count(), load.SUFFIXES, os.getpgid(0) == os.getppid()),
+    *(numpy.geterr(), threading.active_count(), load.KNOWN, os.getpgid(0) == os.getppid()),
 ]
 """.strip().splitlines()
 """The state that a file could leave behind for the next, as a reader sees it."""
 
 SPOIL = """
 load.left = numpy.left = sys.left = os.environ["LEFT"] = "left"
-load.SUFFIXES = ()
+load.KNOWN = {}
 os.chdir("/")
 sys.path.append("/left")
 sys.setrecursionlimit(400)

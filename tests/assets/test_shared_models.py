@@ -11,8 +11,9 @@ import trimesh
 
 from quick import quick
 from viewsphere.assets.exporting.export import export_glb, export_obj
-from viewsphere.assets.load import SUFFIXES, load_model
+from viewsphere.assets.load import load_model
 from viewsphere.assets.normalise import normalise
+from viewsphere.assets.readers import suffixes
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 
@@ -22,7 +23,7 @@ FILES = sorted(
     path.relative_to(MODELS).as_posix()
     for folder in FOLDERS
     for path in (MODELS / folder).rglob("*")
-    if path.suffix[1:].lower() in SUFFIXES
+    if path.suffix[1:].lower() in suffixes(by_blender=False)
 )
 LARGE = {"scene/street_assembled.glb", "awkward/1500_instances_unicode_names.glb"}
 NO_NUMBERS = "awkward/number_formats.obj"  # not all of its words are numbers

@@ -230,13 +230,14 @@ scene:
 
 
 def _model(path: Path) -> None:
-    from viewsphere.assets.load import SUFFIXES, load_model
+    from viewsphere.assets.load import load_model
     from viewsphere.assets.normalise import normalise
+    from viewsphere.assets.readers import suffixes
     from viewsphere.model.model_spec import ModelSpec
 
     spec = ModelSpec(key="model", source=str(path), category="model", category_id=1)
     raw, facts = load_model(path)
-    assert path.suffix[1:] not in SUFFIXES or len(raw.triangles)
+    assert path.suffix[1:] not in suffixes(by_blender=False) or len(raw.triangles)
     mesh = normalise(raw, facts, spec)
     assert np.isfinite(mesh.vertices).all()
     assert mesh.triangles.min() >= 0

@@ -221,7 +221,7 @@ def test_keys_of_very_long_names_are_shortened_and_stay_distinct(build):
 def test_folders_and_patterns_mean_usd_files_where_they_are_read_without_blender(tmp_path, monkeypatch, is_installed):
     for name in ("a.obj", "b.usda", "c.USDZ", "d.fbx"):
         (tmp_path / name).touch()
-    monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: is_installed)
+    monkeypatch.setattr("viewsphere.assets.readers.missing", lambda reader: [] if is_installed else [*reader.packages])
     expected = ["a.obj", "b.usda", "c.USDZ"] if is_installed else ["a.obj"]
     for source in (".", "*"):
         assert sorted(file.name for file in models._matching(tmp_path, source, "models[0]")) == expected

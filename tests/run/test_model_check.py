@@ -184,8 +184,8 @@ def test_usd_models_need_blender_only_without_usd_core(folder, monkeypatch):
 
     (folder / "house.usda").write_text("#usda 1.0\n")
     monkeypatch.setattr("viewsphere.blender.interpreter.find_blender", none)
-    monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: True)
+    monkeypatch.setattr("viewsphere.assets.readers.missing", lambda reader: [])
     assert planned(folder, '"*.obj"', "house.usda").frames == 2
-    monkeypatch.setattr("viewsphere.assets.readers.usd.is_available", lambda: False)
+    monkeypatch.setattr("viewsphere.assets.readers.missing", lambda reader: [*reader.packages])
     with pytest.raises(MissingExtraError, match="no Blender here"):
         planned(folder, '"*.obj"', "house.usda")

@@ -160,12 +160,15 @@ def test_ids_and_depth_on_procedural_scenes(name):
 
 def real_models(count):
     """Normalised to 2 m long; files that cannot be read are somebody else's test."""
-    from viewsphere.assets.load import SUFFIXES, load_model
+    from viewsphere.assets.load import load_model
     from viewsphere.assets.normalise import normalise
+    from viewsphere.assets.readers import suffixes
     from viewsphere.errors import ModelError
     from viewsphere.model.model_spec import ModelSpec
 
-    found = {f: sorted(p for p in (MODELS / f).rglob("*") if p.suffix[1:].lower() in SUFFIXES) for f in FOLDERS}
+    found = {
+        f: sorted(p for p in (MODELS / f).rglob("*") if p.suffix[1:].lower() in suffixes(by_blender=False)) for f in FOLDERS
+    }
     meshes = {}
     for i in range(max(map(len, found.values()))):
         for folder in FOLDERS:

@@ -21,7 +21,7 @@ from typing import Any
 
 from viewsphere import plugins
 from viewsphere.aside import aside, temporary
-from viewsphere.assets.load import check_source
+from viewsphere.assets.load import check_source, suffix_of
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh, unpacked
 from viewsphere.assets.metadata.part_points import part_points
@@ -29,6 +29,7 @@ from viewsphere.assets.normalise import normalise, placed
 from viewsphere.assets.parts import taken
 from viewsphere.assets.paths.inside import split_source
 from viewsphere.assets.primitive import FileFacts, extents
+from viewsphere.assets.readers import third_party_sources
 from viewsphere.assets.sandbox.client import read_apart
 from viewsphere.caches import cache_of
 from viewsphere.caches.entries import SUFFIX, publish, read_entry, sweep_once, write_entry
@@ -144,7 +145,8 @@ def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) 
             own = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return ask()[0]
-    name = hashlib.sha256(f"{readers_digest()} {about} {path.name} {own}".encode()).hexdigest()
+    sources = " ".join(hashlib.sha256(read_bytes(source)).hexdigest() for source in third_party_sources(suffix_of(path)))
+    name = hashlib.sha256(f"{readers_digest()} {sources} {about} {path.name} {own}".encode()).hexdigest()
     entry = _named(cache_folder(), name)
     held = read_entry(entry)
     with suppress(ValueError, TypeError, KeyError):
@@ -206,6 +208,8 @@ def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec, frame: i
         raise FileNotFoundError(path)
     digest = hashlib.sha256(readers_digest().encode())
     digest.update(f"{frame} {spec.model_dump_json(include=set(SETTINGS))}".encode())
+    for source in third_party_sources(suffix_of(path)):
+        digest.update(read_bytes(source))
     digest.update(path.suffix.lower().encode() + path.name.encode() + b"\0".join(text.encode() for text in inside))
     with open_file(path) as file:
         digest.update(hashlib.file_digest(file, "sha256").digest())

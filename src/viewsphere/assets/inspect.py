@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from viewsphere.assets.cache import ZOO, Build, in_file, load
-from viewsphere.assets.load import PICTURE_SUFFIXES
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.metadata.traits import found_symmetries, traits_of
 from viewsphere.assets.normalise import axes
 from viewsphere.assets.primitive import FileFacts
+from viewsphere.assets.readers import reader_of
 from viewsphere.assets.timeline import Timeline, animation_of
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
@@ -131,6 +131,7 @@ def _unusual(material: Material) -> dict[str, Any]:
 
 def _suggestions(spec: ModelSpec, facts: FileFacts, size: Size) -> tuple[str, ...]:
     width, height, length = size
+    reader = reader_of(facts.format)
     said: list[str] = []
     if spec.scale == "as_is" and spec.unit is None:
         longest = max(size)
@@ -138,9 +139,9 @@ def _suggestions(spec: ModelSpec, facts: FileFacts, size: Size) -> tuple[str, ..
             said.append(f"{longest:.4g} m across: set unit: 0.001 if the file is in millimetres, 0.01 if in centimetres")
         elif longest < 0.01:
             said.append(f"{longest:.4g} m across: set unit (metres in one unit of the file) or scale")
-    if spec.forward is None and width > 1.5 * length and facts.format not in PICTURE_SUFFIXES:
+    if spec.forward is None and width > 1.5 * length and not (reader and reader.is_picture):
         sideways = next(f"+{axis}" for axis in "xyz" if axis not in (facts.forward[1], (spec.up or facts.up)[1]))
         said.append(f"wider than long: if the picture shows its side at the front, set forward: {sideways} or its opposite")
-    if spec.up is None and facts.format in {"obj", "ply", "stl", "off"} and height > 2 * max(width, length):
+    if spec.up is None and reader and reader.assumes_up and height > 2 * max(width, length):
         said.append(f"the format does not say which way is up, {facts.up} was assumed: set up if it lies on its back")
     return tuple(said)

@@ -1,10 +1,10 @@
-"""A file's timeline: that of a glTF file is read here, all others are asked from Blender. Answers are cached until the file, or
-a file that it names, changes.
+"""A file's timeline, from its reader, or else from Blender. Answers are cached until the file, or a file that it names,
+changes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +12,11 @@ from typing import Any
 
 from viewsphere.assets.cache import kept
 from viewsphere.assets.clip import Clip, Timeline
-from viewsphere.assets.load import ANIMATED_SUFFIXES, GLTF, USD, check_animated, needs_blender
+from viewsphere.assets.load import animated_reader, suffix_of
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.paths.inside import split_source
+from viewsphere.assets.readers import reader_of
 from viewsphere.assets.readers.blender.reading import asked, read_named, remember_layers, started
-from viewsphere.assets.readers.gltf.animation import timeline
-from viewsphere.assets.readers.gltf.document import Document
 from viewsphere.assets.sandbox.client import timeline_apart
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import ModelError
@@ -44,7 +43,7 @@ class Blenders:
     def told(self, path: Path, confined: bool, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
         """The answer to a request about a file, cached or from Blender; ModelError in one line when Blender has no answer."""
         file = split_source(path)[0]
-        check_animated(file)
+        animated_reader(file)
 
         def ask() -> tuple[dict[str, Any], list[Path]]:
             folder = ModelFolder(file, confined)
@@ -59,18 +58,9 @@ class Blenders:
         second, by default as many as the file says.
         """
         file = split_source(path)[0]
-        if check_animated(file) in GLTF:
-            told = kept(file, f"timeline here {clip} {fps}", lambda: self._of_gltf(file, confined, clip, fps))
-        else:
-            told = self.told(path, confined, "timeline", {"clip": clip, "fps": fps})
-        return _timeline_of(told)
-
-    def _of_gltf(
-        self, file: Path, confined: bool, clip: str | None, fps: float | None
-    ) -> tuple[dict[str, Any], Sequence[Path]]:
-        """The timeline of a glTF file, and the files that hold it."""
-        folder = ModelFolder(file, confined)
-        return timeline(Document.read(folder), clip, fps), tuple(folder.files)
+        if animated_reader(file).timeline is not None:
+            return _timeline_apart(file, confined, clip, fps)
+        return _timeline_of(self.told(path, confined, "timeline", {"clip": clip, "fps": fps}))
 
     def _asked(self, folder: ModelFolder, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
         place = folder.model.parent.resolve(), folder.confined
@@ -91,27 +81,26 @@ def _timeline_of(told: Mapping[str, Any]) -> Timeline:
     return Timeline(told["first"], told["last"], told["fps"], told["moves"], tuple(Clip(**clip) for clip in told["clips"]))
 
 
+def _timeline_apart(file: Path, confined: bool, clip: str | None = None, fps: float | None = None) -> Timeline:
+    """The timeline that a file's own reader reads."""
+    about = f"timeline apart {confined} {clip} {fps}"
+    return _timeline_of(kept(file, about, lambda: timeline_apart(file, confined, clip, fps)))
+
+
 def animation_of(path: Path, confined: bool) -> Timeline | None:
-    """The timeline of a file in which something moves, None for any other. Blender reads those of files that may move; of USD
-    files, usd-core where it is installed.
+    """The timeline of a file in which something moves, None for any other. Blender reads those of which no reader
+    has the timeline.
 
     Raises ModelError where Blender has no answer, or there is none.
     """
     file = split_source(path)[0]
-    if not _may_move(ModelFolder(file, confined)):
+    suffix = suffix_of(file)
+    reader = reader_of(suffix)
+    if reader is not None and reader.timeline is not None:
+        line = _timeline_apart(file, confined)
+    elif reader_of(suffix, moving=True) is None:
         return None
-    suffix = file.suffix[1:].lower()
-    if suffix in USD and not needs_blender(suffix):
-        line = _timeline_of(kept(file, f"timeline by usd-core {confined}", lambda: timeline_apart(file, confined)))
-        return line if line.moves else None
-    with Blenders.none_yet() as blenders:
-        line = blenders.timeline(path, confined)
+    else:
+        with Blenders.none_yet() as blenders:
+            line = blenders.timeline(path, confined)
     return line if line.moves else None
-
-
-def _may_move(folder: ModelFolder) -> bool:
-    """Return whether the format has animations and, of glTF, whose JSON is read here, the file has."""
-    kind = folder.model.suffix[1:].lower()
-    if kind not in GLTF:
-        return kind in ANIMATED_SUFFIXES
-    return bool(list(Document.read(folder).root.items("animations")))

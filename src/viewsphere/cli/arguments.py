@@ -109,11 +109,11 @@ FormatOptions = Annotated[
 
 def load_recipe(file: Path, changes: Sequence[str] | None = None) -> Recipe:
     """The recipe of a file with some fields set; RecipeError names every mistake."""
-    from viewsphere.assets.load import BLENDER_SUFFIXES, SUFFIXES
+    from viewsphere.assets.readers import suffixes
     from viewsphere.recipe.extends import parse_change
     from viewsphere.recipe.recipe import Recipe
 
-    if file.suffix.lower()[1:] in (*SUFFIXES, *BLENDER_SUFFIXES):
+    if file.suffix.lower()[1:] in suffixes():
         raise UserError(
             f"{file}: expected a recipe (YAML); found a model: look at it (viewsphere inspect {file}), or name it as "
             "source in a recipe (viewsphere new FOLDER)"

@@ -11,7 +11,6 @@ from viewsphere.errors import UserError
 from viewsphere.kernels.garbage import pause_collection
 
 RECIPES = ("[!.]*.yaml", "[!.]*.yml", "[!.]*/recipe.yaml", "recipes/*.yaml")
-MODELS = tuple(f"{folder}[!.]*.{suffix}" for folder in ("", "[!.]*/") for suffix in ("glb", "gltf", "obj", "ply", "stl"))
 
 
 class Command(TyperCommand):
@@ -34,7 +33,7 @@ def for_command(name: str) -> str:
         case "new":
             return "new: expected a folder for the recipe; found none\nit need not exist; next: viewsphere new cars"
         case "inspect":
-            model = next(iter(_near(*MODELS)), "zoo:car")
+            model = next(iter(_near(*_models())), "zoo:car")
             here = "no model at hand? the zoo has some" if model == "zoo:car" else f"found {model} here"
             return f"inspect: expected a model; found none\n{here}; next: viewsphere inspect {model}"
         case "plan" | "preview":
@@ -51,6 +50,13 @@ def for_command(name: str) -> str:
             return f"export: expected a data set and --format; found none\n{found}; next: viewsphere export {folder} -f coco"
         case _:
             return f"{name}: expected a data set; found none\n{found}; next: viewsphere {name} {folder}"
+
+
+def _models() -> tuple[str, ...]:
+    """Patterns of model files in this folder and those below."""
+    from viewsphere.assets.readers import suffixes
+
+    return tuple(f"{folder}[!.]*.{suffix}" for folder in ("", "[!.]*/") for suffix in suffixes(by_blender=False))
 
 
 def for_render(given: Path | None, output: Path | None) -> str:

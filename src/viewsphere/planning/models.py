@@ -15,8 +15,9 @@ from itertools import chain
 from pathlib import Path
 from typing import Literal
 
-from viewsphere.assets.load import BLENDER_SUFFIXES, UP, check_source, needs_blender
+from viewsphere.assets.load import check_source, needs_blender
 from viewsphere.assets.paths.inside import split_source
+from viewsphere.assets.readers import reader_of, suffixes
 from viewsphere.composing.scene.entries_walked import below, matching, named
 from viewsphere.composing.seeds import generator, share
 from viewsphere.composing.tables import Cells, table_rows
@@ -31,9 +32,6 @@ from viewsphere.recipe.models import ZOO, Dimensions, Length, ModelEntry, SizeTa
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import Category
 from viewsphere.zoo import things
-
-MODEL_SUFFIXES = frozenset({".obj", ".glb", ".gltf", ".ply", ".stl", ".off", ".dae", ".3mf"})
-"""Endings that folders and patterns are searched for; others are found by patterns that end in them, as `cars/*.fbx` does."""
 
 ANY = "any"
 """Stands for every family of the zoo whose members are things."""
@@ -123,7 +121,7 @@ def files_below(folder: Path) -> Iterator[tuple[str, int, str]]:
     """Of the model files in a folder and those below: a pattern of each folder and suffix, how many files it names, and their
     folder's name in words; those that only Blender reads are among them.
     """
-    endings = MODEL_SUFFIXES | {f".{suffix}" for suffix in BLENDER_SUFFIXES}
+    endings = {f".{suffix}" for suffix in suffixes()}
     found = (file for file in _shown(folder, "new") if file.suffix.lower() in endings and file.is_file())
     groups = Counter((file.parent, file.suffix) for file in found)
     for (parent, suffix), count in sorted(groups.items()):
@@ -151,7 +149,8 @@ def _check_file(entry: ModelEntry, found: _Found) -> None:
         from viewsphere.blender.interpreter import find_blender
 
         find_blender()
-    up = UP.get(suffix)
+    reader = reader_of(suffix)
+    up = reader.axes[0][1] if reader is not None and reader.axes is not None else None
     if up and entry.up is None and entry.forward is not None and entry.forward[1] == up:
         raise RecipeError(
             f"{where}.forward: {entry.forward} lies along +{up}, which is up in {suffix} files. Set `up:`, too, or another "
@@ -288,7 +287,8 @@ def left_out(recipe: Recipe) -> Iterator[str]:
 def _matching(folder: Path, source: str, where: str) -> list[Path]:
     path = _path(folder, source)
     found = _candidates(folder, source, where)
-    matches = found if found == [path] else [f for f in found if f.suffix.lower() in _wanted(path) and f.is_file()]
+    wanted = _wanted(path)
+    matches = found if found == [path] else [f for f in found if f.suffix.lower() in wanted and f.is_file()]
     if not matches:
         endings, unread = ", ".join(sorted(_read_here())), _unread(folder, source, where)
         hint = f"; {_naming(folder, unread)}" if unread else ""
@@ -304,8 +304,8 @@ def _normal(path: Path) -> Path:
 def _unread(folder: Path, source: str, where: str) -> set[Path]:
     """Files that only Blender reads, which a folder or a pattern means but leaves out."""
     path = _path(folder, source)
-    others = frozenset(f".{suffix}" for suffix in BLENDER_SUFFIXES) - _wanted(path)
-    if has_magic(source) and path.suffix.lower() in MODEL_SUFFIXES:
+    others = {f".{suffix}" for suffix in suffixes(by_blender=True)} - _wanted(path)
+    if has_magic(source) and path.suffix.lower() in _read_here():
         return set()  # every file that such a pattern means ends as it does
     found = _candidates(folder, source, where)
     unread = () if found == [path] else (f for f in found if f.suffix.lower() in others and f.is_file())
@@ -342,12 +342,12 @@ def _candidates(folder: Path, source: str, where: str) -> list[Path]:
 def _wanted(path: Path) -> Set[str]:
     """Endings of the files that a folder or a pattern means."""
     ending = path.suffix.lower()
-    return {ending} if ending[1:] in BLENDER_SUFFIXES else _read_here()
+    return {ending} if needs_blender(ending[1:]) else _read_here()
 
 
 def _read_here() -> Set[str]:
     """Endings of the model files that are read without Blender: USD too where its package is installed."""
-    return MODEL_SUFFIXES | {f".{suffix}" for suffix in BLENDER_SUFFIXES if not needs_blender(suffix)}
+    return {f".{suffix}" for suffix in suffixes(by_blender=False)}
 
 
 def _is_hidden(name: str) -> bool:

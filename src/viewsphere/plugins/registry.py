@@ -25,7 +25,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 from viewsphere.errors import PluginError, UserError
 
-Kind = Literal["engines", "formats", "labels", "materials", "motions", "placers", "samplers"]
+Kind = Literal["engines", "formats", "labels", "materials", "motions", "placers", "readers", "samplers"]
 
 
 class Specified(Protocol):
@@ -54,6 +54,7 @@ SEAMS: dict[Kind, Seam] = {
     "materials": Seam("viewsphere.materials", "MATERIAL"),
     "motions": Seam("viewsphere.composing.motion", "MOTION"),
     "placers": Seam("viewsphere.composing.placing", "PLACER"),
+    "readers": Seam("viewsphere.assets.readers", "READER"),
     "samplers": Seam("viewsphere.planning.samplers", "SAMPLER"),
 }
 

@@ -2,8 +2,9 @@
 
 import pytest
 
-from viewsphere.assets.load import SUFFIXES, load_model
+from viewsphere.assets.load import load_model
 from viewsphere.assets.paths.impostor import impostor
+from viewsphere.assets.readers import suffixes
 from viewsphere.errors import ModelError
 
 LFS = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a2146\nsize 1234567\n"
@@ -22,7 +23,7 @@ IMPOSTORS = {
 }
 
 
-@pytest.mark.parametrize("suffix", [*SUFFIXES, "fbx", "usdz", "blend"])
+@pytest.mark.parametrize("suffix", suffixes())
 @pytest.mark.parametrize("kind", IMPOSTORS)
 def test_every_reader_names_what_a_file_is_instead(write, suffix, kind):
     data, reason = IMPOSTORS[kind]

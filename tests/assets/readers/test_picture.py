@@ -7,7 +7,8 @@ import pytest
 from PIL import Image
 
 from viewsphere.assets.cache import load_normalised
-from viewsphere.assets.load import PICTURE_SUFFIXES, load_model
+from viewsphere.assets.load import load_model
+from viewsphere.assets.readers import readers
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 
@@ -25,7 +26,7 @@ def rgba(alpha):
     return np.dstack([np.full((*alpha.shape, 3), 200, np.uint8), alpha])
 
 
-@pytest.mark.parametrize("suffix", PICTURE_SUFFIXES)
+@pytest.mark.parametrize("suffix", readers()["picture"].suffixes)
 def test_every_kind_is_a_plane_in_front(write, suffix):
     quarters = np.zeros((20, 40, 3), np.uint8)
     quarters[:10, :20], quarters[:10, 20:], quarters[10:, :20] = (255, 0, 0), (0, 255, 0), (0, 0, 255)
@@ -100,7 +101,7 @@ def test_what_shows_nothing_is_refused(write, data, said):
 
 
 def test_a_large_picture_is_reduced_and_keeps_its_proportions(write, monkeypatch):
-    from viewsphere.assets.readers import picture
+    from viewsphere.assets.readers.picture import reading as picture
 
     monkeypatch.setattr(picture, "SHARPEST", 16)
     shades = np.repeat(np.arange(40, dtype=np.uint8) * 6, 20).reshape(40, 20)

@@ -313,7 +313,7 @@ def test_damaged_files_are_one_clear_error(write, data, suffix):
 
 
 def test_without_the_package_a_warning_names_what_blender_may_lose(write, monkeypatch):
-    monkeypatch.setattr("viewsphere.assets.readers.usd.find_spec", lambda _: None)
+    monkeypatch.setattr("viewsphere.assets.readers.find_spec", lambda _: None)
     warned = list[str]()
     monkeypatch.setattr(
         "viewsphere.assets.readers.blender.reading.read_via_blender", lambda folder: warned.extend(folder.warnings)

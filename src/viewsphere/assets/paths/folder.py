@@ -42,8 +42,9 @@ class UnreadableError(Exception):
 class ModelFolder:
     """The folder of one model file while it is read.
 
-    `inside` is the part of the file that is read (`inside.split_source`); `shown` are objects of the file that count though
-    renders do not show them; `files` are all files read or looked for, the model itself first; `warnings` say what had to be
+    `inside` is the part of the file that is read (`inside.split_source`), and so is `node`, of a glTF file; `shown` are objects
+    of the file that count though renders do not show them; `clip` and `fps` are the animation that plays, and frames a second,
+    None for those of the file; `files` are all files read or looked for, the model itself first; `warnings` say what had to be
     left out, each with the model's file name; `images` are the textures decoded so far, in order of first use.
     """
 
@@ -53,6 +54,7 @@ class ModelFolder:
     shown: tuple[str, ...] = ()
     clip: str | None = None
     fps: float | None = None
+    node: str | None = None
     files: dict[Path, None] = field(default_factory=dict[Path, None])
     warnings: list[str] = field(default_factory=list[str])
     images: list[Image] = field(default_factory=list[Image])

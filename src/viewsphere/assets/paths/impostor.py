@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from itertools import chain
 
 from viewsphere.assets.paths.finder import PICTURES as PICTURE_ENDINGS
+from viewsphere.assets.readers import readers
 
 HEAD = 4096
 """Bytes that are looked at: a server's message or the head of a page fits."""
@@ -24,15 +26,6 @@ ARCHIVES = {
     b"\xfd7zXZ": "xz",
     b"BZh": "bzip2",
 }
-PACKED = {"3mf": "ZIP", "usdz": "ZIP", "usd": "ZIP", "blend": "gzip"}
-"""Kinds of models that are archives themselves."""
-
-MODELS = {
-    b"glTF": ("glb", "gltf"), b"ply\n": ("ply",), b"ply\r": ("ply",), b"Kaydara FBX": ("fbx",), b"BLENDER": ("blend",),
-    b"PXR-USDC": ("usdc", "usd"), b"#usda": ("usda", "usd"), b"Ogawa": ("abc",),
-}  # fmt: skip
-"""Kinds of models by their first bytes, the most usual ending first."""
-
 PICTURES = {b"\x89PNG": "PNG", b"\xff\xd8\xff": "JPEG", b"RIFF": "WebP", b"GIF8": "GIF"}
 
 
@@ -45,9 +38,9 @@ def impostor(data: bytes) -> str | None:
 def wrong_kind(data: bytes, suffix: str) -> str | None:
     """The content of a file that is no model with this suffix, by its first bytes, and the remedy; None if unknown."""
     kind = next((name for magic, name in ARCHIVES.items() if data.startswith(magic)), None)
-    if kind is not None and PACKED.get(suffix) != kind:
+    if kind is not None and all(reader.archives.get(suffix) != kind for reader in readers().values()):
         return f"a {kind} archive; unpack it and name the file in it"
-    for magic, endings in MODELS.items():
+    for magic, endings in chain.from_iterable(reader.first_bytes.items() for reader in readers().values()):
         if data.startswith(magic) and suffix not in endings:
             return f"one of another kind; rename the file so that it ends in .{endings[0]}"
     picture = next((name for magic, name in PICTURES.items() if data.startswith(magic)), None)

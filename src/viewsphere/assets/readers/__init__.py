@@ -1,1 +1,64 @@
-"""Readers of model files, one file a format."""
+"""Readers of model files, a package for each; a suffix chooses the reader."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
+
+from viewsphere import plugins
+from viewsphere.plugins.reader import ReaderSpec
+
+
+def readers() -> dict[str, ReaderSpec]:
+    """All readers by name, those of viewsphere first; no third-party reader that cannot be loaded."""
+    return _readers(plugins.names("readers"), tuple(plugins.entry_points("viewsphere.readers")))
+
+
+@lru_cache(maxsize=1)
+def _readers(_names: tuple[str, ...], _entries: tuple[metadata.EntryPoint, ...]) -> dict[str, ReaderSpec]:
+    """The readers of these names: looked up for every model, so loaded once, and again after a change of what is installed."""
+    found = plugins.loadable(ReaderSpec)
+    return dict(sorted(found.items(), key=lambda item: plugins.is_third_party("readers", item[0])))
+
+
+def reader_of(suffix: str, *, moving: bool = False) -> ReaderSpec | None:
+    """The reader of files with this suffix, without its dot, or of their animations; None if there is none."""
+    known = [one for one in readers().values() if suffix in one.suffixes and (one.frames is not None or not moving)]
+    return min(known, key=lambda one: (not is_installed(one), one.by_blender), default=None)
+
+
+def is_installed(reader: ReaderSpec) -> bool:
+    """Return whether the optional packages of a reader are installed."""
+    return not missing(reader)
+
+
+def missing(reader: ReaderSpec) -> list[str]:
+    """The optional packages of a reader that are not installed."""
+    return [name for name in reader.packages if find_spec(name) is None]
+
+
+def suffixes(*, by_blender: bool | None = None) -> tuple[str, ...]:
+    """Suffixes of model files, pictures left out, sorted: all, or those that Blender reads here (those that it does not)."""
+    known = sorted({suffix for one in readers().values() if not one.is_picture for suffix in one.suffixes})
+    if by_blender is None:
+        return tuple(known)
+    return tuple(suffix for suffix in known if _is_by_blender(suffix) == by_blender)
+
+
+def _is_by_blender(suffix: str) -> bool:
+    reader = reader_of(suffix)
+    return reader is not None and reader.by_blender
+
+
+def third_party_sources(suffix: str) -> list[Path]:
+    """The files whose change may change the models of a third party's reader; empty for readers of viewsphere."""
+    reader = reader_of(suffix)
+    name = next((name for name, one in readers().items() if one is reader), None)
+    if name is None or not plugins.is_third_party("readers", name):
+        return []
+    file = plugins.source("readers", name)
+    if file is None:
+        return []
+    return sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]

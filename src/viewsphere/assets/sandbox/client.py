@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.aside import temporary
-from viewsphere.assets.load import BLENDER_SUFFIXES, check_source
+from viewsphere.assets.load import suffix_of
 from viewsphere.assets.paths import endings
+from viewsphere.assets.readers import reader_of
 from viewsphere.assets.sandbox.server import do
 from viewsphere.assets.sandbox.worker import LOG, OUTCOME, Job, mesh_name, read
 from viewsphere.errors import ModelError
@@ -32,21 +33,32 @@ def read_apart(spec: ModelSpec, frames: Sequence[int], folder: Path) -> tuple[li
     """
     memory = limits.MAX_READ_BYTES
     seconds = limits.MAX_READ_SECONDS * (1 + len(frames))
-    by_blender = bool(frames) or check_source(Path(spec.source)) in BLENDER_SUFFIXES
-    job = Job(spec.model_dump(mode="json"), str(folder), seconds, memory, by_blender, tuple(frames))
+    reader = reader_of(suffix_of(Path(spec.source)), moving=bool(frames))
+    reserves = reader is not None and reader.reserves_memory
+    job = Job(spec.model_dump(mode="json"), str(folder), seconds, memory, reserves, tuple(frames))
     outcome = read(job) if os.environ.get(READ_HERE) == "1" else _run(job)
     if "error" in outcome:
         raise ModelError(outcome["error"])
     return [folder / mesh_name(i) for i in range(max(len(frames), 1))], [Path(file) for file in outcome["files"]]
 
 
-def timeline_apart(path: Path, confined: bool) -> tuple[dict[str, Any], list[Path]]:
-    """The timeline of a USD file, which usd-core reads in a short-lived process, and the files that it names; otherwise as
+def timeline_apart(path: Path, confined: bool, clip: str | None, fps: float | None) -> tuple[dict[str, Any], list[Path]]:
+    """The timeline of a file, which its reader reads in a short-lived process, and the files that it names; otherwise as
     `read_apart`.
     """
-    spec = ModelSpec(key="timeline", source=str(path), category="model", category_id=1, confined=confined)
+    spec = ModelSpec(
+        key="timeline", source=str(path), category="model", category_id=1, confined=confined, clip=clip, fps=fps
+    )  # fmt: skip
+    reader = reader_of(suffix_of(path))
     with temporary("reading") as folder:
-        job = Job(spec.model_dump(mode="json"), str(folder), limits.MAX_READ_SECONDS, limits.MAX_READ_BYTES, is_timeline=True)
+        job = Job(
+            spec.model_dump(mode="json"),
+            str(folder),
+            limits.MAX_READ_SECONDS,
+            limits.MAX_READ_BYTES,
+            reader is not None and reader.reserves_memory,
+            is_timeline=True,
+        )
         outcome = read(job) if os.environ.get(READ_HERE) == "1" else _run(job)
     if "error" in outcome:
         raise ModelError(outcome["error"])

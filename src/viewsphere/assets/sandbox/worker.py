@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any, Self
@@ -44,30 +45,24 @@ IMPORTED = (
     "viewsphere.assets.load",
     "viewsphere.assets.mesh_file",
     "viewsphere.assets.normalise",
-    "viewsphere.assets.readers.obj.reading",
-    "viewsphere.assets.readers.gltf",
-    "viewsphere.assets.readers.picture",
-    "viewsphere.assets.readers.dae.reading",
-    "viewsphere.assets.readers.off",
-    "viewsphere.assets.readers.ply.reading",
-    "viewsphere.assets.readers.stl",
-    "viewsphere.assets.readers.threemf.reading",
 )
-"""Modules that are imported before the first fork: always the same, so that memory limits leave each file equal room."""
+"""Modules that are imported before the first fork, with those of the readers: always the same, so that memory limits leave each
+file equal room.
+"""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A model to read (a ModelSpec's fields), the folder for the result, limits of seconds and bytes, and if Blender reads it.
-    `frames` of its animation, which ascend, are read; none: the file as it stands. With `is_timeline`, only the timeline of a
-    USD file is read.
+    """A model to read (a ModelSpec's fields), the folder for the result, limits of seconds and bytes, and whether its reader
+    reserves more memory than it writes to. `frames` of its animation, which ascend, are read; none: the file as it stands.
+    With `is_timeline`, only the timeline of the file is read.
     """
 
     spec: dict[str, Any]
     folder: str
     seconds: float
     memory: int
-    by_blender: bool = False
+    reserves_memory: bool = False
     frames: tuple[int, ...] = ()
     is_timeline: bool = False
 
@@ -100,6 +95,7 @@ def _serve() -> None:
     os.dup2(2, 1)  # whatever modules print is no answer
     for name in IMPORTED:
         import_module(name)
+    _import_readers()
     gc.collect()
     gc.freeze()  # forked processes need not copy pages that the collector would write to
     ended, wake = os.pipe()
@@ -118,6 +114,15 @@ def _serve() -> None:
             _do(job)
         os.write(answers, f"{_exit_code(child, ended)}\n".encode())
     os._exit(0)
+
+
+def _import_readers() -> None:
+    """Import the modules of all readers; one that cannot be imported is an error of the files that need it."""
+    from viewsphere.assets.readers import readers
+
+    for name in chain.from_iterable(reader.modules for reader in readers().values()):
+        with suppress(Exception):
+            import_module(name)
 
 
 def _noted(number: int, frame: object) -> None:
@@ -218,13 +223,15 @@ def _read_model(spec: ModelSpec, job: Job) -> Sequence[Path]:
 
 
 def _read_timeline(spec: ModelSpec) -> dict[str, Any]:
-    """The timeline of a USD file, and the files that it names."""
+    """The timeline of a file, and the files that it names."""
+    from viewsphere.assets.load import suffix_of
     from viewsphere.assets.paths.folder import ModelFolder
-    from viewsphere.assets.readers.usd.animated import timeline
+    from viewsphere.assets.readers import reader_of
 
-    folder = ModelFolder(Path(spec.source), spec.confined)
-    told = timeline(folder)
-    return {"timeline": told, "files": [str(file) for file in folder.files]}
+    folder = ModelFolder(Path(spec.source), spec.confined, clip=spec.clip, fps=spec.fps)
+    reader = reader_of(suffix_of(folder.model))
+    assert reader is not None and reader.timeline is not None
+    return {"timeline": reader.timeline(folder), "files": [str(file) for file in folder.files]}
 
 
 def mesh_name(number: int) -> str:
@@ -256,8 +263,8 @@ def _limit(job: Job) -> None:
     import resource
 
     # Blender reserves much more memory than it writes to, and works on all cores.
-    memory = "RLIMIT_DATA" if job.by_blender else "RLIMIT_AS"
-    cores = (os.cpu_count() or 1) if job.by_blender else 1
+    memory = "RLIMIT_DATA" if job.reserves_memory else "RLIMIT_AS"
+    cores = (os.cpu_count() or 1) if job.reserves_memory else 1
     seconds = int(2 * job.seconds * cores) + 1
     wanted = {memory: job.memory, "RLIMIT_FSIZE": job.memory, "RLIMIT_CPU": seconds, "RLIMIT_CORE": 0}
     for name, most in wanted.items():

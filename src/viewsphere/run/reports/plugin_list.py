@@ -11,11 +11,12 @@ from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.material import MaterialSpec
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.placer import PlacerSpec
+from viewsphere.plugins.reader import ReaderSpec
 from viewsphere.plugins.registry import SEAMS, Kind, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.spec import Spec
 
-SPECS: tuple[type[Spec], ...] = (EngineSpec, FormatSpec, Label, MaterialSpec, MotionSpec, PlacerSpec, SamplerSpec)
+SPECS: tuple[type[Spec], ...] = (EngineSpec, FormatSpec, Label, MaterialSpec, MotionSpec, PlacerSpec, ReaderSpec, SamplerSpec)
 """The specs of all kinds."""
 
 

@@ -1,10 +1,39 @@
-"""USD files (usd, usda, usdc, usdz), read by the package usd-core of the extra `usd`: https://openusd.org."""
+"""USD files, read by the package usd-core of the extra `usd`: https://openusd.org. Blender reads their animations."""
 
 from __future__ import annotations
 
-from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+from viewsphere.plugins.reader import ReaderSpec
+
+if TYPE_CHECKING:
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.assets.paths.folder import ModelFolder
+    from viewsphere.assets.primitive import FileFacts
 
 
-def is_available() -> bool:
-    """Return whether the package that reads USD is installed."""
-    return find_spec("pxr") is not None
+def read(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+    """The model, see `scene.read_usd`."""
+    from viewsphere.assets.readers.usd.scene import read_usd
+
+    return read_usd(folder)
+
+
+def timeline(folder: ModelFolder) -> dict[str, Any]:
+    """The animation's frames, see `animated.timeline`."""
+    from viewsphere.assets.readers.usd.animated import timeline
+
+    return timeline(folder)
+
+
+READER = ReaderSpec(
+    about="USD (usd, usda, usdc, usdz)",
+    suffixes=("usd", "usda", "usdc", "usdz"),
+    timeline=timeline,
+    packages=("pxr",),
+    install="viewsphere[usd]",
+    reserves_memory=True,
+    first_bytes={b"PXR-USDC": ("usdc", "usd"), b"#usda": ("usda", "usd")},
+    archives={"usd": "ZIP", "usdz": "ZIP"},
+    read=read,
+)

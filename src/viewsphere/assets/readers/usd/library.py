@@ -1,4 +1,4 @@
-"""The modules of usd-core, which states no types. Import this module only where `is_available` holds."""
+"""The modules of usd-core, which states no types. Import it only where `pxr` is installed."""
 
 from __future__ import annotations
 
