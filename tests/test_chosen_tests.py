@@ -43,7 +43,7 @@ def chosen():
          ["tests/formats/test_tum.py"]),
         ("src/viewsphere/geometry/__init__.py", ["tests/geometry/test_curve.py"], []),
         # Blender's program; what a recipe's kind names; what notebooks call; what `python -m` runs
-        ("src/viewsphere/blender/worker/nodes.py", ["tests/blender/test_materials.py", "tests/engines/test_cycles.py"],
+        ("src/viewsphere/blender/worker/files/nodes.py", ["tests/blender/test_materials.py", "tests/engines/test_cycles.py"],
          ["tests/geometry/test_box.py"]),
         ("src/viewsphere/composing/trajectories/spline.py", ["tests/composing/test_trajectories.py"],
          ["tests/geometry/test_box.py"]),

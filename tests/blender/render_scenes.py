@@ -13,7 +13,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 sys.path.append(sys.argv[1])
-from worker import materials, meshes
+from worker.scene import materials, meshes
 
 
 def render(told, folder):

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from viewsphere.blender.worker import cores
-from viewsphere.blender.worker.cores import few_cores, some_of
+from viewsphere.blender.worker import confine
+from viewsphere.blender.worker.confine import few_cores, some_of
 
 
 @pytest.mark.parametrize("there", [{0}, {3, 5}, {0, 1, 2, 3}, set(range(8, 71))])
@@ -30,7 +30,7 @@ def test_processes_one_after_another_share_no_core_as_long_as_there_are_some(the
 @pytest.mark.parametrize("tasks", [Path("/proc/self/task"), Path("/nowhere")])
 def test_cores_are_given_back(monkeypatch, tasks):
     """Also where threads are not listed, and when loading fails."""
-    monkeypatch.setattr(cores, "TASKS", tasks)
+    monkeypatch.setattr(confine, "TASKS", tasks)
     before = os.sched_getaffinity(0)
     with pytest.raises(ImportError), few_cores(1):
         assert len(os.sched_getaffinity(0)) == 1

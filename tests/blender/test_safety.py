@@ -161,7 +161,7 @@ sys.path.append(sys.argv[2])
 from worker.__main__ import start_blender
 start_blender()
 import bpy
-from worker.opening import open_file
+from worker.files.opening import open_file
 def ran():
     render = bpy.context.scene.render
     render.engine, render.resolution_x, render.resolution_y = "CYCLES", 8, 8

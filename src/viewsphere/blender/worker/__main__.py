@@ -22,7 +22,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any, BinaryIO
 
-from .cores import few_cores
+from .confine import few_cores
 
 DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "METAL", "ONEAPI")
 ONLINE = ("socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socket.sendto", "socket.sendmsg")
@@ -147,67 +147,67 @@ def _memory(_: dict[str, Any]) -> dict[str, float | None]:
 
 
 def _stage(told: dict[str, Any]) -> Any:
-    from .staging import stage
+    from .scene.staging import stage
 
     return stage(told)
 
 
 def _paint(told: dict[str, Any]) -> Any:
-    from .staging import paint
+    from .scene.staging import paint
 
     return paint(told)
 
 
 def _read_model(told: dict[str, Any]) -> Any:
-    from .reading import read
+    from .files.reading import read
 
     return read(told)
 
 
 def _read_timeline(told: dict[str, Any]) -> Any:
-    from .reading import read_timeline
+    from .files.reading import read_timeline
 
     return read_timeline(told)
 
 
 def _read_contents(told: dict[str, Any]) -> Any:
-    from .contents import contents
+    from .files.contents import contents
 
     return contents(told)
 
 
 def _read_cameras(told: dict[str, Any]) -> Any:
-    from .cameras import read_cameras
+    from .files.cameras import read_cameras
 
     return read_cameras(told)
 
 
 def _read_places(told: dict[str, Any]) -> Any:
-    from .contents import places
+    from .files.contents import places
 
     return places(told)
 
 
 def _draw(told: dict[str, Any]) -> Any:
-    from .renderers import try_drawing
+    from .rendering.renderers import try_drawing
 
     return try_drawing(told)
 
 
 def _render(told: dict[str, Any]) -> Any:
-    from .rendering import render
+    from .rendering.frames import render
 
     return render(told)
 
 
 def _number(told: dict[str, Any]) -> Any:
-    from .settling import number
+    from .scene.settling import number
 
     return number(told)
 
 
 def _save(told: dict[str, Any]) -> Any:
-    from .saving import save
+    from .scene.saving import save
 
     return save(told)
 

@@ -1,4 +1,4 @@
-"""A shot as the plain data and arrays that Blender's worker stages (`viewsphere.blender.worker.staging`)."""
+"""A shot as the plain data and arrays that Blender's worker stages (`viewsphere.blender.worker.scene.staging`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A shot as a .blend file to open in Blender: the request to the worker's `save` (`viewsphere.blender.worker.saving`)."""
+"""A shot as a .blend file to open in Blender: the request to the worker's `save` (`viewsphere.blender.worker.scene.saving`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Materials from expressions of Blender's nodes (`viewsphere.blender.worker.nodes`): constants become factors, a picture used
+"""Materials from expressions of Blender's nodes (`blender.worker.files.nodes`): constants become factors, a picture used
 unchanged stays the texture, and an expression over pictures is baked into a new picture.
 """
 

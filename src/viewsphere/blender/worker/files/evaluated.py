@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 
 from .nodes import Reader
-from .skins import skin_of
 
 SOLID = ("MESH", "META")
 """Objects whose triangles are taken; text, curves and surfaces come as meshes when they are evaluated."""
@@ -93,7 +92,7 @@ class Gathering:
             triangles = len(mesh.loop_triangles)
             if self._count + triangles > self._most:
                 return [], triangles
-            found = self._cut(mesh, slots or list(mesh.materials), skin_of(item, mesh)), triangles
+            found = self._cut(mesh, slots or list(mesh.materials), _skin_of(item, mesh)), triangles
         finally:
             if item.type == "META":
                 item.to_mesh_clear()
@@ -253,3 +252,22 @@ def listed(names):
     names = sorted(set(names))
     more = f" and {len(names) - NAMES_SAID} more" if len(names) > NAMES_SAID else ""
     return ", ".join(map(repr, names[:NAMES_SAID])) + more
+
+
+def _skin_of(item, mesh):
+    """Names of the bones that may bend an object, in their armatures' order, and of each vertex of its evaluated mesh numbers
+    of bones and their weights, (V, K) each; None for what no armature bends.
+    """
+    rigs = [m.object for m in item.modifiers if m.type == "ARMATURE" and m.object is not None and m.use_vertex_groups]
+    groups = {group.name: group.index for group in item.vertex_groups}
+    names = list(dict.fromkeys(b.name for rig in rigs for b in rig.data.bones if b.use_deform and b.name in groups))
+    if not names:
+        return None
+    number = {groups[name]: i for i, name in enumerate(names)}
+    own = [[(number[g.group], g.weight) for g in vertex.groups if g.group in number] for vertex in mesh.vertices]
+    width = max(map(len, own), default=0)
+    bones, weights = np.zeros((len(own), width), np.int32), np.zeros((len(own), width), np.float32)
+    for i, pairs in enumerate(own):
+        for k, (bone, weight) in enumerate(pairs):
+            bones[i, k], weights[i, k] = bone, weight
+    return names, bones, weights

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import math
+
 import bpy
+import numpy as np
 from mathutils import Matrix
 
-from . import ground, lights, materials, meshes, renderers, scripting, studio
-from .blurring import ORDER
-from .scene_file import open_scene
+from ..files.scene_file import open_scene
+from ..rendering import renderers
+from ..rendering.blurring import ORDER
+from . import ground, lights, materials, meshes, scripting
+
+DARKEST = 0.6
+"""Largest share of the _light that shadows remove: Workbench darkens faces turned away from the sun as much, though the sun
+gives them nothing.
+"""
+
+TURNED = 0.05
+"""Cosine of the angle between the sun and a surface's normal below which Workbench treats the surface as shadowed."""
+
 
 NUMBER = "number"
 """Custom property of a model's mesh: the mesh's index in the request."""
@@ -28,13 +41,13 @@ def stage(told):
         kind[NUMBER] = number
     for order, item in enumerate(told["objects"]):
         _place(scene, kinds[item["mesh"]], item["matrix"], item["index"])[ORDER] = order
-    for light in told["lights"]:
-        lights.add_light(scene, light)
+    for _light in told["lights"]:
+        lights.add_light(scene, _light)
     sky = lights.add_world(scene, told["world"]) if told["world"] else None
     if told["ground"]:
         _lay_ground(scene, told["ground"], sky, made, renderer)
     if renderer == "workbench":
-        studio.light(scene.display, told["lights"], told["hemispheres"])
+        _light(scene.display, told["lights"], told["hemispheres"])
     renderers.set_up(scene, told["settings"])
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
@@ -88,3 +101,43 @@ def _place(scene, mesh, matrix, index):
     placed.pass_index = placed["id"] = index
     scene.collection.objects.link(placed)
     return placed
+
+
+def _light(display, lights, hemispheres):
+    """Light the display's studio by the sun among the `lights`, and by `hemispheres` (2, 3), the radiance of a white matt
+    surface that faces up, and of one that faces down; None leaves Blender's own studio as it is.
+    """
+    if hemispheres is None:
+        return
+    system, shading = bpy.context.preferences.system, display.shading
+    above, below = np.array(hemispheres)
+    sun = next((one for one in lights if one["kind"] == "sun"), None)
+    direct = np.zeros(3) if sun is None else np.array(sun["irradiance"]) / math.pi
+    toward = (0.0, 0.0, 1.0) if sun is None else sun["direction"]
+    system.use_studio_light_edit = True
+    least = np.minimum(above, below)
+    system.light_ambient = least.tolist()
+    for lamp in system.solid_lights:
+        lamp.use, lamp.specular_color = False, (0, 0, 0)
+    # A studio lamp of smoothness 1 gives (1 + cosine) / 4 of its colour.
+    for lamp, way, more in zip(system.solid_lights, (1.0, -1.0), (above - least, below - least), strict=False):
+        _shine(lamp, (0.0, 0.0, way), 2 * more, 1.0)
+    _shine(system.solid_lights[2], toward, direct, 0.0)
+    shading.use_world_space_lighting = True
+    shading.show_shadows = sun is not None
+    if sun is not None:
+        lit = direct.mean() * max(toward[2], 0.05)
+        shading.shadow_intensity = min(float(lit / (lit + above.mean())), DARKEST)
+        display.shadow_shift, display.shadow_focus = TURNED, 1 - TURNED
+        display.light_direction = _turned(toward)
+
+
+def _shine(lamp, toward, color, smooth):
+    lamp.use, lamp.smooth = True, smooth
+    lamp.direction, lamp.diffuse_color = _turned(toward), color.tolist()
+
+
+def _turned(direction):
+    """A direction of the world in a studio's axes."""
+    x, y, z = direction
+    return x, z, -y

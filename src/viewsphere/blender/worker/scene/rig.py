@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .playing import curves
-from .rendering import place_camera
+from ..files.playing import curves
+from ..rendering.frames import place_camera
 
 STILL = 1e-9
 """Properties that change by less are not keyed: metres, radians, millimetres or shares of the picture."""

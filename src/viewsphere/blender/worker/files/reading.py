@@ -10,14 +10,25 @@ from pathlib import Path
 
 import bpy
 
-from .evaluated import Gathering, listed
-from .marks import Marks
+from .evaluated import Gathering, listed, part_of
 from .opening import choose, open_file
 from .pictures import Pictures
 from .playing import clips, go_to, timeline
-from .points import Points
 from .scene_file import reveal
 from .weight import check_weight
+
+PREFIX = "keypoint:"
+"""Begins the name of an object that is a point; the rest is the point's name."""
+
+POINT_PROPERTY = "keypoint"
+"""The custom property that makes an object a point: its name, or true for that of the object."""
+
+
+PROPERTY = "viewsphere"
+"""The custom property that says what an object is; `width` and `closed` beside it are a lane's."""
+
+LANE = "lane"
+LINES = ("CURVE", "MESH")
 
 
 def read(told):
@@ -112,3 +123,96 @@ def prepare(scene):
     render.use_compositing = render.use_sequencer = False
     scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(scene.camera)
+
+
+class Marks:
+    """Collects the objects that have the property, or are lanes by their names: `found` tells them, in the order of names."""
+
+    def __init__(self, wanted):
+        self.found, self._wanted = [], wanted
+
+    def take(self, depsgraph):
+        """Collect all such objects of a depsgraph that are asked for."""
+        there = sorted(depsgraph.objects, key=lambda one: one.name)
+        below = {}
+        for one in there:
+            if one.parent is not None:
+                below.setdefault(one.parent.name, []).append(one)
+        for one in there:
+            is_wanted = self._wanted is None or one.original.as_pointer() in self._wanted
+            if is_wanted and (one.get(PROPERTY) is not None or one.name.lower().startswith(LANE)):
+                self.found.append(_told(one, below.get(one.name, [])))
+
+
+def _told(one, children):
+    points, edges, has_faces = _lines(one)
+    return {
+        "name": one.name,
+        "said": {name: _plain(one[name]) for name in (PROPERTY, "width", "closed") if name in one},
+        "part": part_of(one, one) if has_faces else "",
+        "points": points,
+        "edges": edges,
+        "children": [[c.name, list(c.matrix_world.translation)] for c in children if c.type == "EMPTY"],
+        "is_group": bool(children),
+    }
+
+
+def _lines(one):
+    """Points in the world, edges between them, and whether there are faces, which leave the first two empty."""
+    if one.type not in LINES:
+        return [], [], False
+    mesh = one.to_mesh()
+    try:
+        if mesh is None or len(mesh.polygons):
+            return [], [], mesh is not None
+        points = [list(one.matrix_world @ vertex.co) for vertex in mesh.vertices]
+        return points, [list(edge.vertices) for edge in mesh.edges], False
+    finally:
+        one.to_mesh_clear()
+
+
+def _plain(value):
+    return value if isinstance(value, (bool, int, float, str)) else str(value)
+
+
+class Points:
+    """Collects the points of what a render would show: `found` are names, places and the numbers of those above."""
+
+    def __init__(self, wanted):
+        self.found, self._wanted = [], wanted
+
+    def take(self, depsgraph):
+        """Collect all points of a depsgraph: objects that are asked for, in the order of their names, else bones."""
+        there = sorted(depsgraph.objects, key=lambda one: one.name)
+        said = {one.name: name for one in there if self._is_wanted(one) and (name := _said(one))}
+        self._tell([(one, said[one.name], one.matrix_world.translation) for one in there if one.name in said])
+        if not said:
+            for rig in self._rigs(there):
+                bones = [bone for bone in rig.pose.bones if bone.bone.use_deform]
+                self._tell([(bone, bone.name, rig.matrix_world @ bone.head) for bone in bones])
+
+    def _is_wanted(self, one):
+        return self._wanted is None or one.original.as_pointer() in self._wanted
+
+    def _rigs(self, there):
+        """Armatures that bend objects which are asked for."""
+        bent = [one for one in there if self._is_wanted(one) and one.type != "ARMATURE"]
+        used = {m.object.name for one in bent for m in one.modifiers if m.type == "ARMATURE" and m.object is not None}
+        return [one for one in there if one.type == "ARMATURE" and one.name in used]
+
+    def _tell(self, owners):
+        numbers = {one.name: len(self.found) + i for i, (one, _, _) in enumerate(owners)}
+        for one, name, place in owners:
+            above = one.parent
+            while above is not None and above.name not in numbers:
+                above = above.parent
+            number = None if above is None else numbers[above.name]
+            self.found.append({"name": name, "place": list(place), "above": number})
+
+
+def _said(one):
+    """The point that an object is said to be; empty for any other."""
+    said = one.get(POINT_PROPERTY)
+    if said and not isinstance(said, str):
+        return one.name.removeprefix(PREFIX)
+    return said or (one.name.removeprefix(PREFIX) if one.name.startswith(PREFIX) else "")

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import bpy
 from mathutils import Matrix
 
-from .playing import curves
+from ..files.playing import curves
 from .posing import camera_matrix
 
 STEPS = 3

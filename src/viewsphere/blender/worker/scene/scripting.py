@@ -8,10 +8,10 @@ import traceback
 import numpy as np
 from mathutils import Matrix
 
-from .blurring import ORDER
-from .contents import displaces
-from .evaluated import SOLID
-from .reading import evaluate
+from ..files.contents import displaces
+from ..files.evaluated import SOLID
+from ..files.reading import evaluate
+from ..rendering.blurring import ORDER
 
 ENTRY = "shade"
 """The function that a script defines: `shade(scene, objects, shot)`."""

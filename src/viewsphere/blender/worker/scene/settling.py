@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import bpy
 
-from .evaluated import SOLID
-from .reading import evaluate
+from ..files.evaluated import SOLID
+from ..files.reading import evaluate
 from .staging import is_placed
 
 KEPT = (

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .compositing import fault
+from ..rendering.compositing import fault
 from .evaluated import LEFT_OUT, STRANDS, listed, part_of, strands, taken
 from .opening import is_within, open_file
 from .playing import go_to

@@ -6,7 +6,7 @@ from contextlib import suppress
 
 import bpy
 
-from . import compositing
+from ..rendering import compositing
 from .opening import open_file
 from .playing import curves, go_to
 

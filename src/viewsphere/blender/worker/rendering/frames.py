@@ -13,7 +13,8 @@ import bpy
 import cycles
 import numpy as np
 
-from . import compositing, ground, passes, renderers
+from ..scene import ground
+from . import compositing, passes, renderers
 from .blurring import exposed
 from .posing import camera_matrix
 

@@ -24,7 +24,7 @@ from typing import Any
 
 import bpy
 
-from . import passes
+from ..rendering import passes
 from .graph import Graph
 from .meshes import COLORS
 from .textures import Textures

@@ -1,0 +1,1 @@
+"""Files that Blender opens: their contents, animation, cameras, and meshes as arrays."""

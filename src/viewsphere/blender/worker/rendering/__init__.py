@@ -1,0 +1,1 @@
+"""Pictures of the staged scene: renderers, passes, motion blur and the compositor."""
