@@ -201,6 +201,7 @@ GROUPS = {
     "pairs": ("samplers", "Every model beside the next one, from all poses."),
     "dots": ("materials", "dots"),
     "tri": ("readers", "Triangles as text"),
+    "ring": ("lights", "ring"),
 }
 """The plug-ins of the page: their groups, and how their examples begin."""
 
@@ -214,7 +215,7 @@ INSTALLED = """
 models: [{source: "zoo:mug", count: 3}, {source: "zoo:box", category: box}]
 viewpoints: {azimuth: [0, 40], elevation: 20, distance: 2}
 camera: {size: [96, 72], fov_deg: 40}
-scene: {ground: {material: dots}}
+scene: {ground: {material: dots}, lights: {kind: ring, position: [0, 0, 1], strength: 4}}
 channels: [rgb, instances, borders]
 formats: [csv_boxes, lines]
 splits: {by: frame, train: 1}
@@ -406,6 +407,47 @@ def test_a_broken_package_is_listed_with_its_reason_and_breaks_nothing_else(smal
         assert check(small_dataset, rays=False, sample=0).ok
         with pytest.raises(PluginError, match=f"broken cannot be imported: {error}"):
             export(small_dataset.root, ["broken"])
+
+
+RING = {"kind": "ring", "at": {"elevation": {"uniform": [40, 60]}, "distance": 2}, "strength": 9, "color": "red", "count": 2}
+
+
+def lit(*lights, **fields):
+    """A recipe without sun and sky."""
+    return small_recipe(scene={"sun": "off", "sky": {"strength": 0}, "lights": list(lights)}, formats=[], **fields)
+
+
+def test_a_light_is_one_file(install):
+    install("lights", "ring", EXAMPLES["ring"])
+    assert "ring" in plugins.names("lights")
+    dark, seen = (next(iter(render(lit(*lights)))) for lights in ((), (RING,)))
+    assert dark.rgb.max() == 0 and seen.rgb[..., 0].max() > 60 and seen.rgb[..., 1:].max() == 0
+    lights = seen.origin.shot.scene.lights
+    assert len(lights) == 16 and {light.kind for light in lights} == {"point"}
+    middles = [np.mean([light.position for light in some], axis=0) for some in (lights[:8], lights[8:])]
+    assert np.linalg.norm(middles, axis=1) == pytest.approx(2) and not np.allclose(*middles)
+    with pytest.raises(RecipeError, match=r"scene\.lights\[0\]\.widht: 'widht' is unknown; did you mean 'width'\?"):
+        lit(RING | {"widht": 1})
+    with pytest.raises(RecipeError, match=r"scene\.lights\[0\]\.kind: 'rng' is unknown; did you mean 'ring'\?"):
+        lit(RING | {"kind": "rng"})
+
+
+@pytest.mark.slow
+def test_a_light_shines_in_blender_too(install):
+    install("lights", "ring", EXAMPLES["ring"])
+    engines = ({"name": "raster", "bounces": "off"}, {"name": "cycles", "samples": 64, "bounces": 0, "denoise": "off"})
+    raster, cycles = (next(iter(render(lit(RING, engine=engine)))) for engine in engines)
+    thing = raster.instances > 0
+    assert cycles.rgb[thing][:, 0].mean() == pytest.approx(raster.rgb[thing][:, 0].mean(), rel=0.1)
+    assert cycles.rgb[..., 1:].max() == 0
+
+
+def test_a_light_without_a_kind_is_refused_by_name(install):
+    code = EXAMPLES["ring"]
+    file = install("lights", "ring", code.replace("(Placed)", "(Frozen)").replace("import Drawn", "import Drawn, Frozen"))
+    message = r"LightSpec\.options: expected a class with the fields kind, count, strength, color; found no count"
+    with pytest.raises(PluginError, match=f"^{re.escape(str(file))}: {message}"):
+        lit(RING)
 
 
 TETRAHEDRON = "0 0 0 1 0 0 0 0 1\n0 0 0 0 1 0 1 0 0\n0 0 0 0 0 1 0 1 0\n1 0 0 0 1 0 0 0 1\n"

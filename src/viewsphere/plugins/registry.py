@@ -25,7 +25,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 from viewsphere.errors import PluginError, UserError
 
-Kind = Literal["engines", "formats", "labels", "materials", "motions", "placers", "readers", "samplers"]
+Kind = Literal["engines", "formats", "labels", "lights", "materials", "motions", "placers", "readers", "samplers"]
 
 
 class Specified(Protocol):
@@ -51,6 +51,7 @@ SEAMS: dict[Kind, Seam] = {
     "engines": Seam("viewsphere.engines", "ENGINE"),
     "formats": Seam("viewsphere.formats", "FORMAT"),
     "labels": Seam("viewsphere.labels", "LABEL", "LABELS"),
+    "lights": Seam("viewsphere.recipe.lights", "LIGHT"),
     "materials": Seam("viewsphere.materials", "MATERIAL"),
     "motions": Seam("viewsphere.composing.motion", "MOTION"),
     "placers": Seam("viewsphere.composing.placing", "PLACER"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from datetime import date, timedelta
@@ -10,26 +9,17 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at as standing_at
 from viewsphere.model.mistakes import nearest, one_of, shown
-from viewsphere.model.numbers import Length, Natural, Number, Strength
+from viewsphere.model.numbers import Number, Strength
 from viewsphere.model.scene import (
-    AimedLight,
-    AreaLight,
     Daylight,
     Environment,
-    HemisphereLight,
-    Light,
-    PlacedLight,
-    PointLight,
     Sky,
-    SpotLight,
     Sun,
-    Vector,
 )
-from viewsphere.recipe.draws import Coordinate, Drawn, alternatives, is_random
+from viewsphere.recipe.draws import Drawn
 from viewsphere.recipe.entries import entry_of
 from viewsphere.recipe.values import OrShort, shape_of, switch
 
@@ -174,98 +164,3 @@ SkyField = Annotated[
     BeforeValidator(_sky),
     OrShort({"type": "string"}),
 ]
-
-
-class At(Frozen):
-    """A direction and a distance, as cameras stand."""
-
-    azimuth: Coordinate = Field(default=0.0, description="degrees, as for cameras")
-    elevation: Drawn[Annotated[float, Field(strict=True, ge=-90, le=90)]] = Field(
-        default=45.0, description="degrees above the horizon"
-    )
-    distance: Drawn[Length] = Field(description="metres")
-
-
-class _Lamp(entry_of(Light)):
-    """Base of all lamps."""
-
-    count: Drawn[Annotated[Natural, Field(le=64)]] = Field(default=1, description="number of such lamps, each drawn separately")
-
-
-class _Placed(entry_of(PlacedLight, optional=("position",)), _Lamp):
-    at: At | None = Field(default=None, description="or {azimuth, elevation, distance} from there, as for cameras")
-
-    @model_validator(mode="after")
-    def _placed(self) -> _Placed:
-        given = [name for name in ("position", "at") if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise ValueError(f"expected one of position, at; found {'both' if given else 'none'}")
-        return self
-
-
-class _Aimed(entry_of(AimedLight), _Placed):
-    """A lamp that points somewhere: two places give the direction."""
-
-    @model_validator(mode="after")
-    def _pointed(self) -> _Aimed:
-        places = (_standing(self.at),) if self.at is not None else tuple(alternatives(self.position))
-        for place in places:
-            if any(_is_one_point(place, toward) for toward in alternatives(self.toward)):
-                with standing_at("position" if self.at is None else "at"):
-                    raise ValueError(f"the lamp is at the point it is aimed at, {shown(place)}: change this place or toward")
-        return self
-
-
-def _standing(at: At) -> Any:
-    """The point (x, y, z) that `at` means, metres; None if `at` contains distributions."""
-    if is_random(at):
-        return None
-    direction = orbit_center(math.radians(at.azimuth), math.radians(at.elevation), at.distance)
-    return tuple(round(x, 9) + 0.0 for x in direction.tolist())
-
-
-def _is_one_point(a: Any, b: Any) -> bool:
-    known = isinstance(a, tuple) and isinstance(b, tuple) and not is_random(a) and not is_random(b)
-    return known and math.dist(cast(Vector, a), cast(Vector, b)) < 1e-6
-
-
-class PointEntry(entry_of(PointLight, fixed=("kind",)), _Placed):
-    """Small balls that shine everywhere."""
-
-
-class SpotEntry(entry_of(SpotLight), _Aimed):
-    """Lamps that shine into a cone."""
-
-    kind: Literal["spot"] = Field(description="a cone of light")
-
-
-class AreaEntry(entry_of(AreaLight), _Aimed):
-    """Rectangles that shine to one side."""
-
-    kind: Literal["area"] = Field(description="a rectangle that shines to one side")
-
-
-class HemisphereEntry(entry_of(HemisphereLight), _Lamp):
-    """Even light from above and from below, without shadows."""
-
-    kind: Literal["hemisphere"] = Field(description="even light from above, and another from below")
-
-
-def _kind_of_lamp(value: Any) -> Any:
-    return value.get("kind", "point") if isinstance(value, Mapping) else getattr(value, "kind", None)
-
-
-LampEntry = Annotated[
-    Annotated[PointEntry, Tag("point")]
-    | Annotated[SpotEntry, Tag("spot")]
-    | Annotated[AreaEntry, Tag("area")]
-    | Annotated[HemisphereEntry, Tag("hemisphere")],
-    Discriminator(_kind_of_lamp),
-]
-
-
-def _lights(value: Any) -> Any:
-    return [value] if isinstance(value, (Mapping, _Lamp)) else value
-
-
-LightsField = Annotated[tuple[LampEntry, ...], BeforeValidator(_lights)]

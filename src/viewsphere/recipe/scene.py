@@ -38,7 +38,8 @@ from viewsphere.recipe.finish import (
     ViewField,
     once_a_sequence,
 )
-from viewsphere.recipe.light import SKY_SUFFIXES, GradientEntry, HdriSky, HemisphereEntry, LightsField, SkyField, SunField
+from viewsphere.recipe.light import SKY_SUFFIXES, GradientEntry, HdriSky, SkyField, SunField
+from viewsphere.recipe.lights import LightsField, spec_of
 from viewsphere.recipe.scenery import CompanyEntry, CompanyField, Draw, PlaceEntry, PlaceField, PlaneEntry, PlanesField
 from viewsphere.recipe.surface import GroundEntry, GroundField, MaterialEntry
 from viewsphere.recipe.values import OrShort, pair
@@ -206,7 +207,7 @@ class SceneEntry(Frozen):
         default=GradientEntry(),
         description="ambient light: zenith, horizon and strength of a gradient, daylight, night, or an EXR or HDR file",
     )
-    lights: LightsField = Field(default=(), description="lamps: point, spot, area, hemisphere")
+    lights: LightsField = Field(default=(), description="lamps: point, spot, area, hemisphere, or your own")
     ground: Drawn[GroundField] = Field(
         default="auto",
         description="on, off, catcher, a colour, a mapping of color, image, roughness and more, or auto: on under the sky, a "
@@ -267,9 +268,10 @@ class SceneEntry(Frozen):
                 with at(name):
                     raise ValueError(f"expected no {name} beside blend, whose file has its own; found one: leave it out")
         for i, lamp in enumerate(self.lights):
-            if isinstance(lamp, HemisphereEntry):
+            if spec_of(lamp).is_sky:
+                kind = cast(Any, lamp).kind
                 with at("lights", i):
-                    raise ValueError("expected a lamp beside blend, whose file has its own sky; found hemisphere: leave it out")
+                    raise ValueError(f"expected a lamp beside blend, whose file has its own sky; found {kind}: leave it out")
 
     @property
     def backgrounds(self) -> tuple[BackgroundEntry, ...]:

@@ -6,7 +6,6 @@ for them: one more field, model or pose changes nobody else's draw.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -20,7 +19,6 @@ from viewsphere.composing.scene.sun import sun_position
 from viewsphere.composing.scene.weather import through_windows, weathered
 from viewsphere.composing.seeds import Names, scene_generators, share
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.instant import Viewpoint
@@ -37,14 +35,14 @@ from viewsphere.model.scene import (
     Scene,
     Sky,
     Sun,
-    Vector,
 )
 from viewsphere.model.substance import Substance
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.draws import RngOf, alternatives, drawn, is_random
 from viewsphere.recipe.entries import concrete, pictures_of
 from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame, ViewEntry
-from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, NightEntry, NightSky, SunEntry
+from viewsphere.recipe.light import DaylightSky, HdriSky, NightEntry, NightSky, SunEntry
+from viewsphere.recipe.lights import Lamp, spec_of
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.seed_names import seed_name
 from viewsphere.recipe.surface import GroundEntry, MaterialEntry
@@ -314,16 +312,9 @@ def is_night(entry: object) -> bool:
     return angles is not None and angles[1] <= 0
 
 
-def _lights(entries: tuple[LampEntry, ...], rng_of: RngOf) -> tuple[AnyLight, ...]:
+def _lights(entries: tuple[Lamp, ...], rng_of: RngOf) -> tuple[AnyLight, ...]:
     lights: list[AnyLight] = []
     for i, entry in enumerate(entries):
         for j in range(drawn(entry.count, rng_of, ("lights", str(i), "count"))):
-            lamp = drawn(entry, rng_of, ("lights", str(i), str(j)))
-            at = getattr(lamp, "at", None)
-            lights.append(concrete(lamp) if at is None else concrete(lamp, position=_spot(at)))
+            lights += spec_of(entry).emitters(drawn(entry, rng_of, ("lights", str(i), str(j))))
     return tuple(lights)
-
-
-def _spot(at: At) -> Vector:
-    x, y, z = orbit_center(math.radians(at.azimuth), math.radians(at.elevation), at.distance).tolist()
-    return x, y, z

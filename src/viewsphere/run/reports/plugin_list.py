@@ -8,6 +8,7 @@ from viewsphere.errors import UserError
 from viewsphere.labels import Label
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
+from viewsphere.plugins.light import LightSpec
 from viewsphere.plugins.material import MaterialSpec
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.placer import PlacerSpec
@@ -16,7 +17,17 @@ from viewsphere.plugins.registry import SEAMS, Kind, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.spec import Spec
 
-SPECS: tuple[type[Spec], ...] = (EngineSpec, FormatSpec, Label, MaterialSpec, MotionSpec, PlacerSpec, ReaderSpec, SamplerSpec)
+SPECS: tuple[type[Spec], ...] = (
+    EngineSpec,
+    FormatSpec,
+    Label,
+    LightSpec,
+    MaterialSpec,
+    MotionSpec,
+    PlacerSpec,
+    ReaderSpec,
+    SamplerSpec,
+)
 """The specs of all kinds."""
 
 
