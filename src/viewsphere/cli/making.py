@@ -37,7 +37,7 @@ from viewsphere.cli.terminal import (
     write_picture,
 )
 from viewsphere.errors import StoreError, UserError
-from viewsphere.kernels.garbage import pause_collection
+from viewsphere.kernels.garbage import importing
 from viewsphere.model.quantity import quantity
 from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
 from viewsphere.run.workers.worker_count import cores
@@ -233,7 +233,7 @@ def plan(
     allow_scripts: AllowScripts = False,
 ) -> None:
     """Report a recipe's models, poses, frames and splits. Reads no mesh without --models or --estimate."""
-    with pause_collection():
+    with importing():
         from viewsphere.planning.plan import check_sidecars
         from viewsphere.run.opening import check_formats, prepare
 
@@ -380,7 +380,7 @@ def render(
     """Render a recipe into a data set. Run it again to resume: finished frames are never rendered twice."""
     if recipe is None or output is None:
         raise UserError(for_render(recipe, output))
-    with waiting(f"planning {recipe}", quiet=json_), pause_collection():
+    with waiting(f"planning {recipe}", quiet=json_), importing():
         from viewsphere.planning.plan import plan as make_plan
         from viewsphere.run.generate import generate
         from viewsphere.run.opening import to_append

@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperCommand
 
 from viewsphere.errors import UserError
-from viewsphere.kernels.garbage import pause_collection
+from viewsphere.kernels.garbage import importing
 
 RECIPES = ("[!.]*.yaml", "[!.]*.yml", "[!.]*/recipe.yaml", "recipes/*.yaml")
 
@@ -20,7 +20,7 @@ class Command(TyperCommand):
         """Parse the arguments by typer; raises UserError with a suggestion if arguments are required and none is given."""
         if not args and not ctx.resilient_parsing and any(p.required for p in self.params):
             raise UserError(for_command(ctx.info_name or ""))
-        with pause_collection():  # while callbacks of options import
+        with importing():  # which callbacks of options do
             return super().parse_args(ctx, args)  # pyright: ignore[reportArgumentType]
 
 

@@ -17,6 +17,7 @@ import typer
 
 from viewsphere.aside import write_whole
 from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.kernels.garbage import importing
 from viewsphere.model.quantity import quantity
 from viewsphere.printable import printable
 
@@ -279,7 +280,8 @@ class ProgressBar:
 
     def __enter__(self) -> ProgressBar:
         if not self._quiet:
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+            with importing():
+                from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
             self._rich = Progress(
                 TextColumn("{task.description:8}"),

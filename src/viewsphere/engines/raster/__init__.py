@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from viewsphere.kernels.garbage import importing
 from viewsphere.model.channel import PASSES
 from viewsphere.plugins.engine import EngineSpec
 
@@ -28,7 +29,8 @@ def stage(shot: Shot, load: Load) -> RasterStage:
 
     Raises UserError for an unknown engine option or one out of range.
     """
-    from viewsphere.engines.raster.staging import build_stage
+    with importing():
+        from viewsphere.engines.raster.staging import build_stage
 
     return build_stage(shot, load)
 

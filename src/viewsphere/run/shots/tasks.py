@@ -9,7 +9,7 @@ from typing import Literal
 
 from viewsphere import plugins
 from viewsphere.kernels.build import PAINTER
-from viewsphere.kernels.garbage import pause_collection
+from viewsphere.kernels.garbage import importing
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
@@ -90,7 +90,7 @@ class Worker:
         Errors of one that takes the place of a damaged one (`again`) as for `Store.aside`.
         """
         shot = self.composer.shot(row)
-        with pause_collection():  # while the engine is imported
+        with importing():
             plugins.load(EngineSpec, shot.engine)
         samples = _counted(self.stages.render(shot), tell)
         scenery = self.composer.scenery(shot)
