@@ -1,6 +1,8 @@
 import itertools
 import json
 import pickle
+import subprocess
+import sys
 from dataclasses import fields
 
 import numpy as np
@@ -12,7 +14,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices, clip_to_image
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
-from viewsphere.labels import annotated, context_of
+from viewsphere.labels import REGULAR, annotated, context_of, labels_of, object_labels
 from viewsphere.labels.shared.placement import view_of
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.instant import Viewpoint
@@ -309,3 +311,20 @@ def test_an_object_that_fills_the_whole_field_of_a_lens():
     (cube,), *_ = scene([UNIT], [at()], pose, narrow)  # no edge of it is where the lens sees
     assert cube.area > 100
     assert (cube.visibility, cube.truncation) == (1, 0)
+
+
+def test_the_regular_labels_are_those_that_are_not_on_request():
+    """Frames import these by name; a label that this list lacked would be missing in all data sets."""
+    assert {label.name for label in object_labels() if not label.on_request} == REGULAR
+    assert labels_of(("amodal",)) == tuple(label for label in object_labels() if not label.on_request or label.name == "amodal")
+
+
+def test_a_label_is_imported_when_it_is_read():
+    code = """
+import sys
+from viewsphere import labels
+labels.labels_of(("amodal",)), labels.channels()["depth"], labels.makers()["visibility"]
+print(*(name for name in ("amodal", "depth", "visibility", "flow", "captions") if f"viewsphere.labels.{name}" in sys.modules))
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert ran.stdout.split() == ["amodal", "depth", "visibility"], ran.stderr

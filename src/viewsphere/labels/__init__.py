@@ -12,6 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from viewsphere import plugins
+from viewsphere.errors import PluginError
 from viewsphere.homes import names_of
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.ids import IdKind, by_number, by_table, in_attributes, in_column, renumbered
@@ -30,6 +31,7 @@ from viewsphere.labels.shared.spec import (
     Picture,
     SampleLabel,
 )
+from viewsphere.labels.shared.table import Table
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel, picture_of
 from viewsphere.model.sample import Sample
 
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 __all__ = [
+    "REGULAR",
     "TAIL",
     "ChannelLabel",
     "Color",
@@ -71,6 +74,7 @@ __all__ = [
     "is_on_request",
     "is_shown",
     "label_named",
+    "label_names",
     "labels",
     "labels_of",
     "makers",
@@ -79,12 +83,18 @@ __all__ = [
     "on_request",
     "renumbered",
     "sample_labels",
+    "sample_labels_of",
     "sample_values",
     "short_record",
     "stand_in_for",
     "view_of",
     "whole_record",
 ]
+
+REGULAR = frozenset(
+    ("box2d", "box2d_projected", "box3d", "category", "mask", "model", "pose", "pose_category", "size", "view", "visibility")
+)
+"""Names of the built-in labels that all objects have. Frames import these and the labels on request, not all."""
 
 _COMPUTING = "viewsphere.labels.shared.computing"
 __getattr__ = names_of(
@@ -100,10 +110,26 @@ __getattr__ = names_of(
 
 
 @cache
-def labels() -> dict[str, Label]:
+def labels() -> Table[Label]:
     """Return every label by name: first the channels that recipes keep by default, then the others in alphabetical order."""
-    found = plugins.loadable(Label)
-    return {name: found[name] for name in sorted(found, key=lambda name: (name not in DEFAULT_CHANNELS, name))}
+    return Table(label_names, _loadable)
+
+
+@cache
+def label_names() -> tuple[str, ...]:
+    """Names of all labels, in the order of `labels`; imports none."""
+    return tuple(sorted(plugins.names("labels"), key=lambda name: (name not in DEFAULT_CHANNELS, name)))
+
+
+@cache
+def _loadable(name: str) -> Label | None:
+    """The label of this name; None for one of a third party that cannot be loaded."""
+    try:
+        return label_named(name)
+    except PluginError:
+        if not plugins.is_third_party("labels", name):
+            raise
+        return None
 
 
 @cache
@@ -126,9 +152,9 @@ def is_channel(name: str) -> bool:
 
 
 @cache
-def channel_labels() -> dict[str, ChannelLabel]:
+def channel_labels() -> Table[ChannelLabel]:
     """Labels of pixels by name."""
-    return {name: label for name, label in labels().items() if isinstance(label, ChannelLabel)}
+    return Table(label_names, lambda name: label if isinstance(label := _loadable(name), ChannelLabel) else None)
 
 
 @cache
@@ -138,32 +164,57 @@ def object_labels() -> tuple[ObjectLabel, ...]:
 
 
 def labels_of(asked: Container[str]) -> tuple[ObjectLabel, ...]:
-    """The labels of objects that data sets have where these were asked for."""
-    return tuple(label for label in object_labels() if not label.on_request or label.name in asked)
+    """The labels of objects that data sets have where these were asked for; imports no others."""
+    found = (_loadable(name) for name in label_names() if name in _perhaps_regular() or name in asked)
+    return tuple(label for label in found if isinstance(label, ObjectLabel) and (not label.on_request or label.name in asked))
 
 
 @cache
-def sample_labels() -> dict[str, SampleLabel]:
+def _perhaps_regular() -> frozenset[str]:
+    """Names of labels that may be of all objects without a request."""
+    return REGULAR | {name for name in label_names() if plugins.is_third_party("labels", name)}
+
+
+@cache
+def sample_labels() -> Table[SampleLabel]:
     """Labels of whole pictures by name."""
-    return {name: label for name, label in labels().items() if isinstance(label, SampleLabel)}
+    return Table(label_names, lambda name: label if isinstance(label := _loadable(name), SampleLabel) else None)
+
+
+def sample_labels_of(asked: Container[str]) -> tuple[SampleLabel, ...]:
+    """The labels of whole pictures that were asked for; imports no others."""
+    found = (_loadable(name) for name in label_names() if name in asked)
+    return tuple(label for label in found if isinstance(label, SampleLabel))
 
 
 @cache
 def on_request() -> dict[str, ObjectLabel | SampleLabel]:
     """Return every label that a recipe's `annotations` may name."""
-    return {label.name: label for label in object_labels() if label.on_request} | sample_labels()
+    return {label.name: label for label in object_labels() if label.on_request} | dict(sample_labels())
 
 
 @cache
-def makers() -> dict[str, ObjectLabel]:
+def makers() -> Table[ObjectLabel]:
     """Labels of objects by the names of their fields."""
-    return {field.name: label for label in object_labels() for field in label.fields}
+    return Table(lambda: [field.name for label in object_labels() for field in label.fields], _maker)
 
 
 @cache
-def channels() -> dict[str, Channel]:
+def _maker(field: str) -> ObjectLabel | None:
+    """The label of this field; only where no regular label has it are all imported."""
+    every = (label for found in (lambda: labels_of(()), object_labels) for label in found())
+    return next((label for label in every if any(field == its.name for its in label.fields)), None)
+
+
+@cache
+def channels() -> Table[Channel]:
     """Return every channel that a recipe's `channels` may name: first the passes, then the labels of pixels."""
-    return PASSES | {name: label.channel for name, label in channel_labels().items()}
+    return Table(lambda: (*PASSES, *channel_labels()), _channel)
+
+
+def _channel(name: str) -> Channel | None:
+    label = _loadable(name)
+    return label.channel if isinstance(label, ChannelLabel) else PASSES.get(name)
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels import channel_labels, labels_of, makers, sample_labels
+from viewsphere.labels import channel_labels, labels_of, makers, sample_labels_of
 from viewsphere.labels.shared.context import LabelContext, NeighbourViews
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.record import Makers, computed
@@ -100,8 +100,9 @@ def annotated(context: LabelContext) -> tuple[ObjectAnnotation, ...]:
     """Annotations of the objects that are placed in a context, visible or not, in the order of their ids. An object that covers
     no pixel has an empty mask, no `box2d` and visibility 0.
     """
-    seen = [label for label in labels_of(context.asked) if label.compute is not derived]
-    every = Makers(makers(), context.asked, "this frame")
+    asked = labels_of(context.asked)
+    seen = [label for label in asked if label.compute is not derived]
+    every = Makers(makers(), asked, context.asked, "this frame")
     return tuple(
         computed(i + 1, [label.compute(context, i) for label in seen], place, every)
         for i, place in enumerate(context.placements)
@@ -112,9 +113,8 @@ def annotated(context: LabelContext) -> tuple[ObjectAnnotation, ...]:
 def sample_values(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The fields of the labels of whole pictures that were asked for; `objects` are `annotated(context)`."""
     found: dict[str, Any] = {}
-    for name, label in sample_labels().items():
-        if name in context.asked:
-            found |= label.compute(context, objects)
+    for label in sample_labels_of(context.asked):
+        found |= label.compute(context, objects)
     return found
 
 

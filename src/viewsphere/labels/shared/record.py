@@ -74,18 +74,20 @@ def short_record(o: ObjectAnnotation, labels: Iterable[ObjectLabel]) -> dict[str
 
 @dataclass(frozen=True)
 class Makers:
-    """The labels that short records are restored by: by the names of fields, and those that were asked for."""
+    """The labels that short records are restored by: by the names of fields, and `labels`, those that were `asked` for among
+    them.
+    """
 
     of: Mapping[str, ObjectLabel]
+    labels: Sequence[ObjectLabel]
     asked: Container[str]
     where: str
 
     @cached_property
     def requested(self) -> tuple[str, ...]:
         """The fields of labels that were asked for and follow from others."""
-        return tuple(
-            name for name, label in self.of.items() if label.on_request and label.compute is derived and self.has(name)
-        )
+        derived_ones = (label for label in self.labels if label.on_request and label.compute is derived)
+        return tuple(field.name for label in derived_ones for field in label.fields)
 
     def has(self, field: str) -> bool:
         """Return whether an object is told to have a field."""

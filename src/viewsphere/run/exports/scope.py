@@ -11,7 +11,7 @@ from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.refusals import lacking_labels
-from viewsphere.labels import Needs, channel_labels, label_named, on_request
+from viewsphere.labels import Needs, label_named, label_names
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.planning.plan import Plan
@@ -53,8 +53,7 @@ def scope_of(dataset: Dataset) -> Scope:
         annotations=(),
     )
     if any(shots):
-        computed = tuple(dict.fromkeys((*known.channels, *channel_labels())))
-        known = replace(known, channels=computed, annotations=tuple(on_request()))
+        known = replace(known, channels=tuple(dict.fromkeys((*known.channels, *label_names()))), annotations=label_names())
     if shots and shots[0] and all(shots):
         return replace(known, rig=shots[0].rig)
     pictures = tuple(chain.from_iterable(map(telling, dataset.samples_of_parts)))

@@ -49,7 +49,7 @@ class Models:
     def _keeps_looks(self) -> bool:
         """Return whether a label of the data set needs what models look like."""
         asked = {name for part in self.record.parts for name in part.recipe.get("annotations", ())}
-        return any(label.needs.looks for name, label in labels().items() if name in asked)
+        return any(labels()[name].needs.looks for name in asked if name in labels())
 
     def make(self, spec: ModelSpec, steps: Iterable[TimeStep] = (), credit: Credit | None = None, trusted: bool = True) -> None:
         """Normalise a model, at these time steps if it deforms, and export it into the store, or see that the one there is the

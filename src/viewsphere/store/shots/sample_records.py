@@ -26,6 +26,7 @@ from viewsphere.labels import (
     makers,
     object_labels,
     sample_labels,
+    sample_labels_of,
     short_record,
     whole_record,
 )
@@ -49,14 +50,16 @@ def short_sample(sample: Sample) -> dict[str, Any]:
 
 def _plain_more(sample: Sample) -> dict[str, Any]:
     """The fields of the labels of whole pictures as JSON; none without any."""
+    if not sample.extra:
+        return {}
     fields = {field.name: field for label in sample_labels().values() for field in label.fields}
-    return {"more": {name: fields[name].plain(value) for name, value in sample.extra.items()}} if sample.extra else {}
+    return {"more": {name: fields[name].plain(value) for name, value in sample.extra.items()}}
 
 
 def _more(asked: Sequence[str], plain: Mapping[str, Any]) -> dict[str, Any]:
     """The fields that `_plain_more` wrote, of the labels that were asked for."""
-    labels = [label for name, label in sample_labels().items() if name in asked]
-    return {field.name: field.value(plain[field.name]) for label in labels for field in label.fields}
+    fields = (field for label in sample_labels_of(asked) for field in label.fields)
+    return {field.name: field.value(plain[field.name]) for field in fields}
 
 
 def whole_sample(sample: Sample) -> dict[str, Any]:
@@ -165,7 +168,7 @@ class ShotRecords:
 
     @cached_property
     def _makers(self) -> Makers:
-        return Makers(makers(), self.shot.annotations, self.where)
+        return Makers(makers(), labels_of(self.shot.annotations), self.shot.annotations, self.where)
 
     def kept(self, place: int) -> tuple[str, ...]:
         """The channels of the shot's that the sample at a place has, counted from 0."""
