@@ -251,7 +251,7 @@ MISTAKES = [
     ({"scene": {"lights": [{**LAMP, "at": {"distance": 2}}]}}, "scene.lights[0]: expected one of position, at; found both", ""),
     (
         {"scene": {"lights": [{**LAMP, "kind": "sopt"}]}},
-        "scene.lights[0].kind: 'sopt' is unknown; did you mean 'spot'? Valid: point, spot",
+        "scene.lights[0].kind: 'sopt' is unknown; did you mean 'spot'? Valid: area, hemisphere, point, spot",
         "",
     ),
     (
