@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.tree import File
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.tree import File
 
 
 def with_channels(sample, **channels):

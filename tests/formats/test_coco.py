@@ -11,8 +11,7 @@ from pycocotools.cocoeval import COCOeval
 from cube_dataset import MESHES, make
 from viewsphere.errors import UserError
 from viewsphere.formats.coco import verify
-from viewsphere.formats.coco.categories import CATEGORY_IDS, category_ids, official_ids
-from viewsphere.formats.coco.options import Options
+from viewsphere.formats.coco.categories import CATEGORY_IDS, Options, category_ids, official_ids
 from viewsphere.geometry.mask import encode_rle
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import write
@@ -195,7 +194,7 @@ def test_equal_bytes(exported, tmp_path):
 
 def test_large_data_sets_have_numbered_folders(exported, monkeypatch, tmp_path):
     dataset, _ = exported
-    monkeypatch.setattr("viewsphere.formats.coco.entries.FOLDER_SIZE", 3)
+    monkeypatch.setattr("viewsphere.formats.coco.writing.FOLDER_SIZE", 3)
     write(dataset, [(FormatEntry(name="coco"), tmp_path)])
     for folder in [
         p for s in dataset.splits for p in [tmp_path / "images" / s, *(tmp_path / "images" / s).rglob("*")] if p.is_dir()

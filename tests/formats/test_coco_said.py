@@ -9,7 +9,7 @@ from PIL import Image
 from viewsphere import Dataset
 from viewsphere.check import check
 from viewsphere.errors import StoreError
-from viewsphere.formats.shared.exif import shown_size, upright
+from viewsphere.formats.shared.reading.exif import shown_size, upright
 from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.datasets.merging import merge
 from viewsphere.run.exports.exporting import export

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from viewsphere.errors import StoreError, UserError
-from viewsphere.formats.shared.sequences import Eyes, check_whole, instants, number, scene
+from viewsphere.formats.shared.writing.sequences import Eyes, check_whole, instants, number, scene
 
 
 def test_names_sort_as_numbers_do():

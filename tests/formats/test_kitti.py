@@ -255,7 +255,7 @@ def test_quoted_and_foreign_names(tmp_path):
 
 
 def test_a_zoom_has_no_calibration(videos, tmp_path, monkeypatch):
-    from viewsphere.formats.shared.timeline import Timeline
+    from viewsphere.formats.shared.writing.timeline import Timeline
 
     def zooming(timeline, course):
         for shot in shots(timeline, course):

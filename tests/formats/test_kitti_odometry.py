@@ -118,7 +118,7 @@ def test_refusals(stills, tmp_path):
 
 
 def test_a_zoom_has_no_calibration(videos, tmp_path, monkeypatch):
-    from viewsphere.formats.shared.timeline import Timeline
+    from viewsphere.formats.shared.writing.timeline import Timeline
 
     def zooming(timeline, course):
         for shot in shots(timeline, course):

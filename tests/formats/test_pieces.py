@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from viewsphere.formats.shared.tree import Piece, Tree, functions
+from viewsphere.formats.shared.writing.tree import Piece, Tree, functions
 
 
 class Mixed(Tree):

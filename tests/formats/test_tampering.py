@@ -35,7 +35,7 @@ from viewsphere.store.shots.checksums import CHECKSUMS
 
 def _proves_itself(module) -> bool:
     """Whether a format has a proof of its own; trees share one, which test_trees.py tries."""
-    return module.verify is not None and module.verify.__module__ != "viewsphere.formats.shared.tree"
+    return module.verify is not None and module.verify.__module__ != "viewsphere.formats.shared.writing.tree"
 
 
 FORMATS = [name for name in plugins.names("formats") if _proves_itself(plugins.load(FormatSpec, name))]

@@ -23,7 +23,7 @@ from tapvid_metrics import PIXELS, evaluated, queries_first, queries_strided, sc
 from proven import close, equal
 from viewsphere.errors import UserError
 from viewsphere.formats import tapvid
-from viewsphere.formats.shared.archives import archive, pickled
+from viewsphere.formats.tapvid import archive, pickled
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 from viewsphere.store import Choice, Dataset
@@ -220,7 +220,7 @@ def test_equal_arrays_make_equal_files_that_any_numpy_reads(tmp_path):
 def test_another_process_makes_the_same_pickle():
     """Hashes of texts differ between processes."""
     program = (
-        "import numpy as np, sys; from viewsphere.formats.shared.archives import pickled;"
+        "import numpy as np, sys; from viewsphere.formats.tapvid import pickled;"
         "sys.stdout.buffer.write(pickled({'v': {'video': np.ones((2, 3), 'u1'), 'occluded': np.ones(3, bool)}}))"
     )
     found = {

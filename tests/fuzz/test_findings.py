@@ -10,7 +10,7 @@ from targets import CAMERAS, COLMAP, FILED, OPENCV, ORBITS, PLY, ROS, SEQUENCE, 
 from sealing import seal_again
 from viewsphere.check import check
 from viewsphere.errors import ViewsphereError
-from viewsphere.formats.shared.paper import json_bytes
+from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.planning.rig_files import read_rig
 from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.datasets.merging import merge

@@ -10,8 +10,7 @@ from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
-from viewsphere.formats.coco.categories import category_ids
-from viewsphere.formats.coco.options import Options
+from viewsphere.formats.coco.categories import Options, category_ids
 from viewsphere.run.datasets.merging import merge
 from viewsphere.run.exports.exporting import export
 from viewsphere.store.index import numbers

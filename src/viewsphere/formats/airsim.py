@@ -42,11 +42,11 @@ from viewsphere.codecs.palette import palette
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.export_files import Coded, Content
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.sequences import scene
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded, Content
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.sequences import scene
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, quaternion_from_matrix, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen

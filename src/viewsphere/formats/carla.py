@@ -38,13 +38,13 @@ from numpy.typing import NDArray
 
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.class_table import Numbered
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.sequences import scene
-from viewsphere.formats.shared.tree import File, Piece, Tree, functions, item
+from viewsphere.formats.shared.reading.class_table import Numbered
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.sequences import scene
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions, item
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec

@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.pictures import picture, png, suffix_of
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions, item
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.pictures import picture, png, suffix_of
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, item
 from viewsphere.geometry.mask import mask_box
 from viewsphere.labels.panoptic import class_of, object_of
 from viewsphere.model.classes import SemanticClass, thing_class

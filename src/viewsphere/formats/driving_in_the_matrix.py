@@ -27,9 +27,9 @@ from xml.etree import ElementTree
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.refusals import plain_names
-from viewsphere.formats.shared.tree import File, Piece, Tree, functions, line
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.refusals import plain_names
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions, line
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec

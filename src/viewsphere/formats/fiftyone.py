@@ -31,9 +31,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.pictures import depth_png, picture, png, suffix_of
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.pictures import depth_png, picture, png, suffix_of
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec

@@ -33,8 +33,8 @@ from viewsphere.assets.exporting.glb import Looking, Placed, scene_glb_bytes
 from viewsphere.files import read_bytes, read_text
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.cameras import opengl_pose
-from viewsphere.formats.shared.export_files import check_files
-from viewsphere.formats.shared.refusals import any_camera
+from viewsphere.formats.shared.writing.export_files import check_files
+from viewsphere.formats.shared.writing.refusals import any_camera
 from viewsphere.model.camera import Distortion
 from viewsphere.model.classes import thing_class
 from viewsphere.model.sample import ObjectAnnotation, Sample

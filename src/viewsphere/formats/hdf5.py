@@ -36,10 +36,10 @@ from pydantic import Field
 
 from viewsphere.errors import MissingExtraError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.refusals import sequences
-from viewsphere.formats.shared.tree import File, Piece, Tree, functions
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.refusals import sequences
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec

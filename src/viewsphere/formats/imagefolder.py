@@ -29,9 +29,9 @@ from pydantic import Field
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.pictures import picture, suffix_of
-from viewsphere.formats.shared.tree import LINES, File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.pictures import picture, suffix_of
+from viewsphere.formats.shared.writing.tree import LINES, File, Layout, Piece, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec

@@ -22,13 +22,13 @@ from functools import partial
 import numpy as np
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.flow_files import steps_png
 from viewsphere.formats.shared.kitti import rectified
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.sequences import Eyes, check_whole, instants, number, scene, two_eyes
-from viewsphere.formats.shared.tree import File, Tree, functions
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.flow_files import steps_png
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.sequences import Eyes, check_whole, instants, number, scene, two_eyes
+from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -40,13 +40,13 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.flow_files import flow_png, steps_png
 from viewsphere.formats.shared.kitti import printed, projection, rectified
-from viewsphere.formats.shared.pictures import ids_png, picture
-from viewsphere.formats.shared.sequences import Eyes, check_whole, instants, number, two_eyes
-from viewsphere.formats.shared.tree import File, Tree, functions
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.flow_files import flow_png, steps_png
+from viewsphere.formats.shared.writing.pictures import ids_png, picture
+from viewsphere.formats.shared.writing.sequences import Eyes, check_whole, instants, number, two_eyes
+from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec

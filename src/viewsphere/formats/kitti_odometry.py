@@ -36,10 +36,10 @@ from viewsphere.formats.shared.kitti import (
     velodyne,
 )
 from viewsphere.formats.shared.mounting import Float, mounted, unmoved
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.refusals import pinhole, sequences
-from viewsphere.formats.shared.timeline import Timeline, unknown_shots
-from viewsphere.formats.shared.tree import File, Piece, Tree, functions, line
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.refusals import pinhole, sequences
+from viewsphere.formats.shared.writing.timeline import Timeline, unknown_shots
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions, line
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot

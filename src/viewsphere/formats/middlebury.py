@@ -39,12 +39,12 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.flow_files import map_pfm, states_png
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.sequences import Eyes, instants, number, scene, two_eyes
-from viewsphere.formats.shared.tree import File, Tree, functions
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.flow_files import map_pfm, states_png
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.sequences import Eyes, instants, number, scene, two_eyes
+from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample

@@ -26,9 +26,9 @@ from pydantic import Field
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.pictures import picture, suffix_of
-from viewsphere.formats.shared.refusals import plain_names, sequences
-from viewsphere.formats.shared.tree import LINES, File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.writing.pictures import picture, suffix_of
+from viewsphere.formats.shared.writing.refusals import plain_names, sequences
+from viewsphere.formats.shared.writing.tree import LINES, File, Layout, Piece, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample

@@ -39,10 +39,10 @@ from numpy.typing import NDArray
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import depth_png, picture
-from viewsphere.formats.shared.refusals import known_cameras, most_objects
-from viewsphere.formats.shared.tree import File, Piece, Tree, functions
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import depth_png, picture
+from viewsphere.formats.shared.writing.refusals import known_cameras, most_objects
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample

@@ -37,15 +37,20 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.geodesy import compass, earth, globe
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.refusals import known_views, lenses, pinhole
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.refusals import known_views, lenses, pinhole
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
+
+AXIS, FLATTENING = 6378137.0, 1 / 298.257223563
+OVAL = FLATTENING * (2 - FLATTENING)
+STEPS = 8
+"""Of the search for a latitude, each of which leaves less than a hundredth of the error."""
+
 
 Float = NDArray[np.float64]
 
@@ -88,8 +93,8 @@ class Nyc3dCars(Tree):
         self._types = {info.key: number for number, info in enumerate(dataset.models, 1)}
         at = math.radians(options.latitude), math.radians(options.longitude)
         self._earth_from_world = np.eye(4)
-        self._earth_from_world[:3, :3] = compass(*at)
-        self._earth_from_world[:3, 3] = earth(*at, options.altitude)
+        self._earth_from_world[:3, :3] = _compass(*at)
+        self._earth_from_world[:3, 3] = _earth(*at, options.altitude)
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its row and those of its vehicles."""
@@ -124,9 +129,9 @@ class Nyc3dCars(Tree):
         assert o.box2d is not None
         corners = transform(self._earth_from_world, o.box3d[:4])
         middle = corners.mean(axis=0)
-        latitude, longitude, _ = globe(middle)
+        latitude, longitude, _ = _globe(middle)
         front = transform(self._earth_from_world[:3, :3], -o.world_from_object[:3, 1])
-        east, north, _ = transform(compass(latitude, longitude).T, front).tolist()
+        east, north, _ = transform(_compass(latitude, longitude).T, front).tolist()
         yield sample.index + 1
         yield from (np.array(o.box2d) / ([sample.width, sample.height] * 2)).tolist()
         yield from (o.occlusion_level, math.degrees(math.atan2(east, north)) % 360)
@@ -147,7 +152,7 @@ def _line(values: Iterable[Any]) -> bytes:
 
 def _words(place: Float) -> str:
     """Longitude, latitude (degrees) and altitude of an earth-centred point."""
-    latitude, longitude, altitude = globe(place)
+    latitude, longitude, altitude = _globe(place)
     return f"{math.degrees(longitude)!r} {math.degrees(latitude)!r} {altitude!r}"
 
 
@@ -166,3 +171,31 @@ FORMAT = FormatSpec(
     preparer=preparer,
     verify=verify,
 )
+
+
+def _compass(latitude: float, longitude: float) -> Float:
+    """The directions east, north and up at a place (radians), the columns of (3, 3)."""
+    (s, c), (sl, cl) = (math.sin(latitude), math.cos(latitude)), (math.sin(longitude), math.cos(longitude))
+    return np.array([[-sl, -s * cl, c * cl], [cl, -s * sl, c * sl], [0.0, c, s]])
+
+
+def _earth(latitude: float, longitude: float, altitude: float) -> Float:
+    """Earth-centred metres (3,) of a place (radians, metres)."""
+    across = AXIS / math.sqrt(1 - OVAL * math.sin(latitude) ** 2)
+    flat = (across + altitude) * math.cos(latitude)
+    return np.array(
+        [flat * math.cos(longitude), flat * math.sin(longitude), (across * (1 - OVAL) + altitude) * math.sin(latitude)]
+    )
+
+
+def _globe(place: Float) -> tuple[float, float, float]:
+    """Latitude, longitude (radians) and altitude (metres) of an earth-centred point."""
+    x, y, z = place.tolist()
+    flat = math.hypot(x, y)
+    latitude = math.atan2(z, flat * (1 - OVAL))
+    for _ in range(STEPS):
+        across = AXIS / math.sqrt(1 - OVAL * math.sin(latitude) ** 2)
+        latitude = math.atan2(z + OVAL * across * math.sin(latitude), flat)
+    across = AXIS / math.sqrt(1 - OVAL * math.sin(latitude) ** 2)
+    s, c = math.sin(latitude), math.cos(latitude)
+    return latitude, math.atan2(y, x), flat * c + z * s - across * (1 - OVAL * s * s)

@@ -38,9 +38,9 @@ from collections.abc import Iterator
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.tree import File, Piece, Tree, functions, line
 from viewsphere.formats.shared.viewpoint_mat import Cads, Options, no_viewpoints, scipy_io
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions, line
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -32,10 +32,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.pictures import picture, suffix_of
-from viewsphere.formats.shared.refusals import known_cameras, pinhole
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions, item
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.pictures import picture, suffix_of
+from viewsphere.formats.shared.writing.refusals import known_cameras, pinhole
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, item
 from viewsphere.geometry.box import clip_to_image
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.sample import ObjectAnnotation, Sample

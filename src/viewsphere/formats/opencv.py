@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.cameras import Rigs
-from viewsphere.formats.shared.refusals import known_cameras, no_skew
-from viewsphere.formats.shared.tree import File, Tree, functions
+from viewsphere.formats.shared.writing.refusals import known_cameras, no_skew
+from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.geometry.rotation import product, rotation_vector, transform
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.rig import Rig, Sensor

@@ -21,8 +21,8 @@ from viewsphere.codecs.ply import encode_ply
 from viewsphere.errors import UserError
 from viewsphere.files import read_bytes
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.export_files import check_files
-from viewsphere.formats.shared.refusals import any_camera
+from viewsphere.formats.shared.writing.export_files import check_files
+from viewsphere.formats.shared.writing.refusals import any_camera
 from viewsphere.model.channel import missing
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.point_cloud import PointCloud

@@ -34,10 +34,10 @@ import numpy as np
 
 from viewsphere.codecs.pictures import encode_picture
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import JPEG_QUALITY, opaque
-from viewsphere.formats.shared.refusals import known_views
-from viewsphere.formats.shared.tree import File, Piece, Tree, functions, line
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import JPEG_QUALITY, opaque
+from viewsphere.formats.shared.writing.refusals import known_views
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions, line
 from viewsphere.model.sample import ObjectAnnotation, ObjectView, Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

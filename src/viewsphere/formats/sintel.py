@@ -41,12 +41,12 @@ from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.flow_files import FLO_TAG, flo_file, states_png, tagged
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.sequences import Eyes, check_whole, instants, number, scene, two_eyes
-from viewsphere.formats.shared.tree import File, Tree, functions
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.flow_files import FLO_TAG, flo_file, states_png, tagged
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.sequences import Eyes, check_whole, instants, number, scene, two_eyes
+from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample

@@ -36,12 +36,12 @@ from numpy.typing import NDArray
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.class_table import Numbered
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import depth_steps
-from viewsphere.formats.shared.sequences import scene
-from viewsphere.formats.shared.tree import File, Tree, functions
+from viewsphere.formats.shared.reading.class_table import Numbered
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import depth_steps
+from viewsphere.formats.shared.writing.sequences import scene
+from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import Sample

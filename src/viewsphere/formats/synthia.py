@@ -45,12 +45,12 @@ from pydantic import Field
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.class_table import Numbered
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import depth_steps, picture
-from viewsphere.formats.shared.sequences import Eyes, scene, two_eyes
-from viewsphere.formats.shared.tree import LINES, File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.reading.class_table import Numbered
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import depth_steps, picture
+from viewsphere.formats.shared.writing.sequences import Eyes, scene, two_eyes
+from viewsphere.formats.shared.writing.tree import LINES, File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.classes import Color, SemanticClass

@@ -24,27 +24,36 @@ https://github.com/google-deepmind/tapnet.
 
 from __future__ import annotations
 
+import io
+import pickle
+import zipfile
 from collections.abc import Iterator
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.codecs.pictures import encode_picture
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.archives import archive, pickled
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import JPEG_QUALITY, opaque
-from viewsphere.formats.shared.sequences import check_whole, scene
-from viewsphere.formats.shared.tree import File, Tree, functions
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import JPEG_QUALITY, opaque
+from viewsphere.formats.shared.writing.sequences import check_whole, scene
+from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.geometry.rotation import rigid
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
+
+DATE = (1980, 1, 1, 0, 0, 0)
+"""Of all members of archives, so that equal arrays make equal files."""
+
+UNIX = 3
+"""The system that all archives say they are of."""
 
 
 class Options(Frozen):
@@ -137,3 +146,32 @@ FORMAT = FormatSpec(
     preparer=preparer,
     verify=verify,
 )
+
+
+class _Portable(pickle.Pickler):
+    """Pickles arrays by their shape, type and bytes: numpy's own way names modules that other versions of it do not have."""
+
+    def reducer_override(self, obj: Any) -> Any:
+        """Return the call that restores an array; other values as usual."""
+        if isinstance(obj, np.ndarray):
+            return np.ndarray, (obj.shape, obj.dtype.str, bytearray(np.ascontiguousarray(obj).tobytes()))
+        return NotImplemented
+
+
+def pickled(value: Any) -> bytes:
+    """A pickle of dictionaries, texts and arrays that every version of numpy reads; equal values, equal bytes."""
+    out = io.BytesIO()
+    _Portable(out, protocol=4).dump(value)
+    return out.getvalue()
+
+
+def archive(**arrays: NDArray[Any]) -> bytes:
+    """The archive of `np.savez(file, **arrays)`; equal arrays, equal bytes."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as members:
+        for name, array in arrays.items():
+            head, member = io.BytesIO(), zipfile.ZipInfo(f"{name}.npy", DATE)
+            member.create_system = UNIX
+            np.lib.format.write_array(head, array, allow_pickle=False)
+            members.writestr(member, head.getvalue())
+    return out.getvalue()

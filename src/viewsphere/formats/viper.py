@@ -35,13 +35,13 @@ from numpy.typing import NDArray
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import StoreError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.class_table import Numbered
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.sequences import check_whole, instants
-from viewsphere.formats.shared.timeline import Timeline
-from viewsphere.formats.shared.tree import File, Piece, Tree, functions
+from viewsphere.formats.shared.reading.class_table import Numbered
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.sequences import check_whole, instants
+from viewsphere.formats.shared.writing.timeline import Timeline
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample

@@ -22,8 +22,8 @@ from pydantic import Field
 
 from viewsphere.codecs import tar
 from viewsphere.files import open_file
-from viewsphere.formats.shared.export_files import check_files
-from viewsphere.formats.shared.paper import json_bytes
+from viewsphere.formats.shared.writing.export_files import check_files
+from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.model.channel import PICTURES
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample

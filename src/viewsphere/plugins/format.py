@@ -16,9 +16,10 @@ Remark = tuple[int | None, str]
 
 
 class FormatSpec(SpecWithOptions):
-    """Functions that write data sets in one format, and facts about the format. Most formats are trees of files
-    (`viewsphere.formats.shared.tree`), whose functions follow from a class. Functions take the format's options, if it has any,
-    as their last value.
+    """Functions that write data sets in one format, and facts about the format.
+
+    Most formats are trees of files (`viewsphere.formats.shared.writing.tree`), whose functions follow from a class. Functions
+    take the format's options, if it has any, as their last value.
     """
 
     KIND: ClassVar[Kind] = "formats"

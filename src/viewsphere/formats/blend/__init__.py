@@ -30,7 +30,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.normalise import normalise
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.refusals import any_view
+from viewsphere.formats.shared.writing.refusals import any_view
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.camera import Scan
 from viewsphere.model.files import Files

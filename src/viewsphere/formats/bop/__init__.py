@@ -44,34 +44,54 @@ https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Literal
+
+from pydantic import Field
 
 from viewsphere.codecs import tar
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.bop.again import again
+from viewsphere.formats.bop.as_recipe import again
 from viewsphere.formats.bop.entries import (
     Entry,
     camera,
     coco,
     depth_file,
     entries,
+    facts,
     mask_png,
+    ply,
     runs,
     sensor,
     targets,
 )
-from viewsphere.formats.bop.models import facts, ply
-from viewsphere.formats.bop.options import Options
 from viewsphere.formats.bop.reading import read
-from viewsphere.formats.shared.export_files import Coded, Content
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.pictures import picture, suffix_of
-from viewsphere.formats.shared.refusals import known_cameras, lacking_labels, pinhole
-from viewsphere.formats.shared.tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item, member
+from viewsphere.formats.shared.writing.export_files import Coded, Content
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.pictures import picture, suffix_of
+from viewsphere.formats.shared.writing.refusals import known_cameras, lacking_labels, pinhole
+from viewsphere.formats.shared.writing.tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item, member
+from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
+
+
+class Options(Frozen):
+    """The layout of files, and the resolution of depth."""
+
+    layout: Literal["scenewise", "imagewise", "webdataset"] = Field(
+        default="scenewise",
+        description="`scenewise`: JSON files of whole scenes, a PNG for each mask; `imagewise`: all files of a picture by "
+        "themselves, masks as run lengths; `webdataset`: the same in tar shards",
+    )
+    depth_scale: float = Field(
+        default=1.0,
+        gt=0,
+        le=1000,
+        description="millimetres of a step of depth: depth ends at 65,535 of these; many of BOP's own data sets have 0.1",
+    )
+
 
 KINDS = (".png", ".jpg")
 SCENE = 1000

@@ -10,15 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.mesh import Mesh
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import depth_steps
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import depth_steps
+from viewsphere.geometry.diameter import diameter
 from viewsphere.geometry.mask import decode_rle, rle_area, rle_box, rle_runs
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.sample import ObjectAnnotation, Rle, Sample
+from viewsphere.store import ModelInfo
 
 MM = 1000.0
+MILLIMETRES = np.diag([MM, MM, MM, 1.0])
+
+
 LEAST_VISIBLE = 0.1
 """Visible share from which an object counts in BOP's evaluations."""
 
@@ -175,3 +181,36 @@ def _corner_and_size(mask: Rle) -> list[int]:
     assert box is not None
     x0, y0, x1, y1 = box
     return [x0, y0, x1 - x0, y1 - y0]
+
+
+def ply(mesh: Mesh) -> bytes:
+    """The vertices that triangles use, mm, with normals, and the triangles, in ASCII."""
+    used, corners = np.unique(mesh.triangles, return_inverse=True)
+    table = np.hstack([mesh.vertices[used] * np.float64(MM), mesh.normals[used]])
+    head = ["ply", "format ascii 1.0", f"element vertex {len(used)}"]
+    head += [f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
+    head += [f"element face {len(mesh.triangles)}", "property list uchar int vertex_indices", "end_header"]
+    rows = (" ".join(f"{value:.9g}" for value in row) for row in table.tolist())
+    faces = (f"3 {a} {b} {c}" for a, b, c in corners.reshape(-1, 3).tolist())
+    return ("\n".join([*head, *rows, *faces]) + "\n").encode("ascii")
+
+
+def facts(info: ModelInfo, mesh: Mesh) -> dict[str, Any]:
+    """The entry in models_info.json: box, diameter and symmetries, mm."""
+    low, high = mesh.bounds * MM
+    found: dict[str, Any] = {
+        "diameter": MM * (diameter(mesh.corners) if info.diameter is None else info.diameter),
+        **_named("min", low),
+        **_named("size", high - low),
+    }
+    if info.symmetries is not None:
+        own = info.symmetries.moved(MILLIMETRES)
+        if own.discrete:
+            found["symmetries_discrete"] = [np.array(motion).ravel().tolist() for motion in own.discrete]
+        if own.continuous:
+            found["symmetries_continuous"] = [{"axis": [*c.axis], "offset": [*c.offset]} for c in own.continuous]
+    return found
+
+
+def _named(name: str, values: NDArray[np.float64]) -> dict[str, float]:
+    return {f"{name}_{axis}": value for axis, value in zip("xyz", values.tolist(), strict=True)}

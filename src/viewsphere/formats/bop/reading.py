@@ -17,11 +17,10 @@ from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes
-from viewsphere.formats.bop.cads import foreign_models, model_files
 from viewsphere.formats.bop.entries import MM, NO_BOX
-from viewsphere.formats.bop.texts import load
-from viewsphere.formats.shared.image_lists import MISTAKES, one_line
-from viewsphere.formats.shared.placed import placed
+from viewsphere.formats.bop.source_models import foreign_models, load, model_files
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.reading.placed_objects import placed
 from viewsphere.geometry.box import clip_to_image
 from viewsphere.geometry.mask import encode_rle, rle_area, rle_box
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid

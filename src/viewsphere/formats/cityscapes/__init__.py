@@ -48,13 +48,13 @@ from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats import Scope
 from viewsphere.formats.cityscapes.classes import COLORS, LABELS, labels_of
 from viewsphere.formats.cityscapes.instances import EACH, Region, regions
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.pictures import picture, png
-from viewsphere.formats.shared.sequences import Eyes, two_eyes
-from viewsphere.formats.shared.timeline import Timeline
-from viewsphere.formats.shared.tree import FOLDER_SIZE, File, Tree, functions
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.pictures import picture, png
+from viewsphere.formats.shared.writing.sequences import Eyes, two_eyes
+from viewsphere.formats.shared.writing.timeline import Timeline
+from viewsphere.formats.shared.writing.tree import FOLDER_SIZE, File, Tree, functions
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.formats.cityscapes.classes import INSTANCES
-from viewsphere.formats.shared.polygons import one_ring
+from viewsphere.formats.shared.writing.polygons import one_ring
 from viewsphere.geometry.mask import mask_polygons
 
 Ring = NDArray[np.int64]

@@ -32,14 +32,13 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewsphere.formats.coco.categories import notes
-from viewsphere.formats.coco.options import Options
+from viewsphere.formats.coco.categories import Options, notes
 from viewsphere.plugins.format import FormatSpec, Remark
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from viewsphere.formats.coco.entries import Entry
+    from viewsphere.formats.coco.writing import Entry
     from viewsphere.model.sample import Sample
     from viewsphere.store import Dataset
     from viewsphere.store.foreign import ForeignDataset
@@ -65,7 +64,7 @@ def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Samp
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
     """Every fault of an export."""
-    from viewsphere.formats.coco.proving import verify
+    from viewsphere.formats.coco.cross_check import verify
 
     return verify(dataset, folder, sampled, options)
 

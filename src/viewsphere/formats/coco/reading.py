@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,15 +16,32 @@ import numpy as np
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
-from viewsphere.formats.coco.places import annotation_files, picture_file
-from viewsphere.formats.coco.points import KEYPOINTS, named_points
-from viewsphere.formats.coco.said import licences_by_id, licensed, said
-from viewsphere.formats.shared.exif import shown_size, upright
+from viewsphere.formats.coco.categories import KEYPOINTS, named_points
+from viewsphere.formats.coco.source_metadata import licences_by_id, licensed, said
+from viewsphere.formats.shared.reading.exif import shown_size, upright
 from viewsphere.geometry.mask import rle_of_polygons, rle_of_runs, rle_runs
 from viewsphere.model.sample import Box, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
+from viewsphere.store.paths import file_inside, is_name
 from viewsphere.store.texts import parsed
+from viewsphere.urls.inside import is_inside
+
+KINDS = ("instances_", "person_keypoints_")
+"""The beginnings of names of annotation files, before the split; the first that a folder has counts."""
+
+BARE = "image_info_"
+"""The beginning of names of files of pictures without annotations."""
+
+NAMELESS = ("labels", "annotations", "_annotations.coco", "coco_annotations")
+"""Files of one split, whose name is its folder's: FiftyOne's, supervision's, Roboflow's and BlenderProc's."""
+
+ONLY = "train"
+"""The split of one that lies in no folder of several."""
+
+FOLDERS = ("", "data", "images")
+"""The folders of the pictures of such a file, beside it."""
+
 
 LARGEST_ID = 2**63
 LARGEST_CATEGORY = 2**31
@@ -41,11 +59,11 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """Return every image and annotation of a folder with instances files, or of one such file.
 
     Every file becomes a split, named like the file without `instances_`, or like its folder. Its images are searched in the
-    folders that COCO and its relatives use (`viewsphere.formats.coco.places`). Ids of categories are kept. Raises StoreError
+    folders that COCO and its relatives use (see `_annotation_files`). Ids of categories are kept. Raises StoreError
     with every mistake: dangling and repeated ids, missing images, invalid boxes and segmentations. With `keep_going` broken
     entries are left out and reported.
     """
-    files = annotation_files(path)
+    files = _annotation_files(path)
     root = path if path.is_dir() else path.parent
     if path.is_file() and root.resolve().name == "annotations":
         root = root.resolve().parent
@@ -118,7 +136,7 @@ def _read_split(split: str, file: Path, root: Path) -> _Split:
     images: list[tuple[dict[str, Any], Path]] = []
     for image in _with_ids(lists["images"], "image", file, problems):
         try:
-            place = picture_file(image, root, split, file.parent)
+            place = _picture_file(image, root, split, file.parent)
             problem = _image_problem(image, place)
         except StoreError as error:
             place, problem = None, str(error)
@@ -300,3 +318,52 @@ def _corners(source: dict[str, Any]) -> Box | None:
         return None
     numbers = [float(v) for polygon in cast(list[list[float]], outline) for v in polygon[: len(polygon) // 2 * 2]]
     return min(numbers[::2]), min(numbers[1::2]), max(numbers[::2]), max(numbers[1::2])
+
+
+def _annotation_files(path: Path) -> list[tuple[str, Path]]:
+    """The files of a folder, or this one file, each with its split; raises StoreError where there are none."""
+    if path.is_file():
+        return [(_split_of(path), path)]
+    for folder in (path / "annotations", path):
+        kinds = (sorted(folder.glob(f"{kind}*.json")) for kind in KINDS)
+        if found := next(filter(None, kinds), None) or sorted(folder.glob("*.json")):
+            told = [(_split_of(file) if len(found) == 1 else _stem(file), file) for file in found]
+            return told + _bare(path, folder, [split for split, _ in told])
+    parts = ((folder.name, folder / f"{name}.json") for folder in sorted(path.glob("*")) for name in NAMELESS)
+    if nested := {split: file for split, file in parts if file.is_file() and is_name(split)}:
+        return list(nested.items())
+    raise StoreError(f"{path}: expected a COCO data set (annotations/instances_<split>.json); found no such file")
+
+
+def _picture_file(image: dict[str, Any], root: Path, split: str, beside: Path) -> Path | None:
+    """The file of a picture: below the root, where COCO and its relatives keep it, or below the folder `beside`, where the
+    annotations are; None if there is none. Raises StoreError for a path that leads outside.
+    """
+    name = image.get("file_name")
+    if not isinstance(name, str) or not name or not is_inside(name):
+        return None
+    below = [(root, f"{split}/{name}"), (root, f"images/{split}/{name}"), (root, f"images/{name}"), (root, name)]
+    for folder, path in (*below, *((beside, f"{inner}/{name}" if inner else name) for inner in FOLDERS)):
+        with suppress(OSError):  # the name may be too long for the file system
+            if (folder / path).is_file():
+                return file_inside(folder, path)
+    return None
+
+
+def _stem(file: Path) -> str:
+    return next((file.stem.removeprefix(kind) for kind in (*KINDS, BARE) if file.stem.startswith(kind)), file.stem)
+
+
+def _split_of(file: Path) -> str:
+    """The split of a file that is the only one of its folder."""
+    return ONLY if file.stem in NAMELESS else _stem(file)
+
+
+def _bare(root: Path, folder: Path, splits: Sequence[str]) -> list[tuple[str, Path]]:
+    """Splits in which nothing is annotated, and of which there are pictures, as datumaro writes them."""
+    found = [(_stem(file), file) for file in sorted(folder.glob(f"{BARE}*.json"))]
+    return [
+        (split, file)
+        for split, file in found
+        if split not in splits and any((root / place / split).is_dir() for place in ("images", ""))
+    ]

@@ -33,14 +33,14 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats.colmap.again import again
+from viewsphere.formats.colmap.as_recipe import again
 from viewsphere.formats.colmap.points import Sights
 from viewsphere.formats.colmap.reading import read
 from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of
 from viewsphere.formats.shared.cameras import Moment, Rigs, world_of
-from viewsphere.formats.shared.pictures import picture, suffix_of
-from viewsphere.formats.shared.refusals import known_cameras, no_skew
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.writing.pictures import picture, suffix_of
+from viewsphere.formats.shared.writing.refusals import known_cameras, no_skew
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample

@@ -12,8 +12,16 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
-from viewsphere.formats.shared.image_lists import MISTAKES, one_line
-from viewsphere.formats.shared.posed import MOST, Posed, camera_of, check_picture, picture_inside, posed_dataset, without_world
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.reading.posed_pictures import (
+    MOST,
+    Posed,
+    camera_of,
+    check_picture,
+    picture_inside,
+    posed_dataset,
+    without_world,
+)
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset

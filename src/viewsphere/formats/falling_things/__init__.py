@@ -48,10 +48,10 @@ from pydantic import Field
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.falling_things.entries import annotation, box_of, camera_data, class_of, lens_settings, model_settings
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.pictures import depth_png, picture, png
-from viewsphere.formats.shared.refusals import known_cameras, pinhole
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.pictures import depth_png, picture, png
+from viewsphere.formats.shared.writing.refusals import known_cameras, pinhole
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.model.channel import missing
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import Rig

@@ -14,7 +14,7 @@ from viewsphere.formats.huggingface.card import CARD, card
 from viewsphere.formats.huggingface.columns import Columns
 from viewsphere.formats.huggingface.options import Options
 from viewsphere.formats.huggingface.shards import Shards
-from viewsphere.formats.shared.export_files import check_files, same_bytes
+from viewsphere.formats.shared.writing.export_files import check_files, same_bytes
 from viewsphere.plugins.format import Remark
 from viewsphere.store import Dataset
 

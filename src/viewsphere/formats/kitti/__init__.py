@@ -54,8 +54,8 @@ from viewsphere.formats import Scope
 from viewsphere.formats.kitti.reading import read
 from viewsphere.formats.kitti.writing import Kitti, Options, type_of
 from viewsphere.formats.shared.kitti import other_cars
-from viewsphere.formats.shared.refusals import pinhole, plain_names, sequences
-from viewsphere.formats.shared.tree import functions
+from viewsphere.formats.shared.writing.refusals import pinhole, plain_names, sequences
+from viewsphere.formats.shared.writing.tree import functions
 from viewsphere.plugins.format import FormatSpec
 
 

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.formats.shared.image_lists import MISTAKES, one_line, text_of
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line, text_of
 from viewsphere.geometry.rotation import inverse, transform
 from viewsphere.limits import limits
 from viewsphere.model.camera import Camera, Intrinsics

@@ -14,10 +14,19 @@ import numpy as np
 from viewsphere.errors import StoreError
 from viewsphere.formats.kitti.labels import LEVEL, MOST_TRACKS, Labels, Row, read_camera, read_labels
 from viewsphere.formats.kitti.writing import NAMES
-from viewsphere.formats.shared.image_lists import MISTAKES, TEST, TRAIN, Listed, listed_dataset, lists, one_line, unposed
 from viewsphere.formats.shared.kitti import DONT_CARE
-from viewsphere.formats.shared.placed import placed
-from viewsphere.formats.shared.posed import picture_inside
+from viewsphere.formats.shared.reading.image_lists import (
+    MISTAKES,
+    TEST,
+    TRAIN,
+    Listed,
+    listed_dataset,
+    lists,
+    one_line,
+    unposed,
+)
+from viewsphere.formats.shared.reading.placed_objects import placed
+from viewsphere.formats.shared.reading.posed_pictures import picture_inside
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import rigid
 from viewsphere.model.camera import Camera

@@ -13,9 +13,9 @@ from pydantic import Field
 from viewsphere.errors import UserError
 from viewsphere.formats.shared.kitti import DONT_CARE, Car, calibration, calibration_text, car_in, nobody_cares, row, velodyne
 from viewsphere.formats.shared.mounting import Float
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.timeline import Timeline
-from viewsphere.formats.shared.tree import File, Piece, Tree, line
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.timeline import Timeline
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, line
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import CAMERA, Rig
 from viewsphere.model.sample import Sample

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.refusals import any_view
+from viewsphere.formats.shared.writing.refusals import any_view
 from viewsphere.plugins.format import FormatSpec, Remark
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[Entry]]:
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
     """Every fault of an export."""
-    from viewsphere.formats.native.proving import verify
+    from viewsphere.formats.native.writing import verify
 
     return verify(dataset, folder, sampled)
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from viewsphere.formats.shared.export_files import Expected
-from viewsphere.formats.shared.paper import faces, json_bytes, transformation_matrix
+from viewsphere.formats.shared.writing.export_files import Expected
+from viewsphere.formats.shared.writing.paper import faces, json_bytes, transformation_matrix
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
-from viewsphere.formats.shared.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.geometry.box import box_size
 from viewsphere.geometry.mask import encode_rle, mask_box, mask_polygons
 from viewsphere.labels import channels

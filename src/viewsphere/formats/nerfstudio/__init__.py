@@ -32,6 +32,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -41,19 +42,60 @@ from viewsphere.codecs.ply import ply_head
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.nerfstudio.again import again
-from viewsphere.formats.nerfstudio.lenses import SYNTHETIC, lens_problem, model_of, said_of
-from viewsphere.formats.nerfstudio.reading import read
+from viewsphere.formats.nerfstudio.reading import lens_of, name_of, pose_said, read, said_frames, split_of, transforms_files
 from viewsphere.formats.nerfstudio.synthetic import SPLITS, synthetic_files, synthetic_layout
-from viewsphere.formats.shared import refusals
 from viewsphere.formats.shared.cameras import Rigs, measured_png, opengl_pose, points_of, world_of
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import picture, suffix_of
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions, item
+from viewsphere.formats.shared.reading.as_recipe import cameras_again, pose_of
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.reading.posed_pictures import camera_of, picture_inside
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import picture, suffix_of
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, item
+from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.listed import ListedShot
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
+from viewsphere.store.again import Again, refuse_any
+
+SYNTHETIC = "nerf-synthetic"
+NAMES = {"brown_conrady": ("k1", "k2", "p1", "p2", "k3"), "fisheye": ("k1", "k2", "k3", "k4")}
+MOST = {"nerfstudio": 5, "instant-ngp": 4, SYNTHETIC: 0}
+"""Coefficients of a lens, by whose files they are."""
+
+
+FOLDERS = ("", "exports/mesh", "exports/poisson", "exports/tsdf", "exports")
+"""The folders in which nerfstudio's users put meshes, relative to the folder of transforms.json."""
+
+
+def again(path: Path) -> Again:
+    """Return every camera of a world's folder, or of one of its files. Pictures are required only where the file does not give
+    w and h. Raises StoreError where there is no such file, and for a frame that lacks its lens or its pose.
+    """
+    problems: list[str] = []
+    shots: dict[str, ListedShot] = {}
+    files = transforms_files(path)
+    for file in files:
+        for number, said, lists in said_frames(file):
+            try:
+                shot = _shot(file, said, lists)
+                shots.setdefault(shot.image or str(len(shots)), shot)
+            except MISTAKES as error:
+                problems.append(f"{file}: frame number {number}: {one_line(error)}")
+    refuse_any(problems)
+    return cameras_again(path, tuple(shots.values()), files[0].parent, FOLDERS, "nerfstudio", "+z")
+
+
+def _shot(file: Path, said: Mapping[str, Any], lists: Mapping[str, set[str]]) -> ListedShot:
+    name, size = name_of(said), (0, 0)
+    if not (said.get("w") and said.get("h")):
+        _, size = picture_inside(file.parent, name.removeprefix("./"), ".png", ".jpg")
+    lens, pose = lens_of(said, size), pose_said(said)
+    camera_of(lens, pose)
+    return ListedShot(split=split_of(file, name, lists), image=name, world_from_camera=pose_of(pose), camera=lens)
+
 
 MILLIMETRE = 0.001
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
@@ -81,9 +123,9 @@ def refuses(scope: Scope, options: Options) -> Iterator[str]:
     yield from refusals.lacking_labels(scope, needs(options))
     yield from refusals.known_cameras(scope)
     cameras = dict(refusals.lenses(scope))
-    problems = ((name, lens_problem(lens, options.kind)) for name, lens in cameras.items())
+    problems = ((name, _lens_problem(lens, options.kind)) for name, lens in cameras.items())
     yield from (f"{problem} of {name}" for name, problem in problems if problem)
-    if len(models := {model_of(lens) for lens in cameras.values()}) > 1:
+    if len(models := {_model_of(lens) for lens in cameras.values()}) > 1:
         yield f"expected lenses of one model; found {' and '.join(sorted(models))}"
 
 
@@ -98,7 +140,7 @@ class Nerfstudio(Tree):
     def of(self, sample: Sample) -> Iterator[File | Piece]:
         """A picture, its depth, and what is said of it."""
         lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
-        problem = lens_problem(lens, self._kind)
+        problem = _lens_problem(lens, self._kind)
         if problem:
             raise UserError(f"nerfstudio: frame {sample.index}: {problem}")
         stem = self.stem(sample).partition("/")[2]
@@ -110,12 +152,12 @@ class Nerfstudio(Tree):
         yield File(f"{world}/{name}", picture(sample, ".png", ".jpg"))
         yield File(f"{world}/depths/{stem}.png", measured_png(sample, MILLIMETRE))
         depth = "depth_path" if self._kind == "instant-ngp" else "depth_file_path"
-        entry = {"file_path": name, depth: f"depths/{stem}.png", **said_of(lens, self._kind)}
+        entry = {"file_path": name, depth: f"depths/{stem}.png", **_said_of(lens, self._kind)}
         entry["transform_matrix"] = opengl_pose(sample.camera).tolist()
         if self._options.masks:
             yield File(f"{world}/masks/{stem}.png", _mask(sample))
             entry["mask_path"] = f"masks/{stem}.png"
-        yield item(f"{world}/transforms.json", entry, f"{model_of(lens)} {self.dataset.plan.part_of(sample.index)}")
+        yield item(f"{world}/transforms.json", entry, f"{_model_of(lens)} {self.dataset.plan.part_of(sample.index)}")
         yield item(f"{world}/transforms.json", name, f"split {sample.split}")
         if self._kind == "nerfstudio":
             yield _points(f"{world}/points.ply", sample)
@@ -134,7 +176,7 @@ class Nerfstudio(Tree):
         said: dict[str, Any] = {"camera_model": model, "ply_file_path": "points.ply"}
         usual = self._rigs.usual(int(part))
         if self._kind == "instant-ngp":
-            first = {} if usual is None else said_of(usual.sensors[0].intrinsics, self._kind)
+            first = {} if usual is None else _said_of(usual.sensors[0].intrinsics, self._kind)
             said = {**first, "aabb_scale": 16, "integer_depth_scale": MILLIMETRE, "enable_depth_loading": True}
             lists = []
         text = json.dumps(said, separators=(",", ":"))[:-1].encode()
@@ -174,3 +216,34 @@ FORMAT = FormatSpec(
     read=read,
     again=again,
 )
+
+
+def _lens_problem(lens: Intrinsics, kind: str) -> str | None:
+    """Return the part of a lens that files of this kind cannot express; None for a lens that they can."""
+    own = lens.distortion.coefficients if isinstance(lens.distortion, Distortion) else ()
+    if own and not MOST[kind]:
+        return f"expected pinhole cameras; found {len(own)} coefficients"
+    if any(own[MOST[kind] :]):
+        return f"expected lenses of at most {MOST[kind]} coefficients; found {len(own)}"
+    if lens.skew:
+        return f"expected cameras without skew; found {lens.skew:g}"
+    if kind == SYNTHETIC and (lens.fx, lens.cx, lens.cy) != (lens.fy, lens.width / 2, lens.height / 2):
+        found = f"fx {lens.fx:g}, fy {lens.fy:g}, cx {lens.cx:g}, cy {lens.cy:g}"
+        return f"expected square pixels and a centred principal point; found {found}"
+    return None
+
+
+def _model_of(lens: Intrinsics) -> str:
+    """The name of its model."""
+    fisheye = lens.distortion is not None and lens.distortion.model == "fisheye"
+    return "OPENCV_FISHEYE" if fisheye else "OPENCV"
+
+
+def _said_of(lens: Intrinsics, kind: str) -> dict[str, Any]:
+    """Its numbers by their names: sizes and K in pixels from the corner, and coefficients."""
+    said: dict[str, Any] = {"w": lens.width, "h": lens.height, "fl_x": lens.fx, "fl_y": lens.fy, "cx": lens.cx, "cy": lens.cy}
+    if isinstance(lens.distortion, Distortion):
+        said |= dict(zip(NAMES[lens.distortion.model], lens.distortion.coefficients[: MOST[kind]], strict=False))
+        if kind == "instant-ngp" and lens.distortion.model == "fisheye":
+            said["is_fisheye"] = True
+    return said

@@ -13,8 +13,15 @@ from numpy.typing import NDArray
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes
 from viewsphere.formats.nerfstudio.synthetic import SPLITS
-from viewsphere.formats.shared.image_lists import MISTAKES, one_line
-from viewsphere.formats.shared.posed import Posed, camera_of, check_picture, picture_inside, posed_dataset, without_world
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.reading.posed_pictures import (
+    Posed,
+    camera_of,
+    check_picture,
+    picture_inside,
+    posed_dataset,
+    without_world,
+)
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import file_inside, is_name

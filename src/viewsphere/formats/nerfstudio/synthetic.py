@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats.shared.cameras import opengl_pose
-from viewsphere.formats.shared.export_files import Coded, Content
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.tree import File, Layout, Piece, item
+from viewsphere.formats.shared.writing.export_files import Coded, Content
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, item
 from viewsphere.model.sample import Sample
 
 SPLITS = ("train", "val", "test")

@@ -45,11 +45,11 @@ from viewsphere.formats.nuscenes.names import LOG, MAP, alike, category_of, chan
 from viewsphere.formats.nuscenes.story import story_of
 from viewsphere.formats.nuscenes.view import KINDS, View, points
 from viewsphere.formats.shared.mounting import pointless
-from viewsphere.formats.shared.paper import json_bytes
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.refusals import pinhole, sequences
-from viewsphere.formats.shared.timeline import Timeline, unknown_shots
-from viewsphere.formats.shared.tree import LIST, File, Layout, Piece, Tree, functions, item
+from viewsphere.formats.shared.writing.paper import json_bytes
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.refusals import pinhole, sequences
+from viewsphere.formats.shared.writing.timeline import Timeline, unknown_shots
+from viewsphere.formats.shared.writing.tree import LIST, File, Layout, Piece, Tree, functions, item
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec

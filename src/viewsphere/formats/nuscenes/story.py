@@ -6,7 +6,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from viewsphere.formats.shared.timeline import Course, Timeline
+from viewsphere.formats.shared.writing.timeline import Course, Timeline
 from viewsphere.model.camera import Intrinsics
 
 

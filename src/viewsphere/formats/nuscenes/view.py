@@ -13,8 +13,8 @@ from viewsphere.formats.nuscenes import records
 from viewsphere.formats.nuscenes.names import LOG, modalities, token
 from viewsphere.formats.nuscenes.story import Story
 from viewsphere.formats.shared.mounting import measured
-from viewsphere.formats.shared.pictures import suffix_of
-from viewsphere.formats.shared.timeline import Course
+from viewsphere.formats.shared.writing.pictures import suffix_of
+from viewsphere.formats.shared.writing.timeline import Course
 from viewsphere.model.lidar import LIDAR
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot

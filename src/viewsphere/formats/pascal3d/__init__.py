@@ -56,12 +56,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from viewsphere.formats import Scope
-from viewsphere.formats.pascal3d.again import again
+from viewsphere.formats.pascal3d.as_recipe import again
 from viewsphere.formats.pascal3d.reading import read
 from viewsphere.formats.pascal3d.writing import CLASSES, MOST, Pascal3d
-from viewsphere.formats.shared.refusals import most_categories, most_objects
-from viewsphere.formats.shared.tree import functions
 from viewsphere.formats.shared.viewpoint_mat import Options, no_viewpoints, scipy_io
+from viewsphere.formats.shared.writing.refusals import most_categories, most_objects
+from viewsphere.formats.shared.writing.tree import functions
 from viewsphere.plugins.format import FormatSpec
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.formats.pascal3d.records import FARTHEST, structs_of, variables
-from viewsphere.formats.shared.image_lists import MISTAKES, one_line
-from viewsphere.formats.shared.source_models import foreign_model
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.reading.source_models import foreign_model
 from viewsphere.formats.shared.viewpoint_mat import OWN
 from viewsphere.model.keypoints import Keypoints, Place
 from viewsphere.store import Category

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from viewsphere.formats.pascal3d.records import Record, Seen
-from viewsphere.formats.shared.image_lists import MISTAKES, TRAIN, VAL, lists, one_line
-from viewsphere.formats.shared.posed import picture_inside
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, TRAIN, VAL, lists, one_line
+from viewsphere.formats.shared.reading.posed_pictures import picture_inside
 from viewsphere.formats.shared.viewpoint_mat import KIT
 from viewsphere.store.paths import file_inside, is_name
 

@@ -18,9 +18,9 @@ from viewsphere.formats.pascal3d.cads import read_cads
 from viewsphere.formats.pascal3d.pictures import FILES_KEPT, Of, Told, objects_of, picture_of, told_pictures
 from viewsphere.formats.pascal3d.posed import pinhole
 from viewsphere.formats.pascal3d.records import Record, Seen, read_record
-from viewsphere.formats.shared.image_lists import MISTAKES, Listed, listed_dataset, one_line, unposed
-from viewsphere.formats.shared.maps import ALIKE, boxes_of, check_map, numbered, numbers_of, overlap
-from viewsphere.formats.shared.placed import placed
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, Listed, listed_dataset, one_line, unposed
+from viewsphere.formats.shared.reading.placed_objects import placed
+from viewsphere.formats.shared.reading.voc_maps import ALIKE, boxes_of, check_map, numbered, numbers_of, overlap
 from viewsphere.formats.shared.viewpoint_mat import KIT
 from viewsphere.geometry.camera import orbit_rotation
 from viewsphere.geometry.mask import encode_rle

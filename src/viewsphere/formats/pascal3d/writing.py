@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from viewsphere.codecs.palette import palette
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.tree import File, Piece, Tree, line
 from viewsphere.formats.shared.viewpoint_mat import KIT, Cads, Options
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, line
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera, Intrinsics

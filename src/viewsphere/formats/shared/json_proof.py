@@ -8,8 +8,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Final, cast
 
-from viewsphere.formats.shared.export_files import same_bytes
 from viewsphere.formats.shared.json_rows import Row, Where, rows
+from viewsphere.formats.shared.writing.export_files import same_bytes
 from viewsphere.plugins.format import Remark
 
 ABSENT: Final = object()

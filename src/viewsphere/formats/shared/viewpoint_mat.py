@@ -18,7 +18,7 @@ from pydantic import Field
 
 from viewsphere.errors import MissingExtraError, UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.refusals import lenses, pinhole, plain_names
+from viewsphere.formats.shared.writing.refusals import lenses, pinhole, plain_names
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen

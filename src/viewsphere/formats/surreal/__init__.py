@@ -44,10 +44,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.timeline import unknown_shots
-from viewsphere.formats.shared.tree import functions
 from viewsphere.formats.shared.viewpoint_mat import scipy_io
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.timeline import unknown_shots
+from viewsphere.formats.shared.writing.tree import functions
 from viewsphere.formats.surreal.writing import Surreal, film_encoder
 from viewsphere.plugins.format import FormatSpec
 

@@ -19,12 +19,12 @@ from viewsphere.codecs.mat import COMPRESSED, HEAD
 from viewsphere.codecs.mp4 import Encoder, encoder, write_mp4
 from viewsphere.errors import UserError
 from viewsphere.files import read_bytes
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import opaque
-from viewsphere.formats.shared.sequences import check_whole, scene
-from viewsphere.formats.shared.timeline import Timeline
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree
 from viewsphere.formats.shared.viewpoint_mat import mat
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import opaque
+from viewsphere.formats.shared.writing.sequences import check_whole, scene
+from viewsphere.formats.shared.writing.timeline import Timeline
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree
 from viewsphere.formats.surreal.body import MOST_TOLD, UNKNOWN, joints, part_numbers
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset

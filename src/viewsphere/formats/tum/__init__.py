@@ -33,9 +33,9 @@ from pydantic import Field
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.cameras import Rigs, measured_png, world_from_camera, world_of
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.refusals import known_cameras, lenses, no_skew, pinhole
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions, line
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.refusals import known_cameras, lenses, no_skew, pinhole
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, line
 from viewsphere.formats.tum.reading import read
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.camera import Distortion, Intrinsics

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.files import read_text
-from viewsphere.formats.shared.image_lists import MISTAKES, one_line
-from viewsphere.formats.shared.posed import Posed, camera_of, picture_inside, posed_dataset
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.reading.posed_pictures import Posed, camera_of, picture_inside, posed_dataset
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.store.foreign import ForeignDataset

@@ -48,10 +48,10 @@ from typing import Literal
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared import refusals
-from viewsphere.formats.shared.pictures import depth_png, picture
-from viewsphere.formats.shared.sequences import Eyes, instants, scene, two_eyes
-from viewsphere.formats.shared.tree import File, Layout, Piece, Tree, functions
+from viewsphere.formats.shared.writing import refusals
+from viewsphere.formats.shared.writing.pictures import depth_png, picture
+from viewsphere.formats.shared.writing.sequences import Eyes, instants, scene, two_eyes
+from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.formats.vkitti import maps, rows
 from viewsphere.formats.vkitti.names import Names
 from viewsphere.model.frozen import Frozen

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewsphere.codecs.palette import palette
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.formats.vkitti.names import Names, object_colors
 from viewsphere.model.sample import Sample
 

@@ -38,8 +38,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.refusals import most_categories, most_objects, plain_names
-from viewsphere.formats.shared.tree import functions
+from viewsphere.formats.shared.writing.refusals import most_categories, most_objects, plain_names
+from viewsphere.formats.shared.writing.tree import functions
 from viewsphere.formats.voc.reading import read
 from viewsphere.formats.voc.writing import Options, Voc
 from viewsphere.plugins.format import FormatSpec

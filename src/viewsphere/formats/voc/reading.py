@@ -16,9 +16,18 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
-from viewsphere.formats.shared.exif import shown_size
-from viewsphere.formats.shared.image_lists import MISTAKES, SUFFIXES, TRAIN, Listed, listed_dataset, lists, one_line, unposed
-from viewsphere.formats.shared.maps import boxes_of, check_map, numbered, numbers_of, unannotated
+from viewsphere.formats.shared.reading.exif import shown_size
+from viewsphere.formats.shared.reading.image_lists import (
+    MISTAKES,
+    SUFFIXES,
+    TRAIN,
+    Listed,
+    listed_dataset,
+    lists,
+    one_line,
+    unposed,
+)
+from viewsphere.formats.shared.reading.voc_maps import boxes_of, check_map, numbered, numbers_of, unannotated
 from viewsphere.formats.voc.writing import BOX
 from viewsphere.geometry.mask import encode_rle, mask_polygons, rle_of_polygons
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample

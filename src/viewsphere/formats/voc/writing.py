@@ -13,9 +13,9 @@ from pydantic import Field
 
 from viewsphere.codecs.palette import palette
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.formats.shared.export_files import Coded
-from viewsphere.formats.shared.pictures import picture
-from viewsphere.formats.shared.tree import File, Piece, Tree, line
+from viewsphere.formats.shared.writing.export_files import Coded
+from viewsphere.formats.shared.writing.pictures import picture
+from viewsphere.formats.shared.writing.tree import File, Piece, Tree, line
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Portion
 from viewsphere.model.sample import Box, ObjectAnnotation, ObjectView, Sample

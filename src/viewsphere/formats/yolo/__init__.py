@@ -21,7 +21,7 @@ pictures. Source: Ultralytics' documentation, https://docs.ultralytics.com/datas
 
 from __future__ import annotations
 
-from viewsphere.formats.shared.tree import functions
+from viewsphere.formats.shared.writing.tree import functions
 from viewsphere.formats.yolo.reading import read
 from viewsphere.formats.yolo.writing import Options, Yolo
 from viewsphere.plugins.format import FormatSpec

@@ -15,9 +15,8 @@ import yaml
 
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
-from viewsphere.formats.shared.exif import shown_size
-from viewsphere.formats.shared.image_lists import MISTAKES, Listed, listed_dataset, one_line, text_of, unposed
-from viewsphere.formats.yolo.describing import DARKNET, NAMES, darknet, unsaid
+from viewsphere.formats.shared.reading.exif import shown_size
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, TRAIN, Listed, listed_dataset, one_line, text_of, unposed
 from viewsphere.formats.yolo.lines import Kind, Row, coco_of, kind_of, parsed_line
 from viewsphere.geometry.mask import rle_of_polygons
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -25,6 +24,17 @@ from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, foreign_object
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.urls.inside import is_inside
+
+NAMES = "obj.names"
+"""Darknet's file of classes, a line each (https://github.com/AlexeyAB/darknet#how-to-train-to-detect-your-custom-objects)."""
+
+DARKNET = "data/"
+"""The beginning of paths in Darknet's lists. They are relative to the program's folder, and this is the data set's folder
+there.
+"""
+
+IMAGES = "images"
+
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 SPLITS = ("train", "val", "test")
@@ -66,7 +76,7 @@ def _described(path: Path) -> Path:
 
 def _load(file: Path) -> dict[str, Any]:
     if file.name == NAMES:
-        return darknet(file)
+        return _darknet(file)
     try:
         data = read_bytes(file, "MAX_ANNOTATION_BYTES")
         told = yaml.safe_load(data) if len(data) <= LARGEST_FILE else None
@@ -75,7 +85,7 @@ def _load(file: Path) -> dict[str, Any]:
     if not isinstance(told, dict):
         raise StoreError(f"{file}: expected names and folders of pictures; found something else")
     said = cast(dict[str, Any], told)
-    return said if any(name not in NO_SPLITS and place for name, place in said.items()) else {**said, **unsaid(file.parent)}
+    return said if any(name not in NO_SPLITS and place for name, place in said.items()) else {**said, **_unsaid(file.parent)}
 
 
 def _names(told: Mapping[str, Any], file: Path) -> list[str]:
@@ -215,3 +225,23 @@ def _object(number: int, row: Row, categories: Sequence[Category], picture: List
     outline, box = source.get("segmentation"), (x, y, x + width, y + height)
     mask = rle_of_polygons(picture.size[1], picture.size[0], outline) if outline else None
     return foreign_object(number, categories[row.number], picture.size, source, mask, box, **({"extra": more} if more else {}))
+
+
+def _darknet(file: Path) -> dict[str, Any]:
+    """Return a data.yaml for a folder with `obj.names` and lists of pictures: `<split>.txt`, or `images.txt`, which FiftyOne
+    writes. Raises StoreError where the names cannot be read.
+    """
+    try:
+        names = [line.strip() for line in text_of(file) if line.strip()]
+    except MISTAKES as error:
+        raise StoreError(f"{file}: expected a line for each class; found: {one_line(error)}") from None
+    lists = {path.stem: path.name for path in sorted(file.parent.glob("*.txt"))}
+    if IMAGES in lists:
+        lists.setdefault(TRAIN, lists.pop(IMAGES))
+    return {"names": names, **lists}
+
+
+def _unsaid(root: Path) -> dict[str, Any]:
+    """The splits of a folder whose data.yaml names none: folders in `images`, or that itself."""
+    splits = {split: f"{IMAGES}/{split}" for split in ("train", "val", "test") if (root / IMAGES / split).is_dir()}
+    return splits or {TRAIN: IMAGES}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.refusals import lacking_labels
+from viewsphere.formats.shared.writing.refusals import lacking_labels
 from viewsphere.labels import Needs, label_named, label_names
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample

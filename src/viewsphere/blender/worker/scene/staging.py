@@ -14,7 +14,7 @@ from ..rendering.blurring import ORDER
 from . import ground, lights, materials, meshes, scripting
 
 DARKEST = 0.6
-"""Largest share of the _light that shadows remove: Workbench darkens faces turned away from the sun as much, though the sun
+"""Largest share of the light that shadows remove: Workbench darkens faces turned away from the sun as much, though the sun
 gives them nothing.
 """
 
@@ -41,13 +41,13 @@ def stage(told):
         kind[NUMBER] = number
     for order, item in enumerate(told["objects"]):
         _place(scene, kinds[item["mesh"]], item["matrix"], item["index"])[ORDER] = order
-    for _light in told["lights"]:
-        lights.add_light(scene, _light)
+    for light in told["lights"]:
+        lights.add_light(scene, light)
     sky = lights.add_world(scene, told["world"]) if told["world"] else None
     if told["ground"]:
         _lay_ground(scene, told["ground"], sky, made, renderer)
     if renderer == "workbench":
-        _light(scene.display, told["lights"], told["hemispheres"])
+        _studio_light(scene.display, told["lights"], told["hemispheres"])
     renderers.set_up(scene, told["settings"])
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
@@ -103,7 +103,7 @@ def _place(scene, mesh, matrix, index):
     return placed
 
 
-def _light(display, lights, hemispheres):
+def _studio_light(display, lights, hemispheres):
     """Light the display's studio by the sun among the `lights`, and by `hemispheres` (2, 3), the radiance of a white matt
     surface that faces up, and of one that faces down; None leaves Blender's own studio as it is.
     """

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes, read_text
-from viewsphere.formats.shared.exif import upright
+from viewsphere.formats.shared.reading.exif import upright
 from viewsphere.model.mistakes import dotted, first_of
 from viewsphere.model.sample import Sample
 from viewsphere.store import Category

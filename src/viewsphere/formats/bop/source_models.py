@@ -12,16 +12,17 @@ from pydantic import ValidationError
 
 from viewsphere.assets.cache import load_normalised
 from viewsphere.errors import StoreError, UserError
+from viewsphere.files import read_bytes
 from viewsphere.formats.bop.entries import MM
-from viewsphere.formats.bop.texts import load
-from viewsphere.formats.shared.image_lists import one_line
-from viewsphere.formats.shared.source_models import foreign_model
+from viewsphere.formats.shared.reading.image_lists import one_line
+from viewsphere.formats.shared.reading.source_models import foreign_model
 from viewsphere.model.mistakes import first_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.symmetries import RIGID, Symmetries
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignModel
 from viewsphere.store.paths import file_inside
+from viewsphere.store.texts import parsed
 
 FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
 """The folders in which data sets have their models; the first that exists counts."""
@@ -96,3 +97,16 @@ def _moving(listed: Any) -> Iterator[list[float]]:
         matrix = np.array(motion, np.float64).reshape(16)
         if np.abs(matrix - np.eye(4).ravel()).max() > RIGID:
             yield matrix.tolist()
+
+
+def load(file: Path) -> dict[str, Any]:
+    """One of BOP's JSON files, an object; an empty one where there is no such file. Raises StoreError for another."""
+    if not file.is_file():
+        return {}
+    try:
+        found = parsed(read_bytes(file, "MAX_RECORD_BYTES"))
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{file}: expected BOP's JSON; found: {error}") from None
+    if not isinstance(found, dict):
+        raise StoreError(f"{file}: expected an object of images; found something else")
+    return cast(dict[str, Any], found)

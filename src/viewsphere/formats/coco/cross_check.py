@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,16 +15,24 @@ from numpy.typing import NDArray
 
 from viewsphere.aside import temporary
 from viewsphere.errors import ViewsphereError
-from viewsphere.formats.coco.categories import category_ids
-from viewsphere.formats.coco.options import Options
-from viewsphere.formats.coco.points import Names, object_points, point_names
-from viewsphere.formats.shared.json_rows import rows
+from viewsphere.formats.coco.categories import Names, Options, category_ids, object_points, point_names
+from viewsphere.formats.coco.writing import Entries, Entry, file_name, file_names, files, instances, seen
+from viewsphere.formats.shared.json_proof import check_json
+from viewsphere.formats.shared.json_rows import Where, rows
+from viewsphere.formats.shared.writing.export_files import Expected, check_files, models
 from viewsphere.geometry.mask import encode_rle, mask_box
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import Remark
 
 if TYPE_CHECKING:
     from viewsphere.store import Dataset
+
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
+
+OPENED: tuple[Where, ...] = ((), ("categories",), ("models",), ("images",), ("annotations",))
+"""The parts of an instances file that the proof reads and compares item by item."""
+
 
 MOST_FRAMES = 2000
 """Frames of a split that are looked at, spread evenly: COCOeval keeps all of them in memory."""
@@ -47,7 +55,9 @@ class _Truth:
     points: list[float]  # x, y, v of each of its category's points
 
 
-def testify(dataset: Dataset, file: Path, split: str, sampled: Collection[int], options: Options) -> Iterator[Remark]:
+def compare_with_pycocotools(
+    dataset: Dataset, file: Path, split: str, sampled: Collection[int], options: Options
+) -> Iterator[Remark]:
     """Masks, areas and boxes that differ from those of the instance maps, and an AP below 1 of detections made from these, and
     from the stored keypoints.
 
@@ -153,3 +163,39 @@ def _precision_of_points(coco: Any, truths: Collection[_Truth], file: Path) -> I
 def _detection(truth: _Truth) -> dict[str, Any]:
     code = {"size": list(truth.mask.shape), "counts": encode_rle(truth.mask)}
     return {"image_id": truth.frame + 1, "category_id": truth.category, "score": 1.0, "bbox": truth.box, "segmentation": code}
+
+
+def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
+    """Yield every difference from the current export. For the `sampled` frames, pycocotools' masks must equal the stored
+    instance maps, and detections made from these maps must score AP 1.
+    """
+    names = file_names(dataset)
+    with temporary("coco") as aside:
+        with instances(dataset, aside, options) as append:
+            expected, again = _expected(dataset, append, options), _expected(dataset, _nowhere, options)
+            yield from check_files(dataset, folder, expected, again, [f"annotations/{name}" for name in names])
+        for name in names:
+            yield from check_json(aside / name, folder / "annotations" / name, OPENED, _frame)
+        for split in dataset.splits:
+            yield from compare_with_pycocotools(dataset, folder / "annotations" / file_name(split), split, sampled, options)
+
+
+def _expected(dataset: Dataset, append: Callable[[Entry], None], options: Options) -> Iterator[Expected]:
+    """Yield every file but the instances; for the instances, `append` receives each frame."""
+    entries = Entries(dataset, options)
+    for sample in dataset:
+        masks = seen(sample)
+        append(entries.of(sample, masks))
+        yield from files(dataset, sample, masks, options)
+    yield from models(dataset)
+
+
+def _nowhere(entry: Entry) -> None:
+    """Ignore a frame, for callers that need only its files."""
+
+
+def _frame(where: Where, value: Any) -> int | None:
+    """Ids of images are frames, counted from 1."""
+    key = {"images": "id", "annotations": "image_id"}.get(where[0] if where else "")
+    number = value.get(key) if key and isinstance(value, dict) else None
+    return number - 1 if isinstance(number, int) else None

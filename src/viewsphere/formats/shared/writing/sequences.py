@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import Scope
-from viewsphere.formats.shared.timeline import unknown_shots
+from viewsphere.formats.shared.writing.timeline import unknown_shots
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Pair, Rig
 from viewsphere.model.sample import Sample

@@ -14,8 +14,8 @@ from viewsphere.formats.pascal3d.cads import read_shapes
 from viewsphere.formats.pascal3d.pictures import FILES_KEPT, Told, objects_of, picture_of, told_pictures
 from viewsphere.formats.pascal3d.posed import Posed, pinhole, posed
 from viewsphere.formats.pascal3d.records import Record, read_record
-from viewsphere.formats.shared.again import pose_of
-from viewsphere.formats.shared.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.reading.as_recipe import pose_of
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.formats.shared.viewpoint_mat import off_bytes
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.model.camera import Intrinsics

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 from viewsphere.aside import temporary
 from viewsphere.errors import UserError
 from viewsphere.files import open_file
-from viewsphere.formats.shared.export_files import Content, Expected, check_files, put, same_bytes
-from viewsphere.formats.shared.paper import json_bytes
+from viewsphere.formats.shared.writing.export_files import Content, Expected, check_files, put, same_bytes
+from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.labels import channels
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import Remark

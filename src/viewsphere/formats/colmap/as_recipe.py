@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewsphere.formats.colmap.reading import read_model
-from viewsphere.formats.shared.again import cameras_again, nearest_up, pose_of
-from viewsphere.formats.shared.image_lists import MISTAKES, one_line
-from viewsphere.formats.shared.posed import camera_of
+from viewsphere.formats.shared.reading.as_recipe import cameras_again, nearest_up, pose_of
+from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
+from viewsphere.formats.shared.reading.posed_pictures import camera_of
 from viewsphere.model.listed import ListedShot
 from viewsphere.store.again import Again, refuse_any
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.formats.shared.export_files import Coded
+from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.model.sample import Sample
 
 FLO_TAG = b"PIEH"

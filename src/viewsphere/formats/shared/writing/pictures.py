@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewsphere.codecs.pictures import encode_picture
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.formats.shared.export_files import Coded, Content
+from viewsphere.formats.shared.writing.export_files import Coded, Content
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import Sample
 
