@@ -141,7 +141,7 @@ def measure(objects: int, rounds: int, embree: Callable[[Any], Any]) -> tuple[di
     stage = stages.stage(shot)
     views = ShotViews(shot, stage.at, lambda thing: stages.model(thing.model))
     boxes = [stages.box(thing.model) for thing in shot.objects]
-    traits = [lambda thing=thing: stages.traits(thing.model) for thing in shot.objects]
+    metadata = [lambda thing=thing: stages.metadata(thing.model) for thing in shot.objects]
     found: dict[str, list[float]] = {}
     rival = None
     for round_ in range(rounds + 1):
@@ -152,7 +152,7 @@ def measure(objects: int, rounds: int, embree: Callable[[Any], Any]) -> tuple[di
             def context(view: Any = view, around: Any = around, instant: int = instant) -> LabelContext:
                 files = ["model.obj"] * len(boxes)
                 seen = context_of(
-                    shot, instant, view.camera, view.geometry, view.visibility, boxes, files, None, around, traits
+                    shot, instant, view.camera, view.geometry, view.visibility, boxes, files, None, around, metadata
                 )
                 for placement in seen.placements:
                     if placement:

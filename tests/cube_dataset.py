@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from small import still_channels
-from viewsphere.assets.appearance.looks import looks_of
+from viewsphere.assets.appearance.description import appearance_of
 from viewsphere.assets.exporting.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.composing.viewpoints.camera import looking
@@ -18,13 +18,13 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import PASSES
 from viewsphere.model.files import Files
 from viewsphere.model.instant import Viewpoint
+from viewsphere.model.metadata import ModelMetadata
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.model.traits import Traits
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Store
 from viewsphere.store.shots.records import PRODUCT
 from viewsphere.truth.raster.geometry import build_geometry
@@ -88,9 +88,9 @@ def render(shot: Shot):
         alpha = np.where(channels["instances"] > 0, 255, 0).astype(np.uint8)
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
         channels = {name: channels[name] for name in shot.channels}
-        traits = [partial(Traits, diameter(mesh.vertices), looks=partial(looks_of, mesh)) for mesh in meshes]
+        metadata = [partial(ModelMetadata, diameter(mesh.vertices), looks=partial(appearance_of, mesh)) for mesh in meshes]
         context = context_of(
-            shot, instant, camera, geometry, visibility, boxes, files, None, views.around(instant, sensor), traits
+            shot, instant, camera, geometry, visibility, boxes, files, None, views.around(instant, sensor), metadata
         )
         objects = annotated(context)
         more = sample_values(context, objects)
@@ -154,14 +154,14 @@ def make(
     for i, mesh in enumerate(MESHES):
         s, (low, high) = spec(i), mesh.bounds
         width, length, height = (high - low).tolist()
-        with store.aside(store.model_folder(s.key)) as folder:
+        with store.scratch_folder(store.model_folder(s.key)) as folder:
             export_obj(mesh, folder, s.key)
             export_glb(mesh, folder / f"{s.key}.glb")
             info = ModelInfo(
                 s.key, s.category, s.supercategory, s.category_id, f"store/models/{s.key}/{s.key}.obj",
                 f"store/models/{s.key}/{s.key}.glb", box_vertices(low, high), (width, height, length), s.real_size,
                 mesh.parts, len(mesh.triangles), "d", diameter=diameter(mesh.vertices),
-                looks=looks_of(mesh) if annotations else None,
+                looks=appearance_of(mesh) if annotations else None,
             )  # fmt: skip
             store.write_model_info(folder, info)
     for i, shot in enumerate(planned):

@@ -25,8 +25,8 @@ from pathlib import Path
 from command_line import Answer, viewsphere
 from deadline import DEADLINE, until
 from small import small_recipe, tree_hash
-from viewsphere.aside import LOCK
 from viewsphere.errors import StoreError
+from viewsphere.scratch import LOCK
 from viewsphere.store.shots.checksums import damaged_files
 from viewsphere.store.shots.manifest import MANIFEST, Manifest
 
@@ -179,7 +179,7 @@ def _files(out: Path) -> int:
 
 
 @dataclass
-class Course:
+class SequenceState:
     """A work in a folder, which faults hit again and again until it is done; then it begins anew."""
 
     work: Work

@@ -15,11 +15,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from viewsphere.aside import aside, of_this_process
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.tracks import TRACK
 from viewsphere.run.exports.exporting import export
+from viewsphere.scratch import of_this_process, scratch_folder
 from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
 from viewsphere.store.places import local
 from viewsphere.store.shots.moving import DURABILITIES, DURABILITY, move, write_through
@@ -91,7 +91,7 @@ def test_wrong_arrays_are_refused():
 def test_an_interrupted_write_leaves_nothing(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    with pytest.raises(RuntimeError), store.aside(store.shot_folder("m-000000")) as folder:
+    with pytest.raises(RuntimeError), store.scratch_folder(store.shot_folder("m-000000")) as folder:
         (folder / "half").write_text("x")
         raise RuntimeError
     assert not store.has_shot("m-000000")
@@ -102,7 +102,7 @@ def test_two_writers_of_one_shot(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
     for _ in range(2):
-        with store.aside(store.shot_folder("m-000000")) as folder:
+        with store.scratch_folder(store.shot_folder("m-000000")) as folder:
             (folder / "frames.json").write_text("[]")
     assert store.has_shot("m-000000")
     assert list((store.folder / "writing").iterdir()) == []
@@ -114,7 +114,7 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
     writing = store.folder / "writing"
     (writing / f"{of_this_process()}of a killed process of this number").mkdir()
     (writing / "otherhost~1~x").mkdir()
-    with aside(writing) as alive:
+    with scratch_folder(writing) as alive:
         with store.occupied():
             (writing / f"{of_this_process()}of a worker that was killed meanwhile").mkdir()
         assert {p.name for p in writing.iterdir()} == {alive.name, "otherhost~1~x"}
@@ -344,7 +344,7 @@ def test_a_broken_plan_is_said(tmp_path, text):
 def test_a_full_disk_is_one_line_and_loses_nothing(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    with pytest.raises(StoreError, match="No space left"), store.aside(store.shot_folder("m-000000")):
+    with pytest.raises(StoreError, match="No space left"), store.scratch_folder(store.shot_folder("m-000000")):
         raise OSError(28, "No space left on device")
     assert not store.has_shot("m-000000")
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from deadline import DEADLINE, until
-from viewsphere.aside import aside, of_this_process
 from viewsphere.assets.cache import PREFIX, cache_folder, load, load_normalised
 from viewsphere.assets.mesh_file import ARRAYS
 from viewsphere.assets.sandbox import server as reader_process
@@ -21,6 +20,7 @@ from viewsphere.assets.sandbox.server import ReaderProcess, Setting
 from viewsphere.assets.sandbox.worker import Job
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.scratch import of_this_process, scratch_folder
 
 CUBE = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 2) for z in (0, 3)) + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\n"
 
@@ -215,7 +215,7 @@ def test_what_was_left_behind_is_swept(spec):
     killed = folder / f"{PREFIX}{of_this_process()}x"
     killed.mkdir(parents=True)
     (killed / "mesh.arrays").write_bytes(b"half")
-    with aside(folder, PREFIX) as alive:
+    with scratch_folder(folder, PREFIX) as alive:
         load_normalised(spec)
         assert {p.name for p in folder.iterdir() if p.is_dir()} == {alive.name}
 

@@ -14,7 +14,7 @@ from viewsphere.assets.exporting.export import export_deforming, export_glb
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.exporting.glb import material_names
 from viewsphere.assets.load import load_model
-from viewsphere.assets.metadata.traits import with_body_parts
+from viewsphere.assets.metadata.model_metadata import with_body_parts
 from viewsphere.assets.skin import NONE, strongest
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec, Parts

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from viewsphere.aside import LOCK
 from viewsphere.blender.process import BlenderProcess
+from viewsphere.scratch import LOCK
 
 
 @pytest.fixture(scope="session")

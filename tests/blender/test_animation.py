@@ -94,7 +94,7 @@ def test_every_format_moves_from_where_it_stands_at_the_first_frame(files, kind)
 
 def test_bones_are_named_points_at_each_frame(files):
     stages, spec = Stages(), spec_of(files / "bend.blend")
-    points = [stages.traits(spec, TimeStep(frame=frame)).keypoints.points for frame in FRAMES]
+    points = [stages.metadata(spec, TimeStep(frame=frame)).keypoints.points for frame in FRAMES]
     assert [[*one] for one in points] == [["bone"]] * 3
     np.testing.assert_allclose([one["bone"][2] - points[0]["bone"][2] for one in points], (0, 0.5, 1), atol=0.02)
     assert [one["bone"][:2] for one in points] == [points[0]["bone"][:2]] * 3

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewsphere.aside import of_this_process
 from viewsphere.caches import arrays, budget, cache_of
 from viewsphere.caches.arrays import Content
 from viewsphere.caches.entries import PREFIX, SUFFIX, kept, making, read_entry, write_entry
+from viewsphere.scratch import of_this_process
 
 
 @pytest.fixture(autouse=True)

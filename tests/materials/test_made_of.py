@@ -9,7 +9,7 @@ import viewsphere as vs
 from animated import let_walk
 from small import ROOT
 from viewsphere.assets.appearance.box_mapping import box_mapped
-from viewsphere.assets.appearance.looks import looks_of, words
+from viewsphere.assets.appearance.description import appearance_of, words
 from viewsphere.assets.appearance.pbr import pictures_of
 from viewsphere.assets.appearance.repaint import textured
 from viewsphere.assets.mesh import Material
@@ -21,9 +21,9 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.materials import brick as brick_module
 from viewsphere.materials import metres, surface
 from viewsphere.materials.brick import Brick
+from viewsphere.model.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import Ground
 from viewsphere.model.shot import Shot
-from viewsphere.model.substance import Substance
 from viewsphere.model.thing import Repaint
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
@@ -31,8 +31,8 @@ from viewsphere.recipe.scene import EngineEntry
 from viewsphere.rendering.ground.material import ground_albedo, ground_material, only_scatters
 from viewsphere.zoo import build
 
-WOOD = Substance(name="wood", seed=4, size=128)
-BRICK = Substance(name="brick", seed=4, size=128)
+WOOD = ProceduralMaterial(name="wood", seed=4, size=128)
+BRICK = ProceduralMaterial(name="brick", seed=4, size=128)
 
 
 def recipe_of(ground="off", materials=(), **changes):
@@ -62,7 +62,7 @@ def test_pictures_hold_what_the_surface_is():
     assert (data[..., 2] == 0).all()
     np.testing.assert_allclose(bumps[..., :3] / 127.5 - 1, made.normals, atol=0.005)
     assert all((pixels[..., 3] == 255).all() for pixels in (color, data, bumps))
-    assert (pictures_of(Substance(name="metal", seed=1, size=32))[1].pixels[..., 2] > 250).all()
+    assert (pictures_of(ProceduralMaterial(name="metal", seed=1, size=32))[1].pixels[..., 2] > 250).all()
 
 
 def test_a_ground_is_made_of_a_material():
@@ -215,17 +215,20 @@ def test_mistakes_are_told_in_a_line(scene, told):
 
 
 def test_sentences_say_what_a_model_is_made_of(chair, monkeypatch):
-    looks = looks_of(replace(chair, materials=tuple(Material(m.name, roughness=0.9) for m in chair.materials)))
+    looks = appearance_of(replace(chair, materials=tuple(Material(m.name, roughness=0.9) for m in chair.materials)))
     assert words(looks)[1] == "matte"
     assert words(looks, (Repaint(texture=BRICK),))[1] == "brick"
     assert words(looks, (Repaint(texture=WOOD),))[1] == "wooden"
-    assert words(looks, (Repaint(texture=Substance(name="grass", size=128)),))[0] == "green"
-    assert words(looks, (Repaint(texture=Substance(name="plaster", size=128), tint=(0.0, 0.0, 0.9)),)) == ("blue", "plaster")
-    leaves = looks_of(replace(chair, materials=tuple(Material(m.name, alpha_mode="MASK") for m in chair.materials)))
+    assert words(looks, (Repaint(texture=ProceduralMaterial(name="grass", size=128)),))[0] == "green"
+    assert words(looks, (Repaint(texture=ProceduralMaterial(name="plaster", size=128), tint=(0.0, 0.0, 0.9)),)) == (
+        "blue",
+        "plaster",
+    )
+    leaves = appearance_of(replace(chair, materials=tuple(Material(m.name, alpha_mode="MASK") for m in chair.materials)))
     assert words(leaves, (Repaint(texture=WOOD),))[1] != "wooden"  # they stay what they are
     brick = Brick(colors=((0.3, 0.03, 0.02),) * 3, rows=16)  # whose joints come back every 8 texels
     monkeypatch.setattr(brick_module, "MATERIAL", brick_module.MATERIAL.model_copy(update={"draw": lambda rng: brick}))
-    assert words(looks, (Repaint(texture=Substance(name="brick", seed=77, size=128)),)) == ("red", "brick")
+    assert words(looks, (Repaint(texture=ProceduralMaterial(name="brick", seed=77, size=128)),)) == ("red", "brick")
 
 
 @pytest.mark.slow

@@ -7,9 +7,9 @@ import sys
 import pytest
 from pydantic import BaseModel, Field, ValidationError
 
-from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.listed import ListedObject, ListedShot
+from viewsphere.model.omit_none import OmitNone
 
 
 class Wheel(Frozen):
@@ -18,10 +18,10 @@ class Wheel(Frozen):
     radius: float = Field(gt=0, description="metres")
 
 
-class Axle(Brief):
+class Axle(OmitNone):
     """Two wheels."""
 
-    UNSAID = ("load",)
+    OMIT_IF_NONE = ("load",)
 
     wheels: tuple[Wheel, ...]
     load: float | None = None

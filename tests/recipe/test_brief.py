@@ -3,10 +3,10 @@
 import pytest
 
 from viewsphere import Recipe
-from viewsphere.model.brief import Brief
+from viewsphere.model.appearance import Patch
 from viewsphere.model.instant import Viewpoint
-from viewsphere.model.looks import Patch
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.rig import Sensor
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint
@@ -23,15 +23,15 @@ CLASSES = [
 
 
 def test_all_of_them_are_looked_at():
-    assert {kind for kind in Brief.__subclasses__() if kind.__module__.startswith("viewsphere.")} == set(CLASSES)
+    assert {kind for kind in OmitNone.__subclasses__() if kind.__module__.startswith("viewsphere.")} == set(CLASSES)
 
 
 @pytest.mark.parametrize("kind", CLASSES)
 def test_what_may_be_unsaid_is_left_out_where_it_is_none_and_nothing_else_is(kind):
     fields = {name: None for name in kind.model_fields}
     written = kind.model_construct(**fields).model_dump(warnings=False)
-    assert 0 < len(kind.UNSAID) == len(fields) - len(written)
-    assert list(written) == [name for name in fields if name not in kind.UNSAID]
+    assert 0 < len(kind.OMIT_IF_NONE) == len(fields) - len(written)
+    assert list(written) == [name for name in fields if name not in kind.OMIT_IF_NONE]
 
 
 def test_a_recipe_says_what_it_is_told():

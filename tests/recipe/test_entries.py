@@ -7,11 +7,11 @@ import pytest
 from pydantic import Field, ValidationError
 
 from viewsphere.model import scene
-from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Length, Portion
+from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import Color, Effects, Picture, Srgb
-from viewsphere.model.substance import Substance
 from viewsphere.recipe import finish, light, surface, weather
 from viewsphere.recipe.draws import drawn, is_random
 from viewsphere.recipe.entries import Entry, concrete, entry_of, pictures_of, words_of
@@ -181,7 +181,7 @@ def test_all_parts_of_a_scene_have_an_entry():
     derived = {kind.part for kind in entries if issubclass(kind, Entry) and kind is not Entry}
     parts = {kind for kind in vars(scene).values() if isinstance(kind, type) and issubclass(kind, Frozen)}
     assert parts - derived == {
-        *(Frozen, Brief, Substance),  # what they are made of
+        *(Frozen, OmitNone, ProceduralMaterial),  # what they are made of
         *(scene.Finish, scene.BlendScene, scene.Floor, scene.Scene),
     }
 

@@ -10,11 +10,11 @@ import pytest
 import viewsphere as vs
 from quick import quick
 from small import small_recipe, tree_hash
-from viewsphere.aside import aside
 from viewsphere.caches import cache_of
 from viewsphere.errors import RecipeError, RemoteError
 from viewsphere.recipe.fetched import PREFIX, fetched
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.scratch import scratch_folder
 from viewsphere.urls import download, files_below, located, remote_path
 
 TETRAHEDRON = "mtllib t.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -129,14 +129,14 @@ def test_no_more_is_written_than_may_be(url, monkeypatch, known):
 
     @contextmanager
     def weighed(place, prefix):
-        with aside(place, prefix) as own:
+        with scratch_folder(place, prefix) as own:
             try:
                 yield own
             finally:
                 written.append(sum((own / "new" / name).stat().st_size for name in files_below(own / "new")))
 
     monkeypatch.setattr(kind, "find", find)
-    monkeypatch.setattr("viewsphere.recipe.fetched.aside", weighed)
+    monkeypatch.setattr("viewsphere.recipe.fetched.scratch_folder", weighed)
     whole = sum(map(len, FILES.values()))
     monkeypatch.setenv("VIEWSPHERE_MAX_FETCHED_BYTES", str(whole - 1))
     with pytest.raises(RecipeError, match=rf"at most {whole - 1:,} bytes .*MAX_FETCHED_BYTES\), found more"):

@@ -11,7 +11,6 @@ import pytest
 from animated import TORN, let_walk, walker
 from sealing import seal_again
 from viewsphere import Dataset, Recipe, generate, plan
-from viewsphere.aside import of_this_process
 from viewsphere.assets.load import load_model
 from viewsphere.check import check
 from viewsphere.errors import RecipeError, StoreError
@@ -22,6 +21,7 @@ from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.datasets.merging import merge
 from viewsphere.run.shots.stages import Stages
+from viewsphere.scratch import of_this_process
 from viewsphere.store import Choice, Store
 
 FRAMES = (1, 13, TORN)

@@ -15,7 +15,7 @@ from viewsphere.composing.scene.draws import Scenes
 from viewsphere.errors import RecipeError
 from viewsphere.limits import limits
 from viewsphere.planning.plan import plan
-from viewsphere.planning.samplers.shared import stock as _stock
+from viewsphere.planning.samplers.shared import sampling_context as _stock
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.datasets.merging import merge
 from viewsphere.run.shots.framing import Framing
@@ -96,8 +96,8 @@ def test_what_cannot_be_met_is_the_best_found_and_counted(tmp_path):
     planned = plan(drawn)
     stages = Stages()
     for sample, subject in zip(samples, planned.subjects, strict=True):
-        tries = [next(stages.render(planned.take(subject, [0], stages.box, tries=[k]))) for k in range(MOST_TRIES)]
-        assert sample.objects[0].visibility == max(own(tries))
+        redraws = [next(stages.render(planned.take(subject, [0], stages.box, redraws=[k]))) for k in range(MOST_TRIES)]
+        assert sample.objects[0].visibility == max(own(redraws))
 
 
 @pytest.mark.parametrize("least", [0.1, 0.8, 0.99])
@@ -109,8 +109,8 @@ def test_no_shot_is_made_twice(frames, least):
     planned, stages, taken = plan(recipe), Stages(), []
 
     class Source:
-        def shot(self, row, box_of, tries=(), redraw=0):
-            taken.append((tuple(tries) or (0,) * frames, planned.shot(row, box_of, tries, redraw)))
+        def shot(self, row, box_of, redraws=(), redraw=0):
+            taken.append((tuple(redraws) or (0,) * frames, planned.shot(row, box_of, redraws, redraw)))
             return taken[-1][1]
 
         def whole(self, row):
@@ -119,7 +119,7 @@ def test_no_shot_is_made_twice(frames, least):
     for row in planned.rows:
         taken.clear()
         made = Framing(planned, Source(), stages, stages.box).shot(row)
-        assert len({tries for tries, _ in taken}) == len(taken) <= MOST_TRIES
+        assert len({redraws for redraws, _ in taken}) == len(taken) <= MOST_TRIES
         drawn = [own(stages.render(shot)) for _, shot in taken]
         assert own(stages.render(made)) == [
             next((seen for seen in found if seen >= least), max(found)) for found in zip(*drawn, strict=True)
@@ -135,7 +135,7 @@ def test_tries_share_what_is_computed_of_a_plan(monkeypatch):
     shots = [planned.shot(0, stages.box, [number] * 6) for number in range(4)]
     assert len({shot.instants[0].viewpoint for shot in shots}) == 4
     assert len(made) == 1
-    assert planned.trying({0: 1}).schedules is planned.schedules
+    assert planned.with_redraws({0: 1}).schedules is planned.schedules
 
 
 @pytest.mark.parametrize("name", quick(["min_visibility", "empty"], "empty"))

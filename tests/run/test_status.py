@@ -13,12 +13,12 @@ from command_line import viewsphere
 from counting import counted
 from deadline import until
 from small import small_recipe
-from viewsphere.aside import LOCK
 from viewsphere.errors import StoreError
 from viewsphere.planning.extension import whole
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.generate import generate
 from viewsphere.run.status import status
+from viewsphere.scratch import LOCK
 from viewsphere.store import Store
 from viewsphere.store.index import Index
 from viewsphere.store.shots.folder import RUN

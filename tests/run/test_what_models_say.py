@@ -118,7 +118,7 @@ def test_what_is_said_of_looks(recipe, tmp_path):
 
     def said(**settings):
         (spec,) = model_specs(recipe(**settings))
-        looks = Stages().traits(spec).looks()
+        looks = Stages().metadata(spec).looks()
         return looks.color, looks.material
 
     assert said() == ("navy", "wooden") and said(color="dark blue") == ("dark blue", "wooden")
@@ -149,14 +149,14 @@ def test_what_a_recipe_asks_for(recipe, tmp_path):
     (tmp_path / "other.yaml").write_text("keypoints: {points: {middle: [20, 0, 0]}}")
     stages = Stages()
 
-    def traits(**settings):
+    def metadata(**settings):
         (spec,) = model_specs(recipe(**settings))
-        return stages.traits(spec)
+        return stages.metadata(spec)
 
-    assert traits().symmetries is None and traits(symmetries="declared").symmetries is None
-    assert len(traits(symmetries="found").symmetries.discrete) == 3
-    assert len(traits(keypoints=5).keypoints.points) == 5
-    np.testing.assert_allclose(traits(sidecar=str(tmp_path / "other.yaml")).keypoints.points["middle"], 0, atol=1e-9)
+    assert metadata().symmetries is None and metadata(symmetries="declared").symmetries is None
+    assert len(metadata(symmetries="found").symmetries.discrete) == 3
+    assert len(metadata(keypoints=5).keypoints.points) == 5
+    np.testing.assert_allclose(metadata(sidecar=str(tmp_path / "other.yaml")).keypoints.points["middle"], 0, atol=1e-9)
 
 
 @pytest.mark.slow

@@ -7,8 +7,8 @@ from quick import quick
 from viewsphere import plugins
 from viewsphere.assets.cache import load
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.metadata.model_metadata import metadata_of
 from viewsphere.assets.metadata.part_points import At, part_points, sided
-from viewsphere.assets.metadata.traits import traits_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.zoo import build_zoo_model
 
@@ -59,7 +59,7 @@ NAMED = {
 def traits(family, seed, **settings):
     spec = ModelSpec(key="a", source=f"zoo:{family}", seed=seed, category="a", category_id=1, **settings)
     mesh, facts = load(spec, build_zoo_model)
-    return mesh, traits_of(spec, mesh, facts)
+    return mesh, metadata_of(spec, mesh, facts)
 
 
 def test_families_with_named_points():

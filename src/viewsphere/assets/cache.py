@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere import plugins
-from viewsphere.aside import aside, temporary
 from viewsphere.assets.load import check_source, suffix_of
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh, unpacked
@@ -38,6 +37,7 @@ from viewsphere.files import open_file, read_bytes
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
+from viewsphere.scratch import scratch_folder, temporary
 
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "clip", "fps", "shown")
 ZOO = "zoo:"
@@ -170,7 +170,7 @@ def _aside(folder: Path) -> Generator[Path]:
         then.callback(sweep_once, folder, PREFIX, os.getpid())
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            place = then.enter_context(aside(folder, PREFIX))
+            place = then.enter_context(scratch_folder(folder, PREFIX))
         except OSError:
             place = then.enter_context(temporary("reading"))
         yield place

@@ -10,7 +10,7 @@ import numpy as np
 
 from viewsphere.assets.cache import ZOO, Build, in_file, load
 from viewsphere.assets.mesh import Material
-from viewsphere.assets.metadata.traits import found_symmetries, traits_of
+from viewsphere.assets.metadata.model_metadata import found_symmetries, metadata_of
 from viewsphere.assets.normalise import axes
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.readers import reader_of
@@ -71,10 +71,10 @@ def describe(source: Path | ModelSpec, build: Build | None = None) -> ModelRepor
     low, high = mesh.bounds
     width, length, height = (float(x) for x in high - low)
     animation, problems = _animation(spec, build)
-    traits = traits_of(spec, mesh, facts)
+    metadata = metadata_of(spec, mesh, facts)
     is_file = not spec.source.startswith(ZOO)
     back = np.linalg.inv(facts.object_from_file) if is_file else np.eye(4)
-    symmetries = found_symmetries(mesh) if traits.symmetries is None else traits.symmetries
+    symmetries = found_symmetries(mesh) if metadata.symmetries is None else metadata.symmetries
     counts = np.bincount(mesh.triangle_part, minlength=len(mesh.parts))
     return ModelReport(
         source=spec.source,
@@ -95,10 +95,10 @@ def describe(source: Path | ModelSpec, build: Build | None = None) -> ModelRepor
         textures=tuple((image.name, (image.pixels.shape[1], image.pixels.shape[0])) for image in mesh.images),
         has_uv=mesh.uv0 is not None,
         has_colors=mesh.colors is not None,
-        diameter=traits.diameter,
+        diameter=metadata.diameter,
         symmetries=symmetries.moved(back).model_dump(),
-        declares=traits.symmetries is not None,
-        keypoints=traits.keypoints and traits.keypoints.moved(back).model_dump(),
+        declares=metadata.symmetries is not None,
+        keypoints=metadata.keypoints and metadata.keypoints.moved(back).model_dump(),
         axes="file" if is_file else "object",
         sidecar=Path(spec.source).name + ENDING if is_file else "",
         animation=animation,

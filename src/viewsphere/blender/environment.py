@@ -12,8 +12,8 @@ from pathlib import Path
 
 import platformdirs
 
-from viewsphere.aside import Aside, sweep
 from viewsphere.errors import UserError
+from viewsphere.scratch import ScratchDir, sweep
 
 REQUIREMENTS = Path(__file__).with_name("requirements.txt")
 """The packages and the digests of their files. Pip refuses other files, so that a changed index does no harm."""
@@ -48,19 +48,19 @@ def make_environment(listener: Listener) -> Path:
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         sweep(place.parent, PREFIX)
-        aside = Aside.make(place.parent, PREFIX)
+        scratch_folder = ScratchDir.make(place.parent, PREFIX)
     except OSError as error:
         raise UserError(f"{place}: expected a place to write, found: {error.strerror or error}") from None
     try:
         listener(f"making {place} with {base}: about 1 GB")
-        _run([base, "-m", "venv", aside.folder / "new"], listener)
-        made = interpreter_of(aside.folder / "new")
+        _run([base, "-m", "venv", scratch_folder.folder / "new"], listener)
+        made = interpreter_of(scratch_folder.folder / "new")
         _run([made, "-m", "pip", "install", *PINNED, "-r", REQUIREMENTS], listener)
         with suppress(FileNotFoundError):
-            place.rename(aside.folder / "old")
-        (aside.folder / "new").rename(place)
+            place.rename(scratch_folder.folder / "old")
+        (scratch_folder.folder / "new").rename(place)
     finally:
-        aside.remove()
+        scratch_folder.remove()
     return interpreter_of(place)
 
 

@@ -12,10 +12,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewsphere.aside import temporary
 from viewsphere.blender import environment
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
+from viewsphere.scratch import temporary
 
 VARIABLE = "VIEWSPHERE_BLENDER_PYTHON"
 SCRIPTS = "VIEWSPHERE_ALLOW_SCRIPTS"

@@ -26,9 +26,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.aside import Aside, sweep
 from viewsphere.errors import BlenderDied, BlenderError
 from viewsphere.files import open_file
+from viewsphere.scratch import ScratchDir, sweep
 
 START = """\
 import sys, runpy
@@ -62,8 +62,8 @@ class BlenderProcess:
     """
 
     def __init__(self, python: Path, log: Path | None = None, readable: Sequence[Path] | None = None, threads: int = 0) -> None:
-        aside = _aside(Path(tempfile.gettempdir()) if readable is not None else _memory())
-        self.folder = aside.folder
+        scratch_folder = _aside(Path(tempfile.gettempdir()) if readable is not None else _memory())
+        self.folder = scratch_folder.folder
         self.log = log or self.folder / "blender.log"
         self._put: list[Path] = []
         told = [json.dumps(None if readable is None else [str(place) for place in readable]), json.dumps(threads)]
@@ -80,9 +80,9 @@ class BlenderProcess:
                     creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
                 )
         except OSError as error:
-            aside.remove()
+            scratch_folder.remove()
             raise BlenderDied(f"{python}: Blender cannot be started: {error.strerror or error}") from None
-        self._end: weakref.finalize[Any, Any] = weakref.finalize(self, _end, self._process, aside, os.getpid())
+        self._end: weakref.finalize[Any, Any] = weakref.finalize(self, _end, self._process, scratch_folder, os.getpid())
 
     def __enter__(self) -> BlenderProcess:
         return self
@@ -179,7 +179,7 @@ class BlenderProcess:
         return []
 
 
-def _end(process: subprocess.Popen[bytes], aside: Aside, owner: int) -> None:
+def _end(process: subprocess.Popen[bytes], scratch_folder: ScratchDir, owner: int) -> None:
     """Let Blender end by itself, else kill it, and remove its folder; a forked copy of the owning process does nothing."""
     if os.getpid() != owner:
         return
@@ -192,8 +192,8 @@ def _end(process: subprocess.Popen[bytes], aside: Aside, owner: int) -> None:
         _kill(process)
         process.wait()
     process.stdout.close()
-    aside.remove()
-    sweep(aside.folder.parent, PREFIX)
+    scratch_folder.remove()
+    sweep(scratch_folder.folder.parent, PREFIX)
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
@@ -229,7 +229,7 @@ def _memory() -> Path:
     return Path(tempfile.gettempdir())
 
 
-def _aside(place: Path) -> Aside:
+def _aside(place: Path) -> ScratchDir:
     """A new folder there, once those of processes that were killed with their Blender are gone."""
     sweep(place, PREFIX)
-    return Aside.make(place, PREFIX)
+    return ScratchDir.make(place, PREFIX)

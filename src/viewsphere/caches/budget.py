@@ -14,9 +14,9 @@ from itertools import accumulate
 from pathlib import Path
 from stat import S_ISREG
 
-from viewsphere.aside import sweep
 from viewsphere.caches import KINDS, cache_folder, cache_of
 from viewsphere.limits import limits
+from viewsphere.scratch import sweep
 
 KEPT_SHARE = 0.9
 """Share of the limit that pruning leaves, so that the next entries need no further pruning."""
@@ -55,7 +55,7 @@ def entries(kinds: Iterable[str] = tuple(KINDS)) -> Iterator[Entry]:
     """Yield the whole files of these kinds."""
     for kind in kinds:
         for folder, folders, names in os.walk(cache_of(kind)):
-            folders[:] = (name for name in folders if "~" not in name)  # in which entries are being written, see `aside`
+            folders[:] = (name for name in folders if "~" not in name)  # without the scratch folders of unfinished entries
             for name in (name for name in names if not name.startswith(".")):
                 file = Path(folder, name)
                 with suppress(OSError):  # deleted meanwhile

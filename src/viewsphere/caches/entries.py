@@ -14,8 +14,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from viewsphere.aside import aside, sweep
 from viewsphere.caches import budget, cache_of
+from viewsphere.scratch import scratch_folder, sweep
 
 if TYPE_CHECKING:
     from viewsphere.caches.arrays import Arrays, Content  # which imports numpy: listing the zoo does not
@@ -72,7 +72,7 @@ def making(file: Path) -> Generator[Path]:
     """A path at which to write an entry's file, which appears when the block has ended; raises OSError as writing does."""
     file.parent.mkdir(parents=True, exist_ok=True)
     sweep_once(file.parent, PREFIX, os.getpid())
-    with aside(file.parent, PREFIX) as place:
+    with scratch_folder(file.parent, PREFIX) as place:
         half = place / file.name
         yield half
         publish(half, file)

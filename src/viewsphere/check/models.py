@@ -10,20 +10,20 @@ from pathlib import Path
 
 import numpy as np
 
-from viewsphere.aside import temporary
-from viewsphere.assets.appearance.looks import is_alike, looks_of
+from viewsphere.assets.appearance.description import appearance_of, is_alike
 from viewsphere.assets.exporting.export import export_obj
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.metadata.model_metadata import far_points
 from viewsphere.assets.metadata.surface import Surface
 from viewsphere.assets.metadata.symmetries import lacking
-from viewsphere.assets.metadata.traits import far_points
 from viewsphere.check.failure import failure
 from viewsphere.codecs.png_tiff import decode_png
 from viewsphere.errors import UserError
 from viewsphere.files import open_text, read_bytes
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.diameter import diameter
+from viewsphere.scratch import temporary
 from viewsphere.store import Category, Dataset, ModelInfo
 from viewsphere.store.shots.manifest import MANIFEST
 
@@ -74,9 +74,9 @@ def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]
     if library is None:
         yield f"{Path(info.obj).name}: expected materials of the model, found others"
         return
-    with temporary("check") as aside:
-        export_obj(mesh, aside, Path(info.obj).stem, library)
-        for file in sorted(aside.iterdir()):
+    with temporary("check") as scratch_folder:
+        export_obj(mesh, scratch_folder, Path(info.obj).stem, library)
+        for file in sorted(scratch_folder.iterdir()):
             names.add(file.name)
             yield from _compared(file, folder / file.name)
 
@@ -108,7 +108,7 @@ def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
         yield f"expected a diameter of {across} m, as the GLB has, found {info.diameter}"
     if info.symmetries is not None:
         yield from lacking(Surface.of(mesh), info.symmetries)
-    if info.looks is not None and not is_alike(info.looks, looks_of(mesh)):
+    if info.looks is not None and not is_alike(info.looks, appearance_of(mesh)):
         yield "expected looks of the GLB, found others"
     if info.keypoints is not None:
         yield from (f"keypoints.{problem}" for problem in far_points(mesh, across, info.keypoints))

@@ -138,7 +138,7 @@ def asked_formats(formats: str | None, option: str = "--format") -> tuple[str, .
 
 def with_options(names: Sequence[str], options: Sequence[str] | None) -> tuple[FormatEntry, ...]:
     """The formats of these names with the options that are set for them; RecipeError names what cannot be set."""
-    from viewsphere.model.mistakes import one_of
+    from viewsphere.model.validation_errors import one_of
     from viewsphere.recipe.extends import parse_change
     from viewsphere.recipe.formats import FormatEntry
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from viewsphere.aside import write_whole
 from viewsphere.cli import completion
 from viewsphere.cli.arguments import (
     AllowScripts,
@@ -41,6 +40,7 @@ from viewsphere.kernels.garbage import importing
 from viewsphere.model.quantity import quantity
 from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
 from viewsphere.run.workers.worker_count import cores
+from viewsphere.scratch import write_whole
 
 if TYPE_CHECKING:
     from viewsphere.planning.plan import Plan
@@ -98,7 +98,7 @@ def _new_again(format_: str, source: Path, folder: Path | None) -> None:
 
 def _new_start(folder: Path, kind: str) -> None:
     if kind not in kinds():
-        from viewsphere.model.mistakes import one_of
+        from viewsphere.model.validation_errors import one_of
 
         raise UserError(f"--kind: {one_of(kind, kinds())}")
     file = folder if folder.suffix in {".yaml", ".yml"} else folder / "recipe.yaml"
@@ -397,8 +397,8 @@ def render(
         print_plan(planned)
         if addition is not None and any(Store(output).gaps(addition.record)):
             say(f"{output}: {addition}")
-    aside = redirect_stdout(sys.stderr) if json_ else nullcontext()  # what libraries print is no JSON
-    with ProgressBar(quiet=json_) as bar, aside:
+    output = redirect_stdout(sys.stderr) if json_ else nullcontext()  # what libraries print is no JSON
+    with ProgressBar(quiet=json_) as bar, output:
         try:
             summary = generate(
                 loaded,

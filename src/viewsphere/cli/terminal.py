@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from viewsphere.aside import write_whole
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.kernels.garbage import importing
 from viewsphere.model.quantity import quantity
 from viewsphere.printable import printable
+from viewsphere.scratch import write_whole
 
 if TYPE_CHECKING:
     from viewsphere.check import Report

@@ -21,10 +21,10 @@ from viewsphere.composing.scene.scenery import composed
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import random_rotation, rigid
-from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.thing import TimeStep
+from viewsphere.model.validation_errors import one_of
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.layout import Layout, options_of, placer_of
 from viewsphere.recipe.scenery import CompanyEntry

@@ -21,12 +21,12 @@ from typing import Any
 
 from pydantic import Field
 
-from viewsphere.aside import temporary
 from viewsphere.files import open_file
 from viewsphere.formats.shared.writing.export_files import Expected, check_files, put
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec, Remark
+from viewsphere.scratch import temporary
 from viewsphere.store import Dataset
 
 TABLE = "objects.csv"
@@ -85,12 +85,12 @@ def writer(
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
     """Yield every difference from the current export."""
-    with temporary("csv") as aside:
-        with _table(aside / TABLE) as append:
+    with temporary("csv") as scratch_folder:
+        with _table(scratch_folder / TABLE) as append:
             ours, others = _expected(dataset, options, append), _expected(dataset, options, lambda rows: None)
             yield from check_files(dataset, folder, ours, others, [TABLE])
         if (folder / TABLE).is_file():
-            yield from _rows_that_differ(aside / TABLE, folder / TABLE)
+            yield from _rows_that_differ(scratch_folder / TABLE, folder / TABLE)
 
 
 def _expected(dataset: Dataset, options: Options, append: Callable[[list[list[Any]]], None]) -> Iterator[Expected]:

@@ -28,7 +28,6 @@ from typing import Any
 import numpy as np
 import xxhash
 
-from viewsphere.aside import temporary
 from viewsphere.assets.exporting.glb import Looking, Placed, scene_glb_bytes
 from viewsphere.files import read_bytes, read_text
 from viewsphere.formats import Scope
@@ -39,6 +38,7 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.classes import thing_class
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec, Remark
+from viewsphere.scratch import temporary
 from viewsphere.store import Dataset
 
 TABLE = "frames.csv"
@@ -55,8 +55,8 @@ def refuses(scope: Scope) -> Iterator[str]:
 @contextmanager
 def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
     """Write the table, and, when all cameras are known, the scenes."""
-    with temporary("cameras") as aside, (folder / TABLE).open("w", encoding="utf-8", newline="") as table:
-        scenes = _Scenes(dataset, aside)
+    with temporary("cameras") as scratch_folder, (folder / TABLE).open("w", encoding="utf-8", newline="") as table:
+        scenes = _Scenes(dataset, scratch_folder)
         table.write(_HEAD)
 
         def add(sample: Sample) -> None:
@@ -70,8 +70,8 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gener
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
     """Scenes and rows that are not as they would be exported now."""
-    with temporary("cameras") as aside:
-        scenes = _Scenes(dataset, aside)
+    with temporary("cameras") as scratch_folder:
+        scenes = _Scenes(dataset, scratch_folder)
         rows = [_HEAD, *(_row(sample, scenes.add(sample)) for sample in dataset)]
         names = [TABLE]
         for frame, name, content in scenes.files():
@@ -97,7 +97,7 @@ class _Scenes:
     """
 
     dataset: Dataset
-    aside: Path
+    scratch_folder: Path
     _files: dict[object, tuple[str, int]] = field(default_factory=dict[object, tuple[str, int]])
     _count: int = 0
 
@@ -118,14 +118,14 @@ class _Scenes:
         inside = "" if number is None else f"{number:04d}/"
         name, first = self._files.setdefault(scene, (f"{inside}{sample.index:08d}.glb", place))
         if (camera := _looking(sample)) is not None:
-            with (self.aside / str(first)).open("a", encoding="utf-8", newline="") as file:
+            with (self.scratch_folder / str(first)).open("a", encoding="utf-8", newline="") as file:
                 file.write(json.dumps(asdict(camera), default=np.ndarray.tolist) + "\n")
         return name
 
     def files(self) -> Iterator[tuple[int, str, bytes]]:
         """The first frame of each scene, the scene's file, and what is in it."""
         for name, first in self._files.values():
-            sample, kept = self.dataset[first], self.aside / str(first)
+            sample, kept = self.dataset[first], self.scratch_folder / str(first)
             lines = read_text(kept).splitlines() if kept.is_file() else []
             cameras = (_read(json.loads(line)) for line in lines)
             yield sample.index, name, scene_glb_bytes([self._placed(o) for o in _known(sample)], cameras)

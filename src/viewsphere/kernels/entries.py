@@ -21,9 +21,9 @@ from functools import cache
 from pathlib import Path
 from stat import S_ISLNK, S_ISREG, S_IWGRP, S_IWOTH
 
-from viewsphere.aside import STALE_S
 from viewsphere.caches import cache_of
 from viewsphere.caches.entries import note_use
+from viewsphere.scratch import STALE_S
 
 SHIPPED = Path(__file__).with_name("shipped")
 """Entries that wheels bring; sources have none."""

@@ -11,7 +11,7 @@ from viewsphere.labels.shared.drawing.lines import note
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.spec import Drawing, Models, Needs, ObjectLabel, rendered
-from viewsphere.model.looks import LONGEST
+from viewsphere.model.appearance import LONGEST
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:

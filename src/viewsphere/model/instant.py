@@ -10,9 +10,9 @@ from pydantic import Field
 
 from viewsphere.geometry.camera import orbit_angles
 from viewsphere.geometry.pose_category import pose_category
-from viewsphere.model.brief import Brief
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.scene import Finish, Matrix4, Vector
 
 NEAREST = 1e-3
@@ -26,13 +26,13 @@ class Moment(Frozen):
     seconds: float
 
 
-class Viewpoint(Brief):
+class Viewpoint(OmitNone):
     """The place of a camera on a sphere around `target` (world metres; None: the box centre of object 1), and its time.
 
     `fill` is the share of the picture that a model fills, if the distance follows from it; see `composing.filling`.
     """
 
-    UNSAID = ("fill",)
+    OMIT_IF_NONE = ("fill",)
 
     index: int
     azimuth_deg: float

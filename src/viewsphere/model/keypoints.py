@@ -12,8 +12,8 @@ from pydantic import AfterValidator, Field, model_validator
 
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.numbers import Number
+from viewsphere.model.validation_errors import nearest, shown
 
 MOST_POINTS = 1000
 """Points of one model."""

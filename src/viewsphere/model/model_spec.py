@@ -6,9 +6,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from viewsphere.model.brief import Brief
+from viewsphere.model.appearance import Word
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.looks import Word
+from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
@@ -27,7 +27,7 @@ class Parts(Frozen):
     file_from_axes: Matrix4 = IDENTITY
 
 
-class ModelSpec(Brief):
+class ModelSpec(OmitNone):
     """The identity of a model, and the conversion of its file to an object that faces -Y with +Z up, in metres.
 
     `source` is a file's absolute path, or `zoo:<family>` with `seed` naming the draw. None for `up`, `forward` or `unit`
@@ -35,7 +35,7 @@ class ModelSpec(Brief):
     its file's first frame. The motion of its thing determines the time step that it shows, and when.
     """
 
-    UNSAID = ("fps", "sidecar", "symmetries", "keypoints", "color", "material", "size", "faces")
+    OMIT_IF_NONE = ("fps", "sidecar", "symmetries", "keypoints", "color", "material", "size", "faces")
 
     key: str  # unique and stable in the data set: also the name of its folder
     source: str

@@ -12,8 +12,8 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import has_unit_rays, pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.channel import picture_of
-from viewsphere.model.mistakes import one_of
 from viewsphere.model.sample import Sample
+from viewsphere.model.validation_errors import one_of
 
 Float = NDArray[np.float64]
 Axes = Literal["camera", "world"]

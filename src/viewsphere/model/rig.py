@@ -9,23 +9,23 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.brief import Brief
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.lidar import LIDAR, Lidar
+from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 CAMERA = "camera"
 """Default name of a rig's only sensor."""
 
 
-class Sensor(Brief):
+class Sensor(OmitNone):
     """A camera or a LiDAR of a rig: its lens, and where it is mounted. `rig_from_sensor` is rigid, OpenCV axes on both sides,
     metres. `channels` are those of the shot's that it keeps, None: a camera all but points, a LiDAR these alone. `lidar`: how
     it measures; None: it is a camera.
     """
 
-    UNSAID = ("channels", "lidar")
+    OMIT_IF_NONE = ("channels", "lidar")
 
     intrinsics: Intrinsics
     name: str = Field(default=CAMERA, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)

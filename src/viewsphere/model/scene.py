@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
-from viewsphere.model.substance import Substance
+from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.procedural_material import ProceduralMaterial
 from viewsphere.model.weather import Fog, Lamps, Rain, Snow, Wet
 
 WEATHER = ("fog", "rain", "snow", "wet", "lamps")
@@ -132,7 +132,7 @@ class HemisphereLight(Light):
 AnyLight = Annotated[PointLight | SpotLight | AreaLight | HemisphereLight, Field(discriminator="kind")]
 
 
-class Ground(Brief):
+class Ground(OmitNone):
     """An endless level plane at the lowest point of all that is placed.
 
     A catcher shows nothing but the shadows and the occlusion it receives, and is not there for labels unless `labels` says so.
@@ -152,9 +152,9 @@ class Ground(Brief):
     tile: Length = Field(default=2.0, description="width of one repetition of images in metres; a slab is half as wide")
     catcher: bool = Field(default=False, description="true: shows only the shadows on it, over the background")
     labels: bool = Field(default=False, description="gives a catcher depth and normals; other ground always has them")
-    material: Substance | None = Field(default=None, description="built-in material instead of slabs or pictures")
+    material: ProceduralMaterial | None = Field(default=None, description="built-in material instead of slabs or pictures")
 
-    UNSAID = ("material",)
+    OMIT_IF_NONE = ("material",)
 
     @property
     def has_slabs(self) -> bool:

@@ -12,9 +12,9 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from viewsphere.geometry.rotation import Float, compose, product, rigid, rotation_about, transform
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Number
 from viewsphere.model.scene import IDENTITY, Vector
+from viewsphere.model.validation_errors import shown
 
 MOST = 1000
 """Symmetries of one model."""

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Portion
+from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import IDENTITY, Color, Matrix4, Picture
-from viewsphere.model.substance import Substance
 
 
-class Repaint(Brief):
+class Repaint(OmitNone):
     """A change to the materials whose names match `material`, a pattern of fnmatch. What is None stays as the file says."""
 
-    UNSAID = ("image", "texture")
+    OMIT_IF_NONE = ("image", "texture")
 
     material: str = Field(default="*", min_length=1, description="names of the materials, a pattern such as paint*")
     tint: Color | None = Field(default=None, description="multiplies the colour; white changes nothing: linear [r, g, b]")
     metallic: Portion | None = Field(default=None, description="replaces the model's value: 1 is metal")
     roughness: Portion | None = Field(default=None, description="replaces the model's value: 0 a mirror, 1 matt")
     image: Picture | None = Field(default=None, description="path of a picture that replaces the colour of opaque materials")
-    texture: Substance | None = Field(default=None, description="built-in material that replaces opaque materials")
+    texture: ProceduralMaterial | None = Field(default=None, description="built-in material that replaces opaque materials")
 
 
 class TimeStep(Frozen):

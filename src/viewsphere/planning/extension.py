@@ -134,11 +134,11 @@ class DatasetPart(Sendable):
         """The recipe's models in a shot, that of its frames first."""
         return self.plan.cast(row.subject, self._of_recipe(row.positions[0][0]))
 
-    def shot(self, row: Row, box_of: BoxOf, tries: Sequence[int] = (), redraw: int = 0) -> Shot:
-        """The shot of a row; `box_of`, `tries`, `redraw` and errors as for `Plan.shot`."""
+    def shot(self, row: Row, box_of: BoxOf, redraws: Sequence[int] = (), redraw: int = 0) -> Shot:
+        """The shot of a row; `box_of`, `redraws`, `redraw` and errors as for `Plan.shot`."""
         poses = tuple(numbers(row.positions))
         own = [self._of_recipe(pose) for pose in poses]
-        made = self.plan.take(row.subject, own, box_of, row.key, row.first, tries, redraw)
+        made = self.plan.take(row.subject, own, box_of, row.key, row.first, redraws, redraw)
         number_of = iter(poses)
         instants = (_at_pose(now, next(number_of)) if now.recorded else now for now in made.instants)
         return made.model_copy(

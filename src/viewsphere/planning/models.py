@@ -24,8 +24,8 @@ from viewsphere.composing.tables import Cells, table_rows
 from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.limits import limits
 from viewsphere.model.file_names import is_reserved
-from viewsphere.model.mistakes import Nearest, one_of
 from viewsphere.model.model_spec import ModelSpec, Size
+from viewsphere.model.validation_errors import Nearest, one_of
 from viewsphere.plugins import families
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres

@@ -55,7 +55,7 @@ from viewsphere.planning.credits import credits_of, unlicensed
 from viewsphere.planning.engine_digest import engine_options, script_digest
 from viewsphere.planning.models import categories, left_out, numbered_specs
 from viewsphere.planning.rigs import rig_of
-from viewsphere.planning.samplers import Standing, Stock, lens
+from viewsphere.planning.samplers import SamplingContext, Standing, lens
 from viewsphere.planning.splits import expected, quotas
 from viewsphere.planning.tracks import tracks_digest, tracks_of
 from viewsphere.plugins.engine import EngineSpec
@@ -77,7 +77,7 @@ SHOT_FRAMES = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Plan(Shown, Stock):
+class Plan(Shown, SamplingContext):
     """The frames to render: the poses of every subject, in order. Its memory does not grow with the number of frames."""
 
     categories: tuple[Category, ...] = ()
@@ -241,10 +241,11 @@ class Plan(Shown, Stock):
     @cached_property
     def _under(self) -> Mapping[str, Self]:
         """The same plan under each variation; it shares what was computed, but for light and finish."""
-        return {name: self._lit(recipe, name) for name, recipe in self.recipe.conditions.items()}
+        return {name: self.with_variation(recipe, name) for name, recipe in self.recipe.conditions.items()}
 
-    def _lit(self, recipe: Recipe, variation: str) -> Self:
-        made = replace(self, recipe=recipe, untried=self, variation=variation)
+    def with_variation(self, recipe: Recipe, variation: str) -> Self:
+        """Return the plan of one variation; the two share all values that do not depend on the scene."""
+        made = replace(self, recipe=recipe, original=self, variation=variation)
         known = {field.name for field in fields(self)} | {"scenes", "taken", "blocks", "rows", "_under"}
         vars(made).update({name: value for name, value in vars(self).items() if name not in known})
         return made
@@ -259,16 +260,16 @@ class Plan(Shown, Stock):
         """Number of shots."""
         return len(self.rows)
 
-    def shot(self, row: Row | int, box_of: BoxOf, tries: Sequence[int] = (), redraw: int = 0) -> Shot:
+    def shot(self, row: Row | int, box_of: BoxOf, redraws: Sequence[int] = (), redraw: int = 0) -> Shot:
         """The shot of a row, or of its number, in the first draw of its scene from `redraw` on that has room for all; raises
         IndexError past the end.
 
-        `tries`: of each pose, how often what is random in it (its viewpoint, company of its own) is drawn again; none: never.
+        `redraws`: of each pose, how often what is random in it (its viewpoint, company of its own) is drawn again; none: never.
         `box_of` gives the sizes of what stands on the floor and of what the cameras look at. Raises RecipeError where there is
         no room for all that is to stand there, and what `box_of` raises.
         """
         row = self.rows[row] if isinstance(row, int) else row
-        return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first, tries, redraw)
+        return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first, redraws, redraw)
 
     def take(
         self,
@@ -277,15 +278,15 @@ class Plan(Shown, Stock):
         box_of: BoxOf,
         key: str = "",
         first: int = 0,
-        tries: Sequence[int] = (),
+        redraws: Sequence[int] = (),
         redraw: int = 0,
     ) -> Shot:
         """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
-        each frame. `first` is the number of its first sample, `tries` and `redraw` as for `shot`.
+        each frame. `first` is the number of its first sample, `redraws` and `redraw` as for `shot`.
         """
         key = key or f"{subject}-{poses[0]:06d}"
         names = (self.world(subject), self.scene_pose(poses[0]) or "")
-        return self._fitting(redraw, lambda number: self._taken_at(number, subject, poses, box_of, key, first, tries), names)
+        return self._fitting(redraw, lambda number: self._taken_at(number, subject, poses, box_of, key, first, redraws), names)
 
     def standing(self, subject: str, box_of: BoxOf) -> Sequence[Standing]:
         """The places of a subject's objects as far as they are known before rendering, in the first draw that has room."""
@@ -337,17 +338,17 @@ class Plan(Shown, Stock):
         return {subject: block.positions for block in reversed(self.blocks) for subject in block.subjects}
 
     def _taken_at(
-        self, redraw: int, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int, tries: Sequence[int]
+        self, redraw: int, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int, redraws: Sequence[int]
     ) -> Shot:
-        variation, stock = "", self
+        variation, context = "", self
         if self.recipe.variations is not None:
             subject, variation = without(subject)
-            stock = self._under[variation]
-        stock = stock.redrawn(redraw)
-        stock = stock.trying(dict(zip(poses, tries, strict=True))) if any(tries) else stock
+            context = self._under[variation]
+        context = context.redrawn(redraw)
+        context = context.with_redraws(dict(zip(poses, redraws, strict=True))) if any(redraws) else context
         with self.recipe.located():
-            made = self.sampler.shot(stock, subject, poses, box_of, key, first)
-            shot = off_center(stock, subject, filled(made, self.recipe.scenes is not None))
+            made = self.sampler.shot(context, subject, poses, box_of, key, first)
+            shot = off_center(context, subject, filled(made, self.recipe.scenes is not None))
             if variation:
                 named = {"variation": variation, "sequence": shot.sequence and under(shot.sequence, variation)}
                 shot = shot.model_copy(update=named)

@@ -15,9 +15,9 @@ from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import PASSES
 from viewsphere.model.lidar import LIDAR, Lidar
-from viewsphere.model.mistakes import one_of, told_of
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.model.validation_errors import one_of, told_of
 from viewsphere.planning.rig_files import Calibrated, read_rig
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.rig import RigFile, SensorEntry, SensorList, StereoRig, SurroundRig

@@ -76,6 +76,6 @@ class FormatSpec(SpecWithOptions):
     )
     again: Callable[[Any], Any] | None = Field(
         default=None,
-        description="`again(path)`: the cameras and models of a data set as a `viewsphere.store.again.Again`, for "
-        "`viewsphere new --from`",
+        description="`again(path)`: the cameras and models of a data set as `viewsphere.store.source_cameras.SourceCameras`, "
+        "for `viewsphere new --from`",
     )

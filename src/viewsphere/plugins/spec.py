@@ -12,9 +12,9 @@ from pydantic.fields import FieldInfo
 
 from viewsphere.errors import PluginError, RecipeError
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import explained, report
-from viewsphere.model.mistakes import read_options as read_as
 from viewsphere.model.quantity import quantity
+from viewsphere.model.validation_errors import explained, report
+from viewsphere.model.validation_errors import read_options as read_as
 from viewsphere.plugins.registry import Kind
 
 

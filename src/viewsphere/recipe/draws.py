@@ -25,10 +25,10 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
-from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at, nearest, shown
 from viewsphere.model.numbers import Count, Metres, Natural, Number
+from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.validation_errors import at, nearest, shown
 from viewsphere.recipe.seed_names import seed_name
 from viewsphere.recipe.values import OrShort
 
@@ -50,10 +50,10 @@ Of = Literal["number", "whole number", "vector", "word", "entry"]
 T = TypeVar("T")
 
 
-class Gaussian(Brief):
+class Gaussian(OmitNone):
     """A normal distribution. What lies beyond `min`, `max` or the field's own limits is never drawn."""
 
-    UNSAID = ("mean", "deviation", "min", "max")
+    OMIT_IF_NONE = ("mean", "deviation", "min", "max")
 
     mean: Any = Field(description="mean")
     deviation: Any = Field(description="standard deviation")
@@ -70,10 +70,10 @@ def _gaussian(value: Any) -> Any:
     return value
 
 
-class Distribution(Brief):
+class Distribution(OmitNone):
     """One of uniform, log_uniform, normal and choice. Their arguments may be distributions themselves."""
 
-    UNSAID = (*KINDS, "weights")
+    OMIT_IF_NONE = (*KINDS, "weights")
 
     uniform: tuple[Any, Any] | None = Field(default=None, description="[low, high]; for vectors, each component separately")
     log_uniform: tuple[Any, Any] | None = Field(

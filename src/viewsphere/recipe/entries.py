@@ -15,9 +15,9 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import whole
 from viewsphere.model.scene import LINEAR, PICTURE, SRGB
+from viewsphere.model.validation_errors import shown
 from viewsphere.recipe.draws import KINDS, Distribution, Drawn
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.mistakes import Marks, Place, dotted, shown
-from viewsphere.model.mistakes import Path as Steps
 from viewsphere.model.scene import Background, Ground
+from viewsphere.model.validation_errors import Marks, Place, dotted, shown
+from viewsphere.model.validation_errors import Path as Steps
 from viewsphere.recipe.draws import KINDS
 from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.file import parse, read

@@ -11,11 +11,11 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from viewsphere.aside import aside, sweep
 from viewsphere.caches import cache_of
 from viewsphere.errors import RecipeError
 from viewsphere.files import open_file
 from viewsphere.limits import limits
+from viewsphere.scratch import scratch_folder, sweep
 from viewsphere.urls import RemotePath, download, files_below, located
 
 PREFIX = "fetching-"
@@ -38,7 +38,7 @@ def fetched(path: str | os.PathLike[str]) -> Path:
     try:
         place.mkdir(parents=True, exist_ok=True)
         sweep(place, PREFIX)
-        with aside(place, PREFIX) as own:
+        with scratch_folder(place, PREFIX) as own:
             _download(file.parent, own / "new")
             target = place / hashlib.sha256(str(file.parent).encode()).hexdigest()[:32]
             _replace(target, own)

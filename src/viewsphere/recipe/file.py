@@ -14,8 +14,8 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from viewsphere.errors import RecipeError
 from viewsphere.files import read_bytes
 from viewsphere.limits import limits
-from viewsphere.model.mistakes import Marks, Place, dotted, shown
-from viewsphere.model.mistakes import Path as Steps
+from viewsphere.model.validation_errors import Marks, Place, dotted, shown
+from viewsphere.model.validation_errors import Path as Steps
 from viewsphere.recipe.yaml_errors import syntax_error
 
 DEEPEST = 200

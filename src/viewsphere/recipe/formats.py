@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, JsonValue, TypeAdapter, ValidationE
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import report, shown
+from viewsphere.model.validation_errors import report, shown
 from viewsphere.plugins.format import FormatSpec
 
 FORM = {

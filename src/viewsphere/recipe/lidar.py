@@ -11,8 +11,8 @@ from pydantic import AfterValidator, Field, model_validator
 from viewsphere.model.camera import Intrinsics, Scan
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.lidar import Lidar
-from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Count, Length, Metres, Number, Portion, Positive
+from viewsphere.model.validation_errors import shown
 
 MOST_RAYS = 10_000_000
 MOST_COLUMNS = 65_535

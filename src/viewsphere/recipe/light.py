@@ -10,8 +10,6 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at as standing_at
-from viewsphere.model.mistakes import nearest, one_of, shown
 from viewsphere.model.numbers import Number, Strength
 from viewsphere.model.scene import (
     Daylight,
@@ -19,6 +17,8 @@ from viewsphere.model.scene import (
     Sky,
     Sun,
 )
+from viewsphere.model.validation_errors import at as standing_at
+from viewsphere.model.validation_errors import nearest, one_of, shown
 from viewsphere.recipe.draws import Drawn
 from viewsphere.recipe.entries import entry_of
 from viewsphere.recipe.values import OrShort, shape_of, switch

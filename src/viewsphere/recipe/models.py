@@ -8,14 +8,14 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere import plugins
-from viewsphere.model.brief import Brief
+from viewsphere.model.appearance import Word
 from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.keypoints import MOST_POINTS
-from viewsphere.model.looks import Word
-from viewsphere.model.mistakes import one_of, shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Positive
+from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.validation_errors import one_of, shown
 from viewsphere.recipe.draws import CountDrawn, Drawn, is_random
 from viewsphere.recipe.motion import MOTION, MotionField
 from viewsphere.recipe.time import RATE, STEPS, Frames, Rate, Steps
@@ -86,10 +86,10 @@ Scale = Annotated[
 ]
 
 
-class ModelEntry(Brief):
+class ModelEntry(OmitNone):
     """Some models of one category, treated alike."""
 
-    UNSAID = ("motion", "fps", "sidecar", "symmetries", "keypoints", "color", "material", "labels")
+    OMIT_IF_NONE = ("motion", "fps", "sidecar", "symmetries", "keypoints", "color", "material", "labels")
 
     source: Annotated[
         tuple[Annotated[str, Field(min_length=1)], ...],

@@ -35,9 +35,9 @@ from viewsphere.model.file_names import is_reserved
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.lidar import LIDAR
-from viewsphere.model.mistakes import Marks, at, report, shown
 from viewsphere.model.notebook import Shown
 from viewsphere.model.numbers import Count, Natural, Number
+from viewsphere.model.validation_errors import Marks, at, report, shown
 from viewsphere.recipe.formats import FormatEntry, FormatField
 from viewsphere.recipe.former_names import former_paths, is_former, renamed, with_present_names
 from viewsphere.recipe.models import ModelEntry

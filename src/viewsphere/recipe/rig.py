@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator
 
 from viewsphere.model.camera import Distortion
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Count, Length, Metres, Number, Positive
+from viewsphere.model.validation_errors import shown
 from viewsphere.recipe.lidar import LidarEntry
 from viewsphere.recipe.scene import CameraEntry, CameraMatrix, PictureSize, Row
 from viewsphere.recipe.values import OrShort, pair

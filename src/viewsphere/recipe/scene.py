@@ -21,9 +21,9 @@ from pydantic import (
 from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at, shown, told_of
 from viewsphere.model.numbers import Count, Number, Positive
 from viewsphere.model.scene import WEATHER
+from viewsphere.model.validation_errors import at, shown, told_of
 from viewsphere.recipe.blend import BlendField, VariantEntry
 from viewsphere.recipe.draws import Drawn, alternatives, is_random
 from viewsphere.recipe.finish import (

@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from viewsphere import plugins
-from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import FARTHEST, Length, Number, Portion
+from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.validation_errors import shown
 from viewsphere.recipe.draws import CountDrawn, CountOrNone, Drawn, is_random, span
 from viewsphere.recipe.layout import LAYOUT, ORIENTATION, Layout, Orientation, Spot, placer_of, spots_of
 from viewsphere.recipe.models import ZOO, Unit
@@ -27,10 +27,10 @@ LABELS = "background, or own: every piece is an object with a category, boxes an
 OF_FILES = ("origin", "up", "forward", "unit", "category")
 
 
-class PlaceEntry(Brief):
+class PlaceEntry(OmitNone):
     """The place in which the targets stand."""
 
-    UNSAID = ("parked", "walkers", "motion")
+    OMIT_IF_NONE = ("parked", "walkers", "motion")
 
     source: str = Field(min_length=1, description="zoo:<place>, such as zoo:neighbourhood, or a model file")
     draw: Draw = Field(default="fixed", description=f"for a zoo place and turn: {DRAWS}")
@@ -101,10 +101,10 @@ class PlaceEntry(Brief):
         return self
 
 
-class CompanyEntry(Brief):
+class CompanyEntry(OmitNone):
     """Other models of the recipe, of the same split, beside the one each frame is about."""
 
-    UNSAID = ("motion",)
+    OMIT_IF_NONE = ("motion",)
 
     count: CountDrawn | None = Field(
         default=None, description="number of models, a number, [low, high] or a distribution; not needed if layout is a list"

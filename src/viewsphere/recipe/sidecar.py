@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from viewsphere.errors import RecipeError
+from viewsphere.model.appearance import Word
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.keypoints import Keypoints, PointName
-from viewsphere.model.looks import Word
-from viewsphere.model.mistakes import report, shown
 from viewsphere.model.symmetries import Symmetries
+from viewsphere.model.validation_errors import report, shown
 from viewsphere.recipe.file import read
 
 ENDING = ".viewsphere.yaml"

@@ -15,10 +15,10 @@ from pydantic import (
 )
 
 from viewsphere import plugins
-from viewsphere.model.brief import Brief
-from viewsphere.model.mistakes import one_of
+from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.scene import Ground, Picture
 from viewsphere.model.thing import Repaint
+from viewsphere.model.validation_errors import one_of
 from viewsphere.recipe.draws import Drawn
 from viewsphere.recipe.entries import entry_of, is_drawn_color, pictures_of
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color, shape_of, switch
@@ -64,10 +64,10 @@ MaterialNames = Annotated[
 """The name of a material, or several, or any, to draw one from."""
 
 
-class GroundEntry(entry_of(Ground, optional=("color",), fixed=("catcher", "labels")), Brief):
+class GroundEntry(entry_of(Ground, optional=("color",), fixed=("catcher", "labels")), OmitNone):
     """A horizontal plane at the lowest point of all that is placed."""
 
-    UNSAID = ("material",)
+    OMIT_IF_NONE = ("material",)
 
     material: MaterialNames | None = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
         default=None, description="built-in material: wood, a list of names to draw from, or any; its grain is random"
@@ -106,10 +106,10 @@ GroundField = Annotated[
 ]
 
 
-class MaterialEntry(entry_of(Repaint, fixed=("material",)), Brief):
+class MaterialEntry(entry_of(Repaint, fixed=("material",)), OmitNone):
     """A change to materials of the models; where several fit one, the last counts."""
 
-    UNSAID = ("image", "images", "texture")
+    OMIT_IF_NONE = ("image", "images", "texture")
 
     models: str = Field(default="*", min_length=1, description="keys of its models, a pattern such as car_*")
     images: Picture | None = Field(default=None, description="or a folder of pictures to draw from")

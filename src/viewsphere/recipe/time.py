@@ -9,8 +9,8 @@ from typing import Annotated, Literal, cast
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Count, Positive
+from viewsphere.model.validation_errors import shown
 from viewsphere.recipe.values import shape_of
 
 FrameNumber = Annotated[int, Field(strict=True, ge=-1_000_000, le=1_000_000)]

@@ -11,8 +11,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Count, Length, Metres, Number, Positive
+from viewsphere.model.validation_errors import shown
 from viewsphere.recipe.aim import AZIMUTH, DISTANCE, ELEVATION, SHAKE, TILT, Bins, Shake, in_elevation, in_reach
 from viewsphere.recipe.values import shape_of
 

@@ -21,8 +21,8 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.numbers import Number, Positive
+from viewsphere.model.validation_errors import nearest, shown
 
 
 class OrShort:

@@ -16,7 +16,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
-from viewsphere.model.mistakes import at
+from viewsphere.model.validation_errors import at
 from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.scene import SceneEntry
 

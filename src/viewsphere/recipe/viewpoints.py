@@ -14,11 +14,11 @@ from pydantic import (
     model_validator,
 )
 
-from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Number, Positive
+from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.validation_errors import at
 from viewsphere.recipe.aim import (
     AZIMUTH,
     DISTANCE,
@@ -209,14 +209,14 @@ class Normal(Aimed):
         return self
 
 
-class PoseList(Aimed, Brief):
+class PoseList(Aimed, OmitNone):
     """Viewpoints from a file: orbits around the target, or a camera's motion through the file's own world.
 
     A motion is turned so that the file's `up` is +Z and its `forward` is -Y, moved so that `origin` lies where the models
     stand, and scaled; its cameras look where they looked, whatever the target.
     """
 
-    UNSAID = ("fps",)
+    OMIT_IF_NONE = ("fps",)
 
     kind: Literal["file"] = Field(description="from a file")
     path: Annotated[str, Field(min_length=1)] = Field(description="the file, or COLMAP's folder")

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
+from viewsphere.model.validation_errors import shown
 from viewsphere.recipe.values import Interval
 
 

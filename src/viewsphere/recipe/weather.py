@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at, nearest
 from viewsphere.model.numbers import Portion
+from viewsphere.model.validation_errors import at, nearest
 from viewsphere.model.weather import Fog, Lamps, Light, Rain, Snow, Wet
 from viewsphere.recipe.draws import Drawn, span
 from viewsphere.recipe.entries import entry_of

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from viewsphere.aside import write_whole
 from viewsphere.errors import StoreError, ViewsphereError
 from viewsphere.geometry.box import EDGES, FACES, VERTEX_SIGNS
 from viewsphere.labels import drawings, is_shown
@@ -22,6 +21,7 @@ from viewsphere.report.sequences import extents_of, played, sequence_data
 from viewsphere.report.summary import summary
 from viewsphere.report.table import FrameTable, read_table
 from viewsphere.report.unknown import numbers
+from viewsphere.scratch import write_whole
 from viewsphere.store import Dataset, ModelInfo
 from viewsphere.store.samples.films import Film, films_of
 from viewsphere.urls import here

@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewsphere.aside import temporary
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.planning.extension import DatasetPart
@@ -30,6 +29,7 @@ from viewsphere.run.memory import render
 from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.shots.precompile import is_precompiled, load_kernels, sketched
 from viewsphere.run.shots.tasks import Worker
+from viewsphere.scratch import temporary
 from viewsphere.store import Dataset, Row, Store
 
 SPEED_RECIPE = Recipe.model_validate(

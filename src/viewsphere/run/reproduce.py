@@ -8,12 +8,12 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError, UserError
-from viewsphere.model.mistakes import one_of
+from viewsphere.model.validation_errors import one_of
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.reproduce_recipe import RECIPE, draft
 from viewsphere.store import new_folder
-from viewsphere.store.again import Again
+from viewsphere.store.source_cameras import SourceCameras
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def make_again(kind: str, source: Path, folder: Path) -> Made:
     return Made(folder / RECIPE, len(found.shots), len(found.models), found.notes)
 
 
-def _again() -> dict[str, Callable[[Path], Again]]:
+def _again() -> dict[str, Callable[[Path], SourceCameras]]:
     return {name: spec.again for name, spec in plugins.loadable(FormatSpec).items() if spec.again is not None}
 
 
@@ -62,7 +62,7 @@ def _check_folder(folder: Path) -> None:
         raise UserError(f"{folder}: expected a new folder, found one that exists: choose another")
 
 
-def _make(found: Again, of: str, folder: Path) -> None:
+def _make(found: SourceCameras, of: str, folder: Path) -> None:
     with new_folder(folder) as made:
         try:
             for name, data in draft(found, of, made):

@@ -29,7 +29,7 @@ from viewsphere.recipe.formats import Formats, read_formats
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.viewpoints import PoseList
 from viewsphere.run.exports.scope import needs_of
-from viewsphere.store.again import Again, AgainModel, Drafted
+from viewsphere.store.source_cameras import Drafted, SourceCameras, SourceModel
 
 SOURCE, CATEGORY = "zoo:car", "car"
 FILLED = 0.5
@@ -48,7 +48,7 @@ PARALLEL = 1e-6
 RECIPE, SHOTS, MODELS, SIDECARS = "recipe.yaml", "shots.jsonl", "models", "symmetries"
 CHANNELS = ("rgb", "depth", "instances")
 STAND_IN = "stand-in"
-"""The key, among an `Again`'s models, of what stands where there are none."""
+"""The key, among an `SourceCameras`'s models, of what stands where there are none."""
 
 COMMENTS = {
     "models": "the data set's own, where they lie, with their own axes, origin and unit",
@@ -64,7 +64,7 @@ NONE_OF_ITS_OWN = (
 )
 
 
-def draft(found: Again, of: str, folder: Path) -> Iterator[tuple[str, bytes]]:
+def draft(found: SourceCameras, of: str, folder: Path) -> Iterator[tuple[str, bytes]]:
     """The files, by their names from the folder in which they are going to lie, those that the recipe names first: each has to
     be written before the next is asked for. `of`: what is rendered again, in words.
     """
@@ -87,13 +87,13 @@ def draft(found: Again, of: str, folder: Path) -> Iterator[tuple[str, bytes]]:
     yield RECIPE, _text(data, of, found, substitute).encode()
 
 
-def _source(model: AgainModel) -> str:
+def _source(model: SourceModel) -> str:
     if isinstance(model.source, Drafted):
         return f"{MODELS}/{model.source.name}"
     return Path(os.path.normpath(model.source.absolute())).as_posix()
 
 
-def _entry(model: AgainModel, source: str, sidecar: str | None) -> dict[str, Any]:
+def _entry(model: SourceModel, source: str, sidecar: str | None) -> dict[str, Any]:
     entry: dict[str, Any] = {"source": [source], "category": model.category or "object"}
     entry |= {"supercategory": model.supercategory} if model.supercategory else {}
     entry |= {"name": model.name} if model.name else {}
@@ -113,7 +113,7 @@ def _joined(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return list(found.values())
 
 
-def _shots(found: Again, substitute: StandIn | None) -> list[ListedShot]:
+def _shots(found: SourceCameras, substitute: StandIn | None) -> list[ListedShot]:
     """The shots with free names, and splits as recipes have them; with what stands in, where they have to be listed."""
     splits, names = dict[str, str](), dict[str, int]()
     shots: list[ListedShot] = []
@@ -129,7 +129,7 @@ def _shots(found: Again, substitute: StandIn | None) -> list[ListedShot]:
     return shots
 
 
-def _are_listed(found: Again) -> bool:
+def _are_listed(found: SourceCameras) -> bool:
     """Return whether shots differ in what only listed ones may: their pictures' sizes, and the splits that they say."""
     sizes = {(shot.camera.width, shot.camera.height) for shot in found.shots if shot.camera}
     return len(sizes) > 1 or len({shot.split for shot in found.shots}) > 1
@@ -152,7 +152,7 @@ def _free(name: str, names: dict[str, int]) -> str:
 
 
 def _recipe(
-    found: Again, entries: list[dict[str, Any]], shots: Sequence[ListedShot], substitute: StandIn | None
+    found: SourceCameras, entries: list[dict[str, Any]], shots: Sequence[ListedShot], substitute: StandIn | None
 ) -> dict[str, Any]:
     views: dict[str, Any] = {"kind": "file", "path": SHOTS, "up": found.up}
     if substitute is not None:
@@ -188,7 +188,7 @@ def _shares(counts: Counter[str]) -> dict[str, float]:
 
 
 def _keys(data: dict[str, Any], sources: dict[str, str], folder: Path) -> dict[str, str]:
-    """The keys, in the recipe, of the models of an `Again`."""
+    """The keys, in the recipe, of the models of an `SourceCameras`."""
     specs = numbered_specs(Recipe.model_validate(data, context={"folder": folder}))
     by_source = {spec.source: spec.key for spec, _ in specs}
     if not sources:
@@ -201,7 +201,7 @@ def _line(shot: ListedShot, keys: dict[str, str]) -> dict[str, Any]:
     return shot.model_copy(update={"objects": objects}).model_dump(mode="json", exclude_defaults=True)
 
 
-def _text(data: dict[str, Any], of: str, found: Again, substitute: StandIn | None) -> str:
+def _text(data: dict[str, Any], of: str, found: SourceCameras, substitute: StandIn | None) -> str:
     """The recipe, with a comment before each part that has one."""
     head = [
         f"Renders a data set again: {of}",

@@ -19,10 +19,10 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from viewsphere.aside import temporary
 from viewsphere.errors import UserError
 from viewsphere.files import check_file, open_file
 from viewsphere.printable import is_utf8, printable
+from viewsphere.scratch import temporary
 from viewsphere.urls.remote_path import BLOCK
 from viewsphere.urls.remote_path import RemotePath as RemotePath
 

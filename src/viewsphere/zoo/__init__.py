@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from viewsphere import plugins
-from viewsphere.aside import temporary
 from viewsphere.caches import cache_of
 from viewsphere.caches.entries import kept, making, note_use
 from viewsphere.files import read_bytes
+from viewsphere.scratch import temporary
 
 if TYPE_CHECKING:
     import numpy as np

@@ -5,7 +5,7 @@ import pytest
 
 from viewsphere.assets.cache import load
 from viewsphere.assets.load import load_model
-from viewsphere.assets.metadata.traits import traits_of
+from viewsphere.assets.metadata.model_metadata import metadata_of
 from viewsphere.model.keypoints import left_and_right
 from viewsphere.model.model_spec import ModelSpec
 
@@ -67,7 +67,7 @@ def test_they_go_where_the_mesh_goes_and_stay_in_the_cache(gltf, cube, tmp_path)
     spec = ModelSpec(key="a", source=str(gltf.write()), category="a", category_id=1, unit=0.5, centring="floor")
     for _ in range(2):
         mesh, facts = load(spec, folder=tmp_path / "cache")
-        found = traits_of(spec, mesh, facts).keypoints
+        found = metadata_of(spec, mesh, facts).keypoints
         assert [*found.points] == ["corner"]  # what is far outside of the model is none of its points
         assert np.abs(mesh.vertices - found.points["corner"]).sum(axis=1).min() < 1e-6
 

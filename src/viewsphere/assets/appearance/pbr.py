@@ -12,8 +12,8 @@ from viewsphere import materials
 from viewsphere.assets.appearance.color_names import NAMES, nearest_names
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import encoded, linear
+from viewsphere.model.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import WHITE, Color
-from viewsphere.model.substance import Substance
 
 KEPT = 8
 """Substances whose pictures are kept: 3 MB each of 512 texels a side, 13 MB of 1024."""
@@ -33,7 +33,7 @@ def is_replaceable(material: Material) -> bool:
     return material.alpha_mode == "OPAQUE" and not material.transmission
 
 
-def made_of(material: Material, substance: Substance, first: int) -> Material:
+def made_of(material: Material, substance: ProceduralMaterial, first: int) -> Material:
     """An opaque material of this substance; its pictures are images `first` and later, one repeat per unit of uv."""
     color, rough, bumps = (Texture(first + i) for i in range(3))
     return Material(
@@ -54,7 +54,7 @@ def scaled(material: Material, metres: float) -> Material:
     return replace(material, **{name: replace(getattr(material, name), scale=(1 / metres, 1 / metres)) for name in names})
 
 
-def pictures_of(substance: Substance) -> Pictures:
+def pictures_of(substance: ProceduralMaterial) -> Pictures:
     """The pictures of a substance; the last ones are kept. Raises UserError for a name that no material has."""
     return _pictures(substance.name, substance.seed, substance.size)
 
@@ -72,7 +72,7 @@ def _pictures(name: str, seed: int, size: int) -> Pictures:
     )
 
 
-def color_of(substance: Substance, tint: Color | None) -> str | None:
+def color_of(substance: ProceduralMaterial, tint: Color | None) -> str | None:
     """The basic colour that most of a substance has, in light of this tint; None where none has."""
     return _color(substance.name, substance.seed, substance.size, tint or WHITE)
 

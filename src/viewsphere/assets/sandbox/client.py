@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from viewsphere.aside import temporary
 from viewsphere.assets.load import suffix_of
 from viewsphere.assets.paths import endings
 from viewsphere.assets.readers import reader_of
@@ -19,6 +18,7 @@ from viewsphere.errors import ModelError
 from viewsphere.files import open_file, read_text
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.scratch import temporary
 
 READ_HERE = "VIEWSPHERE_READ_HERE"
 """Set to 1, this variable lets models be read in the calling process, unprotected."""

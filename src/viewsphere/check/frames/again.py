@@ -20,7 +20,7 @@ Findings = Iterator[tuple[str, str]]
 """Names of labels, and what is wrong with them."""
 
 
-class Again:
+class SourceCameras:
     """Computes labels of a data set again; `not_run` has the reason for each that cannot be, by its name."""
 
     def __init__(self, dataset: Dataset, scenery: Scenery, models: Mapping[str, ModelInfo]) -> None:

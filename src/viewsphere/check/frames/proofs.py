@@ -9,7 +9,7 @@ from functools import partial
 from itertools import accumulate
 
 from viewsphere.check.failure import failure
-from viewsphere.check.frames.again import Again
+from viewsphere.check.frames.again import SourceCameras
 from viewsphere.check.frames.comparing import FRAME_PROOFS
 from viewsphere.check.frames.rays import RayCaster
 from viewsphere.check.frames.recomputed import CONTRADICTED, Recomputed, rows_of
@@ -56,7 +56,7 @@ class _Proofs:
         self._dataset, self._chosen = dataset, chosen
         self._not_run: dict[str, str] = {}
         self._scenery, self._models = Scenery(dataset), {info.key: info for info in dataset.models}
-        self._again = Again(dataset, self._scenery, self._models)
+        self._again = SourceCameras(dataset, self._scenery, self._models)
         self._caster = None if chosen.rays is False else self._make_caster()
         self._recomputed = recomputed
         self._repainted = Repainted(dataset, recomputed)

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 
-from viewsphere.aside import temporary
 from viewsphere.check.frames.differences import differences, in_words
 from viewsphere.check.frames.recomputed import CONTRADICTED, Recomputed
 from viewsphere.check.report import in_short
@@ -15,6 +14,7 @@ from viewsphere.errors import UserError
 from viewsphere.files import read_bytes
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.shots.models import Export, Models
+from viewsphere.scratch import temporary
 from viewsphere.store import Dataset, ModelInfo
 from viewsphere.store.credits import credits_problem
 
@@ -90,6 +90,6 @@ class Sources:
 
     def _is_same(self, info: ModelInfo, export: Export) -> bool:
         """Return whether a source still gives the GLB of the data set."""
-        with temporary("check") as aside:
-            export(aside)
-            return read_bytes(aside / Path(info.glb).name) == read_bytes(self._dataset.path(info.glb))
+        with temporary("check") as scratch_folder:
+            export(scratch_folder)
+            return read_bytes(scratch_folder / Path(info.glb).name) == read_bytes(self._dataset.path(info.glb))

@@ -13,8 +13,8 @@ from pydantic import Field, model_validator
 from viewsphere.composing.motion import Move, Origin, Pose, Start
 from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_about, quaternion_product, slerp
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at, shown
 from viewsphere.model.numbers import Number
+from viewsphere.model.validation_errors import at, shown
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
 

@@ -10,8 +10,8 @@ from viewsphere.composing.motion import Heading, Lane, Move, Pose, Start, curve_
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.curve import Curve
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import one_of
 from viewsphere.model.numbers import Positive
+from viewsphere.model.validation_errors import one_of
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
 

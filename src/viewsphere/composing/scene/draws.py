@@ -23,6 +23,7 @@ from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import (
     WHITE,
     AnyLight,
@@ -36,7 +37,6 @@ from viewsphere.model.scene import (
     Sky,
     Sun,
 )
-from viewsphere.model.substance import Substance
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.draws import RngOf, alternatives, drawn, is_random
 from viewsphere.recipe.entries import concrete, pictures_of
@@ -254,9 +254,9 @@ class Scenes:
         return concrete(entry, image=image)
 
 
-def _substance(name: Any, size: int, rng_of: RngOf, field: tuple[str, ...]) -> Substance:
+def _substance(name: Any, size: int, rng_of: RngOf, field: tuple[str, ...]) -> ProceduralMaterial:
     """A piece of a material; what else is drawn of it follows from the seed."""
-    return Substance(name=name, seed=int(rng_of((*field, "seed")).integers(2**32)), size=size)
+    return ProceduralMaterial(name=name, seed=int(rng_of((*field, "seed")).integers(2**32)), size=size)
 
 
 def _sun(entry: Any, sky: AnySky) -> Sun | None:

@@ -23,9 +23,9 @@ from viewsphere.composing.seeds import Names, generator, scene_generators, share
 from viewsphere.errors import ModelError, RecipeError, UserError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import compose, transform
-from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
+from viewsphere.model.validation_errors import nearest, one_of
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import ZOO, unit_metres
 from viewsphere.recipe.motion import Motions

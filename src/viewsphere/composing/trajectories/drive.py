@@ -14,7 +14,7 @@ from viewsphere.composing.trajectories._world import RigPose, World
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.curve import Curve, spline
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.mistakes import one_of
+from viewsphere.model.validation_errors import one_of
 from viewsphere.recipe.trajectories import DrivePath
 
 Float = NDArray[np.float64]

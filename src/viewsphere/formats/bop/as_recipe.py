@@ -24,8 +24,8 @@ from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.store.again import Again, AgainModel, refuse_any
 from viewsphere.store.paths import file_inside
+from viewsphere.store.source_cameras import SourceCameras, SourceModel, refuse_any
 from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize
 
@@ -53,7 +53,7 @@ SHIFTED = (
 )
 
 
-def again(path: Path) -> Again:
+def again(path: Path) -> SourceCameras:
     """Return every picture of a data set of scenes, or of one of its splits, and every model with its symmetries.
 
     Pixels count from the first one's centre, as in BOP, unless masks fit the models clearly better from elsewhere. The world is
@@ -85,7 +85,7 @@ def again(path: Path) -> Again:
     if x or y:
         notes.append(SHIFTED.format(differs=masks.differs, differed=masks.differed, x=x, y=y))
     has_world = any(not np.array_equal(rigid(one.camera.R, one.camera.t), np.eye(4)) for one in frames)
-    return Again(
+    return SourceCameras(
         name=root.resolve().name,
         shots=tuple(_shifted(shot, masks.shift) for shot in shots),
         models=models,
@@ -113,7 +113,7 @@ def _shifted(shot: ListedShot, shift: Shift) -> ListedShot:
     return shot.model_copy(update={"camera": shot.camera and shifted(shot.camera, shift)})
 
 
-def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, AgainModel], list[str]]:
+def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, SourceModel], list[str]]:
     """The models by their numbers, and notes on what is left out."""
     files = model_files(root)
     for frame in frames:
@@ -123,14 +123,14 @@ def _models(root: Path, frames: tuple[Frame, ...]) -> tuple[dict[str, AgainModel
                 raise StoreError(
                     f"{root}: expected {name}, a model of image {frame.image} of {frame.scene}; found no such file"
                 )
-    known, found, notes, said = categories(root, list(files)), dict[str, AgainModel](), list[str](), symmetries_of(root)
+    known, found, notes, said = categories(root, list(files)), dict[str, SourceModel](), list[str](), symmetries_of(root)
     for number, file in files.items():
         symmetries = said.get(number)
         if symmetries is not None and symmetries.unlisted():
             notes.append(f"symmetries of object {number} are left out: some follow from others that are not listed")
             symmetries = None
         category, _ = known[number]
-        found[str(number)] = AgainModel(
+        found[str(number)] = SourceModel(
             file, category.name, supercategory=category.supercategory, unit=1 / MM, symmetries=symmetries
         )
     return found, notes
@@ -147,7 +147,7 @@ class Fit:
     differs: float = 0.0
 
 
-def _fit(frames: Sequence[Frame], models: Mapping[str, AgainModel]) -> Fit:
+def _fit(frames: Sequence[Frame], models: Mapping[str, SourceModel]) -> Fit:
     """The shift that whole masks have against the models in their poses; none where that is not clear, or where there are no
     masks. Raises ModelError for models that cannot be read, StoreError for masks that are none.
     """
@@ -194,7 +194,7 @@ def _mask(frame: Frame, n: int) -> NDArray[np.bool_]:
     return mask
 
 
-def _silhouette(frame: Frame, n: int, models: Mapping[str, AgainModel], shift: Shift) -> NDArray[np.bool_]:
+def _silhouette(frame: Frame, n: int, models: Mapping[str, SourceModel], shift: Shift) -> NDArray[np.bool_]:
     file = models[str(frame.gt[n]["obj_id"])].source
     assert isinstance(file, Path)
     spec = model_spec(file)

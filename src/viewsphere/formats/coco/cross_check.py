@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.aside import temporary
 from viewsphere.errors import ViewsphereError
 from viewsphere.formats.coco.categories import Names, Options, category_ids, object_points, point_names
 from viewsphere.formats.coco.writing import Entries, Entry, file_name, file_names, files, instances, seen
@@ -23,6 +22,7 @@ from viewsphere.formats.shared.writing.export_files import Expected, check_files
 from viewsphere.geometry.mask import encode_rle, mask_box
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import Remark
+from viewsphere.scratch import temporary
 
 if TYPE_CHECKING:
     from viewsphere.store import Dataset
@@ -110,8 +110,8 @@ def _loaded(file: Path, images: Collection[int]) -> Any:
             value[name] = row
         elif row["id" if name == "images" else "image_id"] in images:
             value[name].append(row)
-    with temporary("coco") as aside, contextlib.redirect_stdout(io.StringIO()):
-        part = aside / file.name
+    with temporary("coco") as scratch_folder, contextlib.redirect_stdout(io.StringIO()):
+        part = scratch_folder / file.name
         part.write_text(json.dumps(value), "utf-8", newline="\n")
         return COCO(part)
 

@@ -9,13 +9,13 @@ from viewsphere.formats.shared.reading.as_recipe import cameras_again, nearest_u
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.formats.shared.reading.posed_pictures import camera_of
 from viewsphere.model.listed import ListedShot
-from viewsphere.store.again import Again, refuse_any
+from viewsphere.store.source_cameras import SourceCameras, refuse_any
 
 FOLDERS = ("", "sparse/0", "sparse", "dense/0", "dense")
 """The folders in which COLMAP's programs put meshes, relative to the folder of the data set."""
 
 
-def again(path: Path) -> Again:
+def again(path: Path) -> SourceCameras:
     """Return every camera of a folder with `sparse/0`, or of such a `sparse/0`, text or binary, in the order of their images'
     names.
 

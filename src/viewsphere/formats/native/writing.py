@@ -9,7 +9,6 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
-from viewsphere.aside import temporary
 from viewsphere.formats.native.entries import Entry, entries_of, files
 from viewsphere.formats.shared.json_proof import check_json
 from viewsphere.formats.shared.json_rows import Where
@@ -17,6 +16,7 @@ from viewsphere.formats.shared.writing.export_files import Expected, check_files
 from viewsphere.formats.shared.writing.paper import json_bytes, vehicles
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import Remark
+from viewsphere.scratch import temporary
 from viewsphere.store import Dataset
 
 OPENED: tuple[Where, ...] = (
@@ -96,11 +96,11 @@ def _write_poses(file: IO[bytes], waiting: IO[bytes], places: Iterable[Place]) -
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
     """Yield every difference from the current export; no proof is limited to the `sampled` frames."""
-    with temporary("native") as aside:
-        with poses(dataset, aside) as append:
+    with temporary("native") as scratch_folder:
+        with poses(dataset, scratch_folder) as append:
             again = _expected(dataset, lambda entries: None)
             yield from check_files(dataset, folder, _expected(dataset, append), again, [FILE_NAME])
-        yield from check_json(aside / FILE_NAME, folder / FILE_NAME, OPENED, lambda where, value: None)
+        yield from check_json(scratch_folder / FILE_NAME, folder / FILE_NAME, OPENED, lambda where, value: None)
 
 
 def _expected(dataset: Dataset, append: Callable[[Sequence[Entry]], None]) -> Iterator[Expected]:

@@ -58,7 +58,7 @@ from viewsphere.model.listed import ListedShot
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
-from viewsphere.store.again import Again, refuse_any
+from viewsphere.store.source_cameras import SourceCameras, refuse_any
 
 SYNTHETIC = "nerf-synthetic"
 NAMES = {"brown_conrady": ("k1", "k2", "p1", "p2", "k3"), "fisheye": ("k1", "k2", "k3", "k4")}
@@ -70,7 +70,7 @@ FOLDERS = ("", "exports/mesh", "exports/poisson", "exports/tsdf", "exports")
 """The folders in which nerfstudio's users put meshes, relative to the folder of transforms.json."""
 
 
-def again(path: Path) -> Again:
+def again(path: Path) -> SourceCameras:
     """Return every camera of a world's folder, or of one of its files. Pictures are required only where the file does not give
     w and h. Raises StoreError where there is no such file, and for a frame that lacks its lens or its pose.
     """

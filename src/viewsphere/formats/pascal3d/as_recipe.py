@@ -20,8 +20,8 @@ from viewsphere.formats.shared.viewpoint_mat import off_bytes
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.listed import ListedObject, ListedShot
-from viewsphere.store.again import Again, AgainModel, Drafted, refuse_any
 from viewsphere.store.paths import file_inside, is_name
+from viewsphere.store.source_cameras import Drafted, SourceCameras, SourceModel, refuse_any
 
 ALIKE = 1e-6
 """Pixels by which the lenses of two objects of one picture may differ."""
@@ -35,7 +35,7 @@ class _Group:
     objects: list[Posed]
 
 
-def again(path: Path) -> Again:
+def again(path: Path) -> SourceCameras:
     """Return every picture with objects of known viewpoint, in the folder of a release, and the CAD models that they show.
 
     A picture is one shot where its objects have one lens, as where the record gives K. Else it is one shot for each lens,
@@ -67,7 +67,7 @@ def again(path: Path) -> Again:
     refuse_any(problems)
     if not found:
         raise StoreError(f"{path}: expected pictures with objects of known viewpoint; found none")
-    return Again(
+    return SourceCameras(
         name=path.resolve().name,
         shots=tuple(found),
         models=models.found,
@@ -137,7 +137,7 @@ class _Models:
     """The CAD models that are asked for: OFF files, else those of a category's MATLAB file."""
 
     root: Path
-    found: dict[str, AgainModel]
+    found: dict[str, SourceModel]
     words: dict[str, str]
 
     def key(self, category: str, number: int) -> str:
@@ -147,7 +147,7 @@ class _Models:
         key = f"{category} {number}"
         if key not in self.found:
             word = self._word(category)
-            self.found[key] = AgainModel(self._source(category, number, word), category, name=word)
+            self.found[key] = SourceModel(self._source(category, number, word), category, name=word)
         return key
 
     def _word(self, category: str) -> str:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.aside import temporary
 from viewsphere.codecs.deflate import compressed
 from viewsphere.codecs.mat import COMPRESSED, HEAD
 from viewsphere.codecs.mp4 import Encoder, encoder, write_mp4
@@ -27,6 +26,7 @@ from viewsphere.formats.shared.writing.timeline import Timeline
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree
 from viewsphere.formats.surreal.body import MOST_TOLD, UNKNOWN, joints, part_numbers
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.scratch import temporary
 from viewsphere.store import Dataset
 
 Float = NDArray[np.float64]
@@ -200,10 +200,10 @@ def _film(clip: Clip) -> bytes:
     times = [sample.time for sample in clip.samples]
     steps: Sequence[float] = np.diff(times).tolist() or [1 / RATE]
     lasts = [*steps, min(steps)][: len(times)]
-    with temporary("film") as aside:
+    with temporary("film") as scratch_folder:
         pictures = (opaque(replace(sample, channels=copy(sample.channels)).picture) for sample in clip.samples)
-        write_mp4(aside / "film.mp4", zip(pictures, lasts, strict=True), film_encoder())
-        return read_bytes(aside / "film.mp4")
+        write_mp4(scratch_folder / "film.mp4", zip(pictures, lasts, strict=True), film_encoder())
+        return read_bytes(scratch_folder / "film.mp4")
 
 
 def _variable(name: str, array: NDArray[Any]) -> bytes:

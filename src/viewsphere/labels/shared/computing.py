@@ -14,15 +14,15 @@ from viewsphere.labels.shared.context import LabelContext, NeighbourViews
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.record import Makers, computed
 from viewsphere.labels.shared.spec import derived
+from viewsphere.model.appearance import Appearance
 from viewsphere.model.camera import Camera
 from viewsphere.model.keypoints import Keypoints
-from viewsphere.model.looks import Looks
+from viewsphere.model.metadata import ModelMetadata
 from viewsphere.model.model_spec import Size
 from viewsphere.model.sample import ObjectAnnotation
 from viewsphere.model.shot import Shot
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import Thing
-from viewsphere.model.traits import Traits
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility
 
@@ -59,7 +59,7 @@ def context_of(
     models: Sequence[str],
     real_sizes: Sequence[Size | None] | None = None,
     around: NeighbourViews | None = None,
-    traits: Sequence[Callable[[], Traits]] | None = None,
+    metadata: Sequence[Callable[[], ModelMetadata]] | None = None,
 ) -> LabelContext:
     """Return the view that a camera has of a shot at an instant (counted from 0 there), with the places of its objects.
 
@@ -77,7 +77,9 @@ def context_of(
     sizes = real_sizes or [None if isinstance(thing.model.real_size, str) else thing.model.real_size for thing in objects]
     facts = [
         Rendered(model, box, size, thing.model.category, thing.model.category_id, _track(thing, instant), said)
-        for thing, box, model, size, said in zip(objects, boxes, models, sizes, traits or [_unsaid] * len(objects), strict=True)
+        for thing, box, model, size, said in zip(
+            objects, boxes, models, sizes, metadata or [_unsaid] * len(objects), strict=True
+        )
     ]
     places = tuple(
         None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known, step)
@@ -87,7 +89,7 @@ def context_of(
     return LabelContext(geometry, camera, visibility, places, around, shot.annotations, shot.labels)
 
 
-def _unsaid() -> Traits:
+def _unsaid() -> ModelMetadata:
     raise ValueError("expected what the model says of itself; context_of() was not given it")
 
 
@@ -128,26 +130,26 @@ class Rendered:
     category: str
     category_id: int
     track: str
-    traits: Callable[[], Traits]
+    metadata: Callable[[], ModelMetadata]
     materials: tuple[str, ...] = ()
     body_parts: tuple[str, ...] = ()
 
     @property
     def diameter(self) -> float:
         """The largest distance between two vertices, metres."""
-        return self.traits().diameter
+        return self.metadata().diameter
 
     @property
     def symmetries(self) -> Symmetries | None:
         """Motions that leave the model as it is."""
-        return self.traits().symmetries
+        return self.metadata().symmetries
 
     @property
     def keypoints(self) -> Keypoints | None:
         """Named points."""
-        return self.traits().keypoints
+        return self.metadata().keypoints
 
     @property
-    def looks(self) -> Looks | None:
+    def looks(self) -> Appearance | None:
         """The model's appearance: its colours and materials."""
-        return self.traits().looks()
+        return self.metadata().looks()

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.model.appearance import Appearance
 from viewsphere.model.camera import Camera
 from viewsphere.model.keypoints import Keypoints
-from viewsphere.model.looks import Looks
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.sample import ObjectView
 from viewsphere.model.scene import Matrix4
@@ -83,7 +83,7 @@ class ModelFacts(Protocol):
         ...
 
     @property
-    def looks(self) -> Looks | None:
+    def looks(self) -> Appearance | None:
         """Its colours and materials; None where no requested label needs them."""
         ...
 

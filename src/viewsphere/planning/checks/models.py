@@ -15,9 +15,9 @@ from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.errors import RecipeError
 from viewsphere.labels import Needs, channels, is_channel, is_on_request, label_named, labels, on_request
 from viewsphere.model.channel import MATERIAL_PASSES, PASSES
-from viewsphere.model.mistakes import nearest, one_of, read_options, shown
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.suggestions import suggestion
+from viewsphere.model.validation_errors import nearest, one_of, read_options, shown
 from viewsphere.planning.models import count_models
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec

@@ -6,26 +6,26 @@ import numpy as np
 
 from viewsphere.model.instant import Instant
 from viewsphere.model.shot import Shot
-from viewsphere.planning.samplers import Stock
+from viewsphere.planning.samplers import SamplingContext
 from viewsphere.recipe.finish import JitterEntry
 
 
-def off_center(stock: Stock, subject: str, shot: Shot) -> Shot:
+def off_center(context: SamplingContext, subject: str, shot: Shot) -> Shot:
     """The shot with its cameras moved in their pictures' planes, as its recipe's jitter says: what they look at keeps its
     distance along the camera's axis, and so its size. Cameras without a viewpoint of their own stay.
     """
-    if stock.recipe.scene.jitter.off_center == JitterEntry().off_center:
+    if context.recipe.scene.jitter.off_center == JitterEntry().off_center:
         return shot
-    instants = tuple(_moved(stock, subject, shot, i) for i in range(len(shot.instants)))
+    instants = tuple(_moved(context, subject, shot, i) for i in range(len(shot.instants)))
     return shot.model_copy(update={"instants": instants})
 
 
-def _moved(stock: Stock, subject: str, shot: Shot, i: int) -> Instant:
+def _moved(context: SamplingContext, subject: str, shot: Shot, i: int) -> Instant:
     now, lens = shot.instants[i], shot.camera(i).intrinsics
     view = now.viewpoint
     if view is None:
         return now
-    right, down = stock.scenes.jitter(subject, stock.jitter_name(view.index)).off_center
+    right, down = context.scenes.jitter(subject, context.jitter_name(view.index)).off_center
     pose = np.array(now.world_from_rig)
     x, y = -right * lens.width * view.distance / lens.fx, -down * lens.height * view.distance / lens.fy
     by = x * pose[:3, 0] + y * pose[:3, 1]

@@ -17,7 +17,7 @@ from viewsphere.composing.viewpoints.sequence_poses import SequencePoses, Trajec
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.thing import Thing
-from viewsphere.planning.samplers.shared.course import no_such_thing, piece_moving, target_moving, time_of
+from viewsphere.planning.samplers.shared.sequence_state import no_such_thing, piece_moving, target_moving, time_of
 from viewsphere.recipe.scenes import ScenesEntry
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """Samplers: which shots a recipe means, and what is in each.
 
-A sampler is one module with a `SamplerSpec`; none imports another. Samplers make their shots from a `Stock`.
+A sampler is one module with a `SamplerSpec`; none imports another. Samplers make their shots from a `SamplingContext`.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from typing import TypeVar
 
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import read_options
 from viewsphere.model.scene import Vector
 from viewsphere.model.thing import Thing
-from viewsphere.planning.samplers.shared.stock import Stock, lens
+from viewsphere.model.validation_errors import read_options
+from viewsphere.planning.samplers.shared.sampling_context import SamplingContext, lens
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import SamplerEntry
 
-__all__ = ["Standing", "Stock", "lens", "options_of"]
+__all__ = ["SamplingContext", "Standing", "lens", "options_of"]
 
 Options = TypeVar("Options", bound=Frozen)
 

@@ -12,14 +12,14 @@ from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics
 from viewsphere.composing.viewpoints.poses import ListedPoses, placed, pose_file, world_turn
 from viewsphere.errors import RecipeError, each
 from viewsphere.model.listed import ListedObject
-from viewsphere.model.mistakes import Nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.planning.samplers import Standing, Stock
+from viewsphere.model.validation_errors import Nearest, one_of
+from viewsphere.planning.samplers import SamplingContext, Standing
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.viewpoints import PoseList
@@ -54,14 +54,14 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     return tuple(each(name, shots))
 
 
-def factors(stock: Stock) -> str:
+def factors(context: SamplingContext) -> str:
     """The number of shots."""
-    return f"{quantity(len(stock.subjects), 'listed shot')} of {quantity(stock.models, 'model')}"
+    return f"{quantity(len(context.subjects), 'listed shot')} of {quantity(context.models, 'model')}"
 
 
-def blocks(stock: Stock) -> tuple[Block, ...]:
+def blocks(context: SamplingContext) -> tuple[Block, ...]:
     """Every shot from its own camera, in the file's order."""
-    return tuple(Block((name,), ((i, i + 1),)) for i, name in enumerate(stock.subjects))
+    return tuple(Block((name,), ((i, i + 1),)) for i, name in enumerate(context.subjects))
 
 
 def most_objects(recipe: Recipe) -> int:
@@ -69,62 +69,62 @@ def most_objects(recipe: Recipe) -> int:
     return max(len(shot.places) for shot in _file(recipe)[1])
 
 
-def cast(stock: Stock, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The models of a shot, in the order of their ids."""
-    return tuple(stock.spec(one.model) for one in _shots(stock)[subject].said.objects)
+    return tuple(context.spec(one.model) for one in _shots(context)[subject].said.objects)
 
 
-def split(stock: Stock, subject: str, pose: int) -> str:
+def split(context: SamplingContext, subject: str, pose: int) -> str:
     """The shot's own, else what its name draws."""
-    if stock.recipe.splits.by == "scene":
-        return stock.dealt_splits[subject]
-    return _shots(stock)[subject].said.split or stock.hashed_split(subject, pose)
+    if context.recipe.splits.by == "scene":
+        return context.dealt_splits[subject]
+    return _shots(context)[subject].said.split or context.hashed_split(subject, pose)
 
 
-def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """Nothing: where a listed camera is, is meant so."""
     return iter(())
 
 
-def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
     """The models of a shot where the file has them, and what stands around them, seen by its camera."""
     (pose,) = poses
-    things = _things(stock, _shots(stock)[subject])
-    if stock.composition is not None:
-        things = stock.composition.things(subject, things, stock.scene_pose(pose), box_of)
-    view, number = stock.view(stock.pose_list, pose), first // len(stock.rig.sensors)
-    now = stock.instant(subject, view, view.target, (0.0, 0.0, 0.0), split(stock, subject, pose), number)
-    scene = stock.scene(subject, stock.pose_list.name(pose))
-    things, own = stock.repainted(things, subject, pose), now.intrinsics
-    if stock.own_rig is not None or own is None:
-        return stock.finished(key, first, things, scene, [now])
-    made = stock.finished(key, first, things, scene, [now.model_copy(update={"intrinsics": None})])
+    things = _things(context, _shots(context)[subject])
+    if context.composition is not None:
+        things = context.composition.things(subject, things, context.scene_pose(pose), box_of)
+    view, number = context.view(context.pose_list, pose), first // len(context.rig.sensors)
+    now = context.instant(subject, view, view.target, (0.0, 0.0, 0.0), split(context, subject, pose), number)
+    scene = context.scene(subject, context.pose_list.name(pose))
+    things, own = context.repainted(things, subject, pose), now.intrinsics
+    if context.own_rig is not None or own is None:
+        return context.finished(key, first, things, scene, [now])
+    made = context.finished(key, first, things, scene, [now.model_copy(update={"intrinsics": None})])
     return made.model_copy(update={"rig": Rig.of(own)})
 
 
-def _things(stock: Stock, shot: Arranged) -> tuple[Thing, ...]:
+def _things(context: SamplingContext, shot: Arranged) -> tuple[Thing, ...]:
     """The objects of a shot, with the motions that the recipe's viewpoints make of their file's world."""
-    entry, file = _listed(stock).viewpoints, _listed(stock).file
+    entry, file = _listed(context).viewpoints, _listed(context).file
     turn = world_turn(entry, file)
 
     def thing(number: int, one: ListedObject, place: Extrinsics) -> Thing:
         a, b, c = ((x, y, z, w) for x, y, z, w in placed(place, turn, entry)[:3].tolist())
         motion = Motion.still((a, b, c, IDENTITY[3]))
-        return Thing(id=number, model=stock.spec(one.model), motion=motion, scenery=one.scenery)
+        return Thing(id=number, model=context.spec(one.model), motion=motion, scenery=one.scenery)
 
     pairs = zip(shot.said.objects, shot.places, strict=True)
     return tuple(thing(number, one, place) for number, (one, place) in enumerate(pairs, 1))
 
 
-def _listed(stock: Stock) -> ListedPoses:
-    assert isinstance(stock.pose_list, ListedPoses)
-    return stock.pose_list
+def _listed(context: SamplingContext) -> ListedPoses:
+    assert isinstance(context.pose_list, ListedPoses)
+    return context.pose_list
 
 
 @lru_cache(maxsize=2)
-def _shots(stock: Stock) -> dict[str, Arranged]:
+def _shots(context: SamplingContext) -> dict[str, Arranged]:
     """The shots by their names."""
-    return {shot.name: shot for shot in _listed(stock).file.shots}
+    return {shot.name: shot for shot in _listed(context).file.shots}
 
 
 def _file(recipe: Recipe) -> tuple[Path, tuple[Arranged, ...]]:

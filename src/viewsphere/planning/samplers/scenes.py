@@ -18,7 +18,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
-from viewsphere.planning.samplers import Standing, Stock
+from viewsphere.planning.samplers import SamplingContext, Standing
 from viewsphere.planning.samplers.shared.random import (
     are_views_drawn,
     check_scene_models,
@@ -51,19 +51,19 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     return scene_names(recipe)
 
 
-def factors(stock: Stock) -> str:
+def factors(context: SamplingContext) -> str:
     """Scenes, and the poses of each."""
-    entry = scenes_entry(stock.recipe)
-    views = len(stock.pose_list) if entry.views is None else min(entry.views, len(stock.pose_list))
-    return f"{quantity(len(stock.subjects), 'scene')} of {quantity(stock.models, 'model')} x {quantity(views, 'pose')}"
+    entry = scenes_entry(context.recipe)
+    views = len(context.pose_list) if entry.views is None else min(entry.views, len(context.pose_list))
+    return f"{quantity(len(context.subjects), 'scene')} of {quantity(context.models, 'model')} x {quantity(views, 'pose')}"
 
 
-def blocks(stock: Stock) -> tuple[Block, ...]:
+def blocks(context: SamplingContext) -> tuple[Block, ...]:
     """Return the blocks of every scene, with all poses or the drawn ones. Raises RecipeError where too few models may meet."""
-    check_scene_models(stock)
-    if not are_views_drawn(stock):
-        return (Block(stock.subjects, ((0, len(stock.pose_list)),)),)
-    taken = groupby(stock.subjects, partial(_poses, stock))
+    check_scene_models(context)
+    if not are_views_drawn(context):
+        return (Block(context.subjects, ((0, len(context.pose_list)),)),)
+    taken = groupby(context.subjects, partial(_poses, context))
     return tuple(Block(tuple(names), poses) for poses, names in taken)
 
 
@@ -72,52 +72,52 @@ def most_objects(recipe: Recipe) -> int:
     return scenes_entry(recipe).most_objects
 
 
-def cast(stock: Stock, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The models of a scene."""
-    return scene_cast(stock, subject)
+    return scene_cast(context, subject)
 
 
-def split(stock: Stock, subject: str, pose: int) -> str:
+def split(context: SamplingContext, subject: str, pose: int) -> str:
     """The scene's, or what its pose, place or name draw; by model, what the scene draws before its models."""
-    match stock.recipe.splits.by:
+    match context.recipe.splits.by:
         case "scene":
-            return stock.dealt_splits[subject]
+            return context.dealt_splits[subject]
         case "model":
-            return scene_split(stock, subject)
+            return scene_split(context, subject)
         case _:
-            return stock.hashed_split(subject, pose)
+            return context.hashed_split(subject, pose)
 
 
-def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The models of a scene; nothing where the place they stand in is drawn for each frame."""
-    if not stock.recipe.scene.is_moved_each_frame and not is_slow(scenes_entry(stock.recipe).layout):
-        things = scene_things(stock, subject, None, box_of)
-        views, poses = stock.pose_list.of(subject), tuple(numbers(_poses(stock, subject)))
+    if not context.recipe.scene.is_moved_each_frame and not is_slow(scenes_entry(context.recipe).layout):
+        things = scene_things(context, subject, None, box_of)
+        views, poses = context.pose_list.of(subject), tuple(numbers(_poses(context, subject)))
         yield Standing(things, center_of_all(things, box_of), views, poses)
 
 
-def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
     """The models of a scene, and what stands around them; cameras look at the middle of the models."""
-    pose = stock.scene_pose(poses[0])
-    targets = things = scene_things(stock, subject, pose, box_of)
+    pose = context.scene_pose(poses[0])
+    targets = things = scene_things(context, subject, pose, box_of)
     middle = center_of_all(things, box_of)
-    if stock.composition is not None:
-        things = stock.composition.things(subject, things, pose, box_of, redraw=stock.redraw)
-    things += scene_distractors(stock, subject, pose, box_of) + scene_around(stock, subject, pose, box_of)
-    views = stock.pose_list.of(subject)
+    if context.composition is not None:
+        things = context.composition.things(subject, things, pose, box_of, redraw=context.redraw)
+    things += scene_distractors(context, subject, pose, box_of) + scene_around(context, subject, pose, box_of)
+    views = context.pose_list.of(subject)
     instants = [
-        stock.instant(subject, stock.view(views, pose), middle, middle, split(stock, subject, pose), i)
-        for i, pose in enumerate(poses, first // len(stock.rig.sensors))
+        context.instant(subject, context.view(views, pose), middle, middle, split(context, subject, pose), i)
+        for i, pose in enumerate(poses, first // len(context.rig.sensors))
     ]
-    scene = stock.scene(subject, stock.pose_list.name(poses[0]))
+    scene = context.scene(subject, context.pose_list.name(poses[0]))
     if min(float(transform(thing.world_from_object, box_of(thing.model))[:, 2].min()) for thing in targets) > IN_THE_AIR:
         scene = scene.model_copy(update={"floor": Floor(height=0.0)})
-    return stock.finished(key, first, stock.repainted(things, subject, poses[0]), scene, instants)
+    return context.finished(key, first, context.repainted(things, subject, poses[0]), scene, instants)
 
 
-def _poses(stock: Stock, subject: str) -> Ranges:
+def _poses(context: SamplingContext, subject: str) -> Ranges:
     """Numbers of the poses that a scene is taken from."""
-    return as_ranges(np.array(scene_views(stock, subject), np.int64))
+    return as_ranges(np.array(scene_views(context, subject), np.int64))
 
 
 SAMPLER = SamplerSpec(

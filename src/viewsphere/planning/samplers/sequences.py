@@ -25,8 +25,7 @@ from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
-from viewsphere.planning.samplers import Standing, Stock
-from viewsphere.planning.samplers.shared.course import Course, course, middle, placed_targets, time_of
+from viewsphere.planning.samplers import SamplingContext, Standing
 from viewsphere.planning.samplers.shared.exposing import exposures
 from viewsphere.planning.samplers.shared.random import (
     check_scene_models,
@@ -36,6 +35,7 @@ from viewsphere.planning.samplers.shared.random import (
     scene_views,
     scenes_entry,
 )
+from viewsphere.planning.samplers.shared.sequence_state import SequenceState, middle, placed_targets, sequence_state, time_of
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
@@ -59,19 +59,19 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     return tuple(spec.key for spec in specs)
 
 
-def factors(stock: Stock) -> str:
+def factors(context: SamplingContext) -> str:
     """The factors of the number of frames: models or scenes, sequences and instants."""
-    subjects = quantity(len(stock.subjects), "model" if stock.recipe.scenes is None else "scene")
-    views = sum(len(names) for names in _taken(stock).values())
-    return f"{subjects}, {quantity(views, 'sequence')} x {quantity(time_of(stock).count, 'instant')}"
+    subjects = quantity(len(context.subjects), "model" if context.recipe.scenes is None else "scene")
+    views = sum(len(names) for names in _taken(context).values())
+    return f"{subjects}, {quantity(views, 'sequence')} x {quantity(time_of(context).count, 'instant')}"
 
 
-def blocks(stock: Stock) -> tuple[Block, ...]:
+def blocks(context: SamplingContext) -> tuple[Block, ...]:
     """Blocks of rows: for each viewpoint, its subjects and its instants."""
-    if stock.recipe.scenes is not None:
-        check_scene_models(stock)
-    count = time_of(stock).count
-    return tuple(Block(tuple(names), ((view * count, (view + 1) * count),)) for view, names in _taken(stock).items())
+    if context.recipe.scenes is not None:
+        check_scene_models(context)
+    count = time_of(context).count
+    return tuple(Block(tuple(names), ((view * count, (view + 1) * count),)) for view, names in _taken(context).items())
 
 
 def most_objects(recipe: Recipe) -> int:
@@ -81,29 +81,29 @@ def most_objects(recipe: Recipe) -> int:
     return 1 + (recipe.scene.company.number if recipe.scene.company else 0)
 
 
-def cast(stock: Stock, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The recipe's models in a sequence; only the model itself where company is drawn for each sequence and none is named."""
-    if stock.recipe.scenes is not None:
-        return scene_cast(stock, subject)
-    return stock.with_company(subject, pose)
+    if context.recipe.scenes is not None:
+        return scene_cast(context, subject)
+    return context.with_company(subject, pose)
 
 
-def split(stock: Stock, subject: str, pose: int) -> str:
+def split(context: SamplingContext, subject: str, pose: int) -> str:
     """The model's, the scene's or the sequence's, or what its pose, place or name draw."""
-    by = stock.recipe.splits.by
+    by = context.recipe.splits.by
     if by == "sequence":
-        return stock.dealt_splits[stock.sequence(subject, pose)]
-    if by == "model" and stock.recipe.scenes is not None:
-        return scene_split(stock, subject)
-    return stock.dealt_splits[subject] if by in ("model", "scene") else stock.hashed_split(subject, pose)
+        return context.dealt_splits[context.sequence(subject, pose)]
+    if by == "model" and context.recipe.scenes is not None:
+        return scene_split(context, subject)
+    return context.dealt_splits[subject] if by in ("model", "scene") else context.hashed_split(subject, pose)
 
 
-def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The things as they are placed, seen by cameras that stand still; nothing where they are drawn for each sequence."""
-    if not stock.recipe.scene.is_moved_each_frame and is_still(stock.recipe.viewpoints) and not _is_slow(stock.recipe):
-        things = placed_targets(stock, subject, None, box_of)
-        count, views = time_of(stock).count, stock.sequences_of(subject)
-        poses = [view * count for view, names in _taken(stock).items() if subject in names]
+    if not context.recipe.scene.is_moved_each_frame and is_still(context.recipe.viewpoints) and not _is_slow(context.recipe):
+        things = placed_targets(context, subject, None, box_of)
+        count, views = time_of(context).count, context.sequences_of(subject)
+        poses = [view * count for view, names in _taken(context).items() if subject in names]
         yield Standing(things, middle(things, box_of), views, poses)
 
 
@@ -114,66 +114,66 @@ def _is_slow(recipe: Recipe) -> bool:
     return layout is not None and is_slow(layout)
 
 
-def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
     """Some instants of a sequence, and those that their labels need."""
-    start = poses[0] - poses[0] % time_of(stock).count
+    start = poses[0] - poses[0] % time_of(context).count
     taken = {pose - start for pose in poses}
-    own = course(stock, subject, start, box_of)
-    numbers = sorted(taken | _needed(stock, taken))
-    instants = [_instant(stock, own, subject, start + i, box_of).model_copy(update={"recorded": i in taken}) for i in numbers]
-    scene = stock.scene(subject, stock.scene_name(start)).model_copy(update={"floor": FLOOR})
-    made = stock.finished(key, first, own.things_during(numbers), scene, instants)
+    own = sequence_state(context, subject, start, box_of)
+    numbers = sorted(taken | _needed(context, taken))
+    instants = [_instant(context, own, subject, start + i, box_of).model_copy(update={"recorded": i in taken}) for i in numbers]
+    scene = context.scene(subject, context.scene_name(start)).model_copy(update={"floor": FLOOR})
+    made = context.finished(key, first, own.things_during(numbers), scene, instants)
 
     def rig_at(instant: int) -> Matrix4:
-        return _instant(stock, own, subject, start + instant, box_of).world_from_rig
+        return _instant(context, own, subject, start + instant, box_of).world_from_rig
 
-    blurred = exposures(own, [i if i in taken else None for i in numbers], time_of(stock), rig_at)
-    more = {"sequence": stock.sequence(subject, start), "tracks": _tracks(stock, subject, start)}
-    return made.model_copy(update=more | {"shutter": time_of(stock).shutter, "exposures": blurred})
+    blurred = exposures(own, [i if i in taken else None for i in numbers], time_of(context), rig_at)
+    more = {"sequence": context.sequence(subject, start), "tracks": _tracks(context, subject, start)}
+    return made.model_copy(update=more | {"shutter": time_of(context).shutter, "exposures": blurred})
 
 
-def _tracks(stock: Stock, subject: str, start: int) -> Tracks | None:
+def _tracks(context: SamplingContext, subject: str, start: int) -> Tracks | None:
     """The points that sensors follow through a sequence."""
-    if stock.tracks is None or stock.tracks.count is None:
-        return stock.tracks
-    rng = generator(stock.recipe.seed, "tracks", subject, stock.pose_list.place(start))
-    return stock.tracks.model_copy(update={"seed": int(rng.integers(2**63))})
+    if context.tracks is None or context.tracks.count is None:
+        return context.tracks
+    rng = generator(context.recipe.seed, "tracks", subject, context.pose_list.place(start))
+    return context.tracks.model_copy(update={"seed": int(rng.integers(2**63))})
 
 
-def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) -> Instant:
+def _instant(context: SamplingContext, own: SequenceState, subject: str, pose: int, box_of: BoxOf) -> Instant:
     """The instant of a pose."""
-    time, part = time_of(stock), split(stock, subject, pose)
+    time, part = time_of(context), split(context, subject, pose)
     i = pose % time.count
     if own.rig is None:
-        view, at = stock.sequences_of(subject)[pose], own.focus_at(i, stock.recipe.viewpoints.target == "follow", box_of)
-        return stock.instant(subject, view, at, at, part, i).model_copy(update={"seconds": time.at(i)})
-    finish, now = stock.finish(subject, pose), own.rig[i]
-    if not stock.recipe.camera.of_viewpoints:
-        now = replace(now, intrinsics=stock.drawn_lens(subject, pose))
-    return instant_of(now, i, time.at(i), pose, stock.recipe.viewpoints.bins, split=part, finish=finish)
+        view, at = context.sequences_of(subject)[pose], own.focus_at(i, context.recipe.viewpoints.target == "follow", box_of)
+        return context.instant(subject, view, at, at, part, i).model_copy(update={"seconds": time.at(i)})
+    finish, now = context.finish(subject, pose), own.rig[i]
+    if not context.recipe.camera.of_viewpoints:
+        now = replace(now, intrinsics=context.drawn_lens(subject, pose))
+    return instant_of(now, i, time.at(i), pose, context.recipe.viewpoints.bins, split=part, finish=finish)
 
 
-def _needed(stock: Stock, taken: Set[int]) -> set[int]:
+def _needed(context: SamplingContext, taken: Set[int]) -> set[int]:
     """The instants that labels of those that are taken need besides."""
-    names = {name for sensor in stock.rig.sensors for name in sensor.kept(stock.recipe.channels)}
-    names.update(stock.recipe.annotations)
+    names = {name for sensor in context.rig.sensors for name in sensor.kept(context.recipe.channels)}
+    names.update(context.recipe.annotations)
     needs = (label.needs for name in names if (label := label_named(name)))
     offsets = {offset for some in needs for offset in (*some.instants, *some.poses)}
-    offsets |= {-1, 1} if any(sensor.lidar and sensor.lidar.sweep for sensor in stock.rig.sensors) else set()
-    count = time_of(stock).count
+    offsets |= {-1, 1} if any(sensor.lidar and sensor.lidar.sweep for sensor in context.rig.sensors) else set()
+    count = time_of(context).count
     compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
-    return compared if stock.tracks is None else compared | set(stock.tracks.at)
+    return compared if context.tracks is None else compared | set(context.tracks.at)
 
 
-def _taken(stock: Stock) -> dict[int, list[str]]:
+def _taken(context: SamplingContext) -> dict[int, list[str]]:
     """The subjects that are taken from each viewpoint, by the viewpoint's number."""
-    assert isinstance(stock.pose_list, SequencePoses)
-    base = stock.pose_list.base
-    if stock.recipe.scenes is None:
-        return {view: list(stock.subjects) for view in range(len(base))}
+    assert isinstance(context.pose_list, SequencePoses)
+    base = context.pose_list.base
+    if context.recipe.scenes is None:
+        return {view: list(context.subjects) for view in range(len(base))}
     found: defaultdict[int, list[str]] = defaultdict(list)
-    for subject in stock.subjects:
-        for view in scene_views(stock, subject):
+    for subject in context.subjects:
+        for view in scene_views(context, subject):
             found[view].append(subject)
     return dict(sorted(found.items()))
 

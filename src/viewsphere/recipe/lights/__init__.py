@@ -10,7 +10,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from viewsphere import plugins
-from viewsphere.model.mistakes import at, one_of, shown
+from viewsphere.model.validation_errors import at, one_of, shown
 from viewsphere.plugins.light import LightSpec
 from viewsphere.recipe.lights.shared.lamps import Aimed, At, Lamp, Placed, place_of
 

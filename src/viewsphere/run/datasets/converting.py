@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from viewsphere.aside import aside
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
 from viewsphere.recipe.formats import Formats, read_formats
@@ -20,6 +19,7 @@ from viewsphere.run.exports.exporting import linked, write
 from viewsphere.run.exports.scope import refuse, scope_of_foreign
 from viewsphere.run.exports.writable import writable
 from viewsphere.run.progress import Listener, null_listener
+from viewsphere.scratch import scratch_folder
 from viewsphere.store import Dataset, located, new_folder
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.places.local import TAKEN
@@ -69,7 +69,7 @@ def convert(
         # In order of their names: of two runs at the same time, the first to put one folder in place puts all shared ones.
         ordered = sorted(entries, key=lambda entry: entry.name)
         folders = [(entry, whole.enter_context(_folder(located(out) / entry.name))) for entry in ordered]
-        store = whole.enter_context(aside(folders[0][1].parent)) / "store"  # on the same disk, for links
+        store = whole.enter_context(scratch_folder(folders[0][1].parent)) / "store"  # on the same disk, for links
         with _told_of(store, foreign, source, located(out)):
             put_in_store(foreign, store, listener)
             dataset = Dataset(store)
@@ -86,7 +86,7 @@ def _folder(target: Path) -> Generator[Path]:
     """
     made = b""
     if (target / CHECKSUMS).is_file():
-        with aside(target.parent) as own:
+        with scratch_folder(target.parent) as own:
             folder = own / target.name
             folder.mkdir()
             yield folder

@@ -45,7 +45,7 @@ Take = Callable[[Sequence[int], int], Shot]
 class Source(Protocol):
     """A plan, or a part of a data set, whose shots are made."""
 
-    def shot(self, row: Row, box_of: BoxOf, tries: Sequence[int] = (), redraw: int = 0) -> Shot:
+    def shot(self, row: Row, box_of: BoxOf, redraws: Sequence[int] = (), redraw: int = 0) -> Shot:
         """The shot of a row."""
         ...
 
@@ -81,7 +81,7 @@ class Framing:
         return self._fitting(take, self._scenes[whole], self._scenes[whole] + 1)
 
     def _taker(self, source: Source, row: Row) -> Take:
-        return lambda tries, redraw: source.shot(row, self.box_of, tries, redraw)
+        return lambda redraws, redraw: source.shot(row, self.box_of, redraws, redraw)
 
     def _fitting(self, take: Take, redraw: int, stop: int, is_judged: bool = True) -> Shot:
         """The shot in the first of its scene's draws that fits; not `is_judged`: only its cameras have to."""

@@ -74,7 +74,7 @@ class Models:
             if wanted:
                 read_ahead(spec, wanted, build=build_zoo_model)
         target = self.store.model_folder(spec.key)
-        self._write(spec, wanted, credit, self.store.aside(target) if known is None else self.store.replacing(target))
+        self._write(spec, wanted, credit, self.store.scratch_folder(target) if known is None else self.store.replacing(target))
 
     def mend(self, spec: ModelSpec, steps: Iterable[TimeStep], credit: Credit | None = None) -> None:
         """Put a model in the place of one that is damaged; raises StoreError where that was another. The `credit` counts where
@@ -83,7 +83,7 @@ class Models:
         wanted = _with_rest(spec, steps)
         if wanted:
             read_ahead(spec, wanted, build=build_zoo_model)
-        place = self.store.aside(self.store.model_folder(spec.key), again=True)
+        place = self.store.scratch_folder(self.store.model_folder(spec.key), again=True)
         self._write(spec, wanted, self._credit_of(spec.key, credit), place)
 
     def _credit_of(self, key: str, otherwise: Credit | None) -> Credit | None:
@@ -146,7 +146,7 @@ class Models:
 
     def _info(self, spec: ModelSpec, mesh: Mesh, step: TimeStep | None = None) -> ModelInfo:
         """Return the metadata of a model, or of one of its time steps."""
-        frame, box, traits = step and step.frame, box_vertices(*mesh.bounds), self.stages.traits(spec, step)
+        frame, box, metadata = step and step.frame, box_vertices(*mesh.bounds), self.stages.metadata(spec, step)
         obj, glb = model_files(spec.key, frame)
         return ModelInfo(
             key=spec.key_at(frame),
@@ -164,11 +164,11 @@ class Models:
             warnings=mesh.warnings,
             step=step,
             materials=tuple(material.name for material in mesh.materials),
-            diameter=traits.diameter,
-            symmetries=traits.symmetries,
-            keypoints=traits.keypoints,
+            diameter=metadata.diameter,
+            symmetries=metadata.symmetries,
+            keypoints=metadata.keypoints,
             body_parts=mesh.body_parts,
-            looks=traits.looks() if self._keeps_looks else None,
+            looks=metadata.looks() if self._keeps_looks else None,
             faces=spec.faces,
         )
 
@@ -187,10 +187,10 @@ class Models:
                 "real_size": self.stages.real_size(spec, step),
             }
             if info.diameter is not None:
-                traits = self.stages.traits(spec, step)
-                now |= {"symmetries": traits.symmetries, "keypoints": traits.keypoints}
+                metadata = self.stages.metadata(spec, step)
+                now |= {"symmetries": metadata.symmetries, "keypoints": metadata.keypoints}
                 if info.looks is not None:
-                    now["looks"] = traits.looks()
+                    now["looks"] = metadata.looks()
             for name, value in now.items():
                 if getattr(info, name) != value:
                     raise StoreError(

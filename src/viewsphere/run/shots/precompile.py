@@ -30,13 +30,13 @@ from viewsphere.labels import channels
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.exposure import Exposure, Sweep
 from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.metadata import ModelMetadata
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.model.tracks import Tracks
-from viewsphere.model.traits import Traits
 from viewsphere.planning.engine_digest import engine_digest
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.recipe import Recipe
@@ -271,7 +271,7 @@ def _render(shot: Shot) -> None:
     boxes = [box_vertices(*card.bounds)] * len(shot.objects)
     views = ShotViews(shot, stage.at, lambda thing: card)
     for number in shot.samples:
-        sample = render_sample(views, number, stage, boxes, [None] * len(boxes), [lambda: Traits(1.0)] * len(boxes))
+        sample = render_sample(views, number, stage, boxes, [None] * len(boxes), [lambda: ModelMetadata(1.0)] * len(boxes))
         for name, array in sample.channels.items():
             encode(channels()[name], array, shot.files)
 

@@ -9,23 +9,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewsphere import plugins
-from viewsphere.assets.appearance.looks import looks_of
+from viewsphere.assets.appearance.description import appearance_of
 from viewsphere.assets.appearance.opaque import Stamp
 from viewsphere.assets.appearance.repaint import repaint_stamps
 from viewsphere.assets.cache import frame_of, load, read_ahead
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.metadata.traits import traits_of, with_body_parts
+from viewsphere.assets.metadata.model_metadata import metadata_of, with_body_parts
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.labels import annotated, context_of, labels, observe, sample_values
 from viewsphere.model.channel import PASSES
+from viewsphere.model.metadata import ModelMetadata
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
 from viewsphere.model.sample import Float, Origin, Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
-from viewsphere.model.traits import Traits
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.rendering.ground.material import ground_stamps
 from viewsphere.store import ModelInfo, Store
@@ -76,7 +76,7 @@ class Stages:
     _boxes: dict[str, Float] = field(default_factory=dict[str, Float])
     _sizes: dict[str, Size] = field(default_factory=dict[str, Size])
     _facts: dict[str, FileFacts] = field(default_factory=dict[str, FileFacts])
-    _traits: dict[str, Traits] = field(default_factory=dict[str, Traits])
+    _traits: dict[str, ModelMetadata] = field(default_factory=dict[str, ModelMetadata])
 
     def model(self, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
         """The normalised model at a time step (None: as it rests); raises ModelError if its file cannot be used."""
@@ -108,14 +108,14 @@ class Stages:
             self.model(spec, step)
         return self._boxes[name]
 
-    def traits(self, spec: ModelSpec, step: TimeStep | None = None) -> Traits:
-        """Return the metadata of a model at a time step; raises ModelError as `model` and `traits_of` do."""
+    def metadata(self, spec: ModelSpec, step: TimeStep | None = None) -> ModelMetadata:
+        """Return the metadata of a model at a time step; raises ModelError as `model` and `metadata_of` do."""
         name = _name(spec, step)
         if name not in self._traits:
             mesh = self.model(spec, step)
             facts = self._facts.get(name) or FileFacts(Path(spec.source), "parts", "+z", "-y", 1.0)
-            said = traits_of(spec, mesh, facts, step)
-            looks = cache(lambda: looks_of(self.model(spec, step), said.color, said.material))
+            said = metadata_of(spec, mesh, facts, step)
+            looks = cache(lambda: appearance_of(self.model(spec, step), said.color, said.material))
             self._traits[name] = replace(said, looks=looks)
         return self._traits[name]
 
@@ -151,16 +151,16 @@ class Stages:
         stage = self.stage(shot)
         views = ShotViews(shot, stage.at, lambda thing: self.model(thing.model, thing.step))
         shown: tuple[TimeStep | None, ...] | None = None
-        boxes, sizes, traits = list[Float](), list[Size | None](), list[Callable[[], Traits]]()
+        boxes, sizes, metadata = list[Float](), list[Size | None](), list[Callable[[], ModelMetadata]]()
         for sample in shot.samples:
             steps = tuple(thing.motion.step_at(sample[1]) for thing in shot.objects)
             if steps != shown:
                 both = list(zip(shot.objects, steps, strict=True))
                 boxes = [self.box(thing.model, step) for thing, step in both]
                 sizes = [self.real_size(thing.model, step) for thing, step in both]
-                traits = [partial(self.traits, thing.model, step) for thing, step in both]
+                metadata = [partial(self.metadata, thing.model, step) for thing, step in both]
                 shown = steps
-            yield render_sample(views, sample, stage, boxes, sizes, traits)
+            yield render_sample(views, sample, stage, boxes, sizes, metadata)
 
 
 def _name(spec: ModelSpec, step: TimeStep | None) -> str:
@@ -186,12 +186,12 @@ def render_sample(
     stage: Stage,
     boxes: Sequence[Float],
     sizes: Sequence[Size | None],
-    traits: Sequence[Callable[[], Traits]],
+    metadata: Sequence[Callable[[], ModelMetadata]],
 ) -> Sample:
     """One of the samples of the views' shot: colour from the engine, every label from truth, for which a shadow catcher may not
     be there.
 
-    `boxes`, `sizes` and `traits`: each object's 3D box then in its own axes, its real size if known, and what gives what its
+    `boxes`, `sizes` and `metadata`: each object's 3D box then in its own axes, its real size if known, and what gives what its
     model says of itself.
     """
     shot, (number, instant, sensor) = views.shot, sample
@@ -208,7 +208,7 @@ def render_sample(
         observed |= stage.paint(instant, sensor, painted, passes)
     steps = [thing.motion.step_at(instant) for thing in shot.objects]
     files = [model_files(p.model.key, step and step.frame)[0] for p, step in zip(shot.objects, steps, strict=True)]
-    context = context_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, around, traits)
+    context = context_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, around, metadata)
     objects = annotated(context)
     return Sample(
         index=number,

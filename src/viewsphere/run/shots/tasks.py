@@ -87,7 +87,7 @@ class Worker:
 
     def make_shot(self, row: Row, tell: Callable[[int], None], again: bool = False) -> int:
         """Make the shot of a row and render it into the store; gives the number of its frames, and `tell` so far after each.
-        Errors of one that takes the place of a damaged one (`again`) as for `Store.aside`.
+        Errors of one that takes the place of a damaged one (`again`) as for `Store.scratch_folder`.
         """
         shot = self.composer.shot(row)
         with importing():

@@ -51,7 +51,7 @@ class Place(Protocol):
         """
         ...
 
-    def aside(self) -> AbstractContextManager[Path]:
+    def scratch_folder(self) -> AbstractContextManager[Path]:
         """A folder of this machine for what is not whole yet, as long as the block lasts; StoreError for what the disk refuses
         meanwhile.
         """

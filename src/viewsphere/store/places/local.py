@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
 
-from viewsphere.aside import Aside, aside, left_by_dead, of_this_process, sweep
 from viewsphere.errors import StoreError
+from viewsphere.scratch import ScratchDir, left_by_dead, of_this_process, scratch_folder, sweep
 from viewsphere.store.shots.manifest import MANIFEST
 from viewsphere.store.shots.moving import move, write_through
 
@@ -75,7 +75,7 @@ class Local:
     def occupied(self) -> Generator[Path]:
         """As `Place` says."""
         with disk_errors(self.root):
-            own = Aside.make(self._writing)
+            own = ScratchDir.make(self._writing)
         try:
             yield own.folder
         finally:
@@ -106,11 +106,11 @@ class Local:
             lock.release()
 
     @contextmanager
-    def aside(self) -> Generator[Path]:
+    def scratch_folder(self) -> Generator[Path]:
         """As `Place` says."""
         with disk_errors(self.root):
             self._writing.mkdir(parents=True, exist_ok=True)
-            own = Aside.make(self._writing)
+            own = ScratchDir.make(self._writing)
             try:
                 yield own.folder
             except BaseException:
@@ -134,7 +134,7 @@ class Local:
 
     def replace(self, made: Path, target: Path) -> None:
         """As `Place` says. The old folder goes with what is aside; and so does what other runs put there at this moment. It is
-        never lost: where this ends between the two, `aside` puts it back; where the process dies, the next run.
+        never lost: where this ends between the two, `scratch_folder` puts it back; where the process dies, the next run.
         """
         target.parent.mkdir(parents=True, exist_ok=True)
         old = made.parent / OLD / target.relative_to(self.root)
@@ -166,7 +166,7 @@ class Local:
         for left in left_by_dead(self._writing):
             self._put_back(left)
 
-    def _give_up(self, own: Aside) -> None:
+    def _give_up(self, own: ScratchDir) -> None:
         """Remove what came to nothing; where what it was about to replace cannot be put back now, the next sweep does it."""
         is_back = False
         try:
@@ -205,7 +205,7 @@ class Local:
                     )
                 place.mkdir(parents=True, exist_ok=True)
                 sweep(place, prefix)
-                with aside(place, prefix) as own:
+                with scratch_folder(place, prefix) as own:
                     folder = own / NEW
                     folder.mkdir()
                     yield folder

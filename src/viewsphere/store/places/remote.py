@@ -10,8 +10,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TypeVar, cast
 
-from viewsphere.aside import temporary
 from viewsphere.errors import StoreError
+from viewsphere.scratch import temporary
 from viewsphere.store.places.local import NEW, disk_errors
 from viewsphere.store.shots.checksums import CHECKSUMS
 from viewsphere.store.shots.manifest import MANIFEST
@@ -64,7 +64,7 @@ class Remote:
         return nullcontext()
 
     @contextmanager
-    def aside(self) -> Generator[Path]:
+    def scratch_folder(self) -> Generator[Path]:
         """As `Place` says."""
         with disk_errors(self.root), temporary("aside") as own:
             yield own
@@ -108,7 +108,7 @@ class Remote:
         """As `Place` says."""
         if self.is_foreign():
             raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another, or delete it")
-        with self.aside() as own:
+        with self.scratch_folder() as own:
             folder = own / NEW
             folder.mkdir()
             yield folder

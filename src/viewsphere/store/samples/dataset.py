@@ -19,13 +19,13 @@ from viewsphere.files import read_bytes
 from viewsphere.labels import channels
 from viewsphere.model.classes import SemanticClass
 from viewsphere.model.files import Files
-from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import step_key
 from viewsphere.model.notebook import Shown
 from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Shot
+from viewsphere.model.validation_errors import one_of
 from viewsphere.store.foreign import Loaded
 from viewsphere.store.index import Row
 from viewsphere.store.paths import file_inside, files_inside, names

@@ -39,7 +39,7 @@ class Simulated:
             if not self.writes:
                 return made
             text = json.dumps(made, separators=(",", ":"))
-            with store.aside(folder) as aside:
+            with store.scratch_folder(folder) as aside:
                 (aside / MADE).write_text(text, "utf-8", newline="\n")
         try:
             return json.loads(read_text(folder / MADE, "MAX_RECORD_BYTES"))

@@ -14,15 +14,15 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from viewsphere.aside import lives
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
-from viewsphere.model.mistakes import different, first_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
+from viewsphere.model.validation_errors import different, first_of
+from viewsphere.scratch import lives
 from viewsphere.store.index import Index, Row
 from viewsphere.store.paths import file_inside
 from viewsphere.store.places import place_of
@@ -258,7 +258,7 @@ class Store:
             )
 
     def _write_atomically(self, file: Path, text: str) -> None:
-        with self.place.aside() as own:
+        with self.place.scratch_folder() as own:
             (own / NEW).write_text(text, "utf-8", newline="\n")
             self.place.put(own / NEW, file)
 
@@ -288,14 +288,14 @@ class Store:
         return (self.shot_folder(key) / MANIFEST).is_file()
 
     @contextmanager
-    def aside(self, target: Path, again: bool = False) -> Generator[Path]:
+    def scratch_folder(self, target: Path, again: bool = False) -> Generator[Path]:
         """A folder to write into that becomes `target` when the block ends well, and is removed when it does not. The last file
         in it is the manifest.
 
         If another writer finished the same target first, that one stays: both hold the same bytes. With `again` it takes the
         place of a damaged one; raises StoreError where it is not equal to what that was before, as far as that is known.
         """
-        with self.place.aside() as own:
+        with self.place.scratch_folder() as own:
             folder = own / NEW
             folder.mkdir()
             yield folder
@@ -314,7 +314,7 @@ class Store:
         """
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
-        with self.place.aside() as own:
+        with self.place.scratch_folder() as own:
             folder = own / NEW
             folder.mkdir()
             yield folder
@@ -355,7 +355,7 @@ class Store:
         again: bool = False,
         painter: str = "",
     ) -> int:
-        """Write all frames of a shot, with the channels their samples hold; gives their number. `again` as for `aside`.
+        """Write all frames of a shot, with the channels their samples hold; return their number.
 
         `scenery`, if any, is a text that says what stands there that is no object; `kinds` of files are the default ones.
         What is known of the `shot` besides is kept for those who make its scene anew; `painter` as for `Manifest`.
@@ -365,7 +365,7 @@ class Store:
         records: list[dict[str, Any]] = []
         kinds, table = kinds or Files(), channels()
         own = {} if shot is None else {sensor.name: sensor.kept(shot.channels) for sensor in shot.rig.sensors}
-        with self.aside(target, again) as folder, ShotFiles(folder, kinds, painter) as put:
+        with self.scratch_folder(target, again) as folder, ShotFiles(folder, kinds, painter) as put:
             for sample in samples:
                 files: dict[str, str] = {}
                 for name, array in sample.channels.items():

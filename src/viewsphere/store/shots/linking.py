@@ -32,7 +32,7 @@ def link_model(
     if store.model_info(key) is not None:
         return
     prefix = store.model_folder(key).relative_to(store.root).as_posix()
-    with store.aside(store.model_folder(key)) as folder:
+    with store.scratch_folder(store.model_folder(key)) as folder:
         for file in files:
             if file.name not in {"model.json", MANIFEST}:
                 link_file(file.resolve(), folder / file.name)
@@ -51,7 +51,7 @@ def link_shot(
     target = store.shot_folder(key)
     prefix = target.relative_to(store.root).as_posix()
     records: list[str] = []
-    with store.aside(target) as folder, ShotFiles(folder, kinds or Files()) as put:
+    with store.scratch_folder(target) as folder, ShotFiles(folder, kinds or Files()) as put:
         for frame in frames:
             files: dict[str, str] = {}
             for name, source in frame.files.items():

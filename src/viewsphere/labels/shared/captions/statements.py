@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.appearance.looks import words
+from viewsphere.assets.appearance.description import words
 from viewsphere.geometry.box import Bounds
 from viewsphere.labels.shared.captions.english import noun_of, noun_phrase
 from viewsphere.labels.shared.placement import ModelFacts

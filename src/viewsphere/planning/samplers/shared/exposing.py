@@ -9,8 +9,8 @@ import numpy as np
 from viewsphere.model.exposure import Exposure, Sweep, beyond
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion
-from viewsphere.planning.samplers.shared.course import Course
 from viewsphere.planning.samplers.shared.moving import Moving
+from viewsphere.planning.samplers.shared.sequence_state import SequenceState
 from viewsphere.recipe.sequence import TimeEntry
 
 NODES = 5
@@ -23,17 +23,19 @@ RigAt = Callable[[int], Matrix4]
 """The rig's pose at an instant of a sequence."""
 
 
-def exposures(course: Course, instants: Sequence[int | None], time: TimeEntry, rig_at: RigAt) -> tuple[Exposure | None, ...]:
+def exposures(
+    state: SequenceState, instants: Sequence[int | None], time: TimeEntry, rig_at: RigAt
+) -> tuple[Exposure | None, ...]:
     """Return the movements around each of these instants; empty for a shutter without duration.
     An instant has None where it is not recorded (None), and where nothing moves.
     """
     if not time.shutter:
         return ()
-    return tuple(None if at is None else _exposure(course, at, time, rig_at) for at in instants)
+    return tuple(None if at is None else _exposure(state, at, time, rig_at) for at in instants)
 
 
-def _exposure(course: Course, at: int, time: TimeEntry, rig_at: RigAt) -> Exposure | None:
-    things = tuple(None if moving is None or moving.is_still else _thing(moving, at, time) for moving in course.moving)
+def _exposure(state: SequenceState, at: int, time: TimeEntry, rig_at: RigAt) -> Exposure | None:
+    things = tuple(None if moving is None or moving.is_still else _thing(moving, at, time) for moving in state.moving)
     rig = _rig(at, time.count, rig_at)
     return None if rig is None and not any(things) else Exposure(things=things, rig=rig)
 

@@ -19,12 +19,12 @@ from viewsphere.composing.seeds import generator, share, shares
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.limits import limits
-from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.planning.samplers.shared.stock import Stock
+from viewsphere.model.validation_errors import one_of
+from viewsphere.planning.samplers.shared.sampling_context import SamplingContext
 from viewsphere.planning.splits import drawn_split, shared
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.layout import SurfaceEntry
@@ -57,15 +57,15 @@ def scene_names(recipe: Recipe) -> tuple[str, ...]:
     return tuple(f"scene-{number:06d}" for number in range(count))
 
 
-def scene_cast(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
+def scene_cast(context: SamplingContext, subject: str) -> tuple[ModelSpec, ...]:
     """The models of a scene, of one split where splits are by model."""
-    recipe, entry = stock.recipe, scenes_entry(stock.recipe)
-    models = _models_for(stock, _group(stock, subject))
-    names = (subject, *redraw_names(stock.redraw, SAME_MODELS))
+    recipe, entry = context.recipe, scenes_entry(context.recipe)
+    models = _models_for(context, _group(context, subject))
+    names = (subject, *redraw_names(context.redraw, SAME_MODELS))
     if entry.balance == "models":
-        return mixed(recipe.seed, models, _size(recipe, subject, stock.redraw), names, entry.repeat)
+        return mixed(recipe.seed, models, _size(recipe, subject, context.redraw), names, entry.repeat)
     cast: list[ModelSpec] = []
-    for category, count in _categories(stock.root)[subject]:
+    for category, count in _categories(context.root)[subject]:
         own = tuple(spec for spec in models if spec.category == category)
         cast += mixed(recipe.seed, own, count, names, entry.repeat)
     return tuple(sorted(cast, key=lambda spec: share(recipe.seed, "slot", subject, spec.key)))
@@ -77,58 +77,58 @@ def _size(recipe: Recipe, subject: str, redraw: int = 0) -> int:
     return max(least_objects(recipe, count), count - fewer(recipe, redraw))
 
 
-def _group(stock: Stock, subject: str) -> str:
+def _group(context: SamplingContext, subject: str) -> str:
     """The split that a scene's models are of, where splits are by model; else the empty name of all."""
-    return scene_split(stock, subject) if stock.recipe.splits.by == "model" else ""
+    return scene_split(context, subject) if context.recipe.splits.by == "model" else ""
 
 
-def _models_for(stock: Stock, group: str) -> tuple[ModelSpec, ...]:
+def _models_for(context: SamplingContext, group: str) -> tuple[ModelSpec, ...]:
     """The models that may meet in scenes of a group."""
-    return tuple(spec for spec in stock.model_specs if not group or stock.dealt_splits[spec.key] == group)
+    return tuple(spec for spec in context.model_specs if not group or context.dealt_splits[spec.key] == group)
 
 
 @lru_cache(maxsize=2)
-def _categories(stock: Stock) -> dict[str, tuple[tuple[str, int], ...]]:
+def _categories(context: SamplingContext) -> dict[str, tuple[tuple[str, int], ...]]:
     """Return the number of objects of each category in each scene."""
-    recipe, repeat = stock.recipe, scenes_entry(stock.recipe).repeat
+    recipe, repeat = context.recipe, scenes_entry(context.recipe).repeat
     groups: defaultdict[str, list[str]] = defaultdict(list)
-    for subject in stock.subjects:
-        groups[_group(stock, subject)].append(subject)
+    for subject in context.subjects:
+        groups[_group(context, subject)].append(subject)
     found: dict[str, tuple[tuple[str, int], ...]] = {}
     for group, subjects in groups.items():
-        there = Counter(spec.category for spec in _models_for(stock, group))
+        there = Counter(spec.category for spec in _models_for(context, group))
         found |= balanced(recipe.seed, {name: _size(recipe, name) for name in subjects}, there, repeat)
     return found
 
 
-def scene_split(stock: Stock, subject: str) -> str:
+def scene_split(context: SamplingContext, subject: str) -> str:
     """The split of a scene where splits are by model: it draws its split first, then models of this split; shares follow from
     the numbers of models where some of these are listed.
     """
-    return drawn_split(_shares(stock.root), stock.recipe.lasting_seed, (subject,))
+    return drawn_split(_shares(context.root), context.recipe.lasting_seed, (subject,))
 
 
-def scene_laid(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
-    """The models of a scene as its layout places them; the last ones are kept, whatever the tries of frames."""
-    return _laid(stock.root, stock.redraw, subject, pose, box_of)
+def scene_laid(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
+    """The models of a scene as its layout places them; the last ones are kept, whatever the redraws of frames."""
+    return _laid(context.root, context.redraw, subject, pose, box_of)
 
 
 @lru_cache(maxsize=4)
-def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
-    stock, recipe, entry = root.redrawn(redraw), root.recipe, scenes_entry(root.recipe)
-    models = (*scene_cast(stock, subject), *_distractors(stock, subject))
-    stand = surface(stock, subject, pose)
+def _laid(root: SamplingContext, redraw: int, subject: str, pose: str | None, box_of: BoxOf) -> Laid:
+    context, recipe, entry = root.redrawn(redraw), root.recipe, scenes_entry(root.recipe)
+    models = (*scene_cast(context, subject), *_distractors(context, subject))
+    stand = surface(context, subject, pose)
     if stand is None:
-        free = None if stock.composition is None else stock.composition.free_floor(subject, pose, redraw)
+        free = None if context.composition is None else context.composition.free_floor(subject, pose, redraw)
     else:
         free = footprint(
             box_vertices((-stand.size[0] / 2, -stand.size[1] / 2, 0), (stand.size[0] / 2, stand.size[1] / 2, 0)), IDENTITY
         )
     world_from_room = IDENTITY if stand is None else stand.world_from_surface
-    built = None if stock.composition is None else stock.composition.built(subject, pose, redraw, world_from_room)
+    built = None if context.composition is None else context.composition.built(subject, pose, redraw, world_from_room)
     again = redraw_names(redraw)
     names = ("scene", subject, *again) if pose is None else ("scene", subject, pose, *again)
-    roads = None if stand is not None else stock.composition
+    roads = None if stand is not None else context.composition
     room = Room(
         free,
         entry.gap,
@@ -136,7 +136,7 @@ def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxO
         field="scenes",
         below=0.0 if stand is None else stand.world_from_surface[2][3],
         clearance=None if stand is None else stand.clearance,
-        memory=partial(stock.memory, remembered_as(entry, models, names)),
+        memory=partial(context.memory, remembered_as(entry, models, names)),
         moves=recipe.time is not None,
         built=built,
         lanes=roads.lanes(subject, pose, redraw) if roads else (),
@@ -148,32 +148,32 @@ def _laid(root: Stock, redraw: int, subject: str, pose: str | None, box_of: BoxO
     return laid(entry.layout, entry.orientation, models, room, box_of, rng, world_from_room)
 
 
-def scene_things(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+def scene_things(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """The models of a scene where they stand; raises RecipeError where there is no room."""
-    made, cast = scene_laid(stock, subject, pose, box_of), scene_cast(stock, subject)
+    made, cast = scene_laid(context, subject, pose, box_of), scene_cast(context, subject)
     return still(cast, made.poses[: len(cast)])
 
 
-def scene_distractors(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+def scene_distractors(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """The models of a scene that are not labelled, where they stand."""
-    made, count = scene_laid(stock, subject, pose, box_of), len(scene_cast(stock, subject))
+    made, count = scene_laid(context, subject, pose, box_of), len(scene_cast(context, subject))
     placed = zip(made.members[count:], made.poses[count:], strict=True)
     return tuple(Thing(id=0, model=spec, motion=Motion.still(at), scenery=True) for spec, at in placed)
 
 
-def _distractors(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
-    entry, models = scenes_entry(stock.recipe), [spec for spec, _ in stock.distractors]
+def _distractors(context: SamplingContext, subject: str) -> tuple[ModelSpec, ...]:
+    entry, models = scenes_entry(context.recipe), [spec for spec, _ in context.distractors]
     if not models:
         return ()
-    count = drawn(entry.distractors, lambda path: generator(stock.recipe.seed, *path, subject), ("scenes", "distractors"))
-    names = (subject, "distractors", *redraw_names(stock.redraw, SAME_MODELS))
-    return mixed(stock.recipe.seed, models, count, names, repeat=True)
+    count = drawn(entry.distractors, lambda path: generator(context.recipe.seed, *path, subject), ("scenes", "distractors"))
+    names = (subject, "distractors", *redraw_names(context.redraw, SAME_MODELS))
+    return mixed(context.recipe.seed, models, count, names, repeat=True)
 
 
-def scene_around(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+def scene_around(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """Return the background pieces that a scene's layout adds, such as the table or box for its models."""
-    pieces = list(scene_laid(stock, subject, pose, box_of).around)
-    on, seed = scenes_entry(stock.recipe).surface, stock.recipe.seed
+    pieces = list(scene_laid(context, subject, pose, box_of).around)
+    on, seed = scenes_entry(context.recipe).surface, context.recipe.seed
     if isinstance(on, SurfaceEntry):
         pieces.append(Piece("plain_table", (on.size[0], on.height, on.size[1]), IDENTITY))
     return tuple(
@@ -209,14 +209,14 @@ def check_surface(recipe: Recipe) -> None:
         _named(on, tuple(surfaces.values()))
 
 
-def surface(stock: Stock, subject: str, pose: str | None) -> Surface | None:
+def surface(context: SamplingContext, subject: str, pose: str | None) -> Surface | None:
     """Return the surface under a scene's models, world axes; None for the floor. Raises RecipeError for an absent surface."""
-    on = scenes_entry(stock.recipe).surface
+    on = scenes_entry(context.recipe).surface
     if on is None:
         return None
     if isinstance(on, SurfaceEntry):
         return Surface("on", ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, on.height), (0, 0, 0, 1)), on.size)
-    return _named(on, () if stock.composition is None else stock.composition.surfaces(subject, pose, stock.redraw))
+    return _named(on, () if context.composition is None else context.composition.surfaces(subject, pose, context.redraw))
 
 
 def _named(name: str, found: Sequence[Surface]) -> Surface:
@@ -230,29 +230,29 @@ def _named(name: str, found: Sequence[Surface]) -> Surface:
     return names[name]
 
 
-def scene_views(stock: Stock, subject: str) -> Sequence[int]:
+def scene_views(context: SamplingContext, subject: str) -> Sequence[int]:
     """Numbers of the viewpoints that a scene is taken from, ascending: where they are drawn, those of the lowest hashes."""
-    if not are_views_drawn(stock):
-        return range(len(stock.views))
-    hashed = shares(stock.recipe.seed, "scene's views", subject, each=stock.view_names)
-    return sorted(sorted(range(len(hashed)), key=hashed.__getitem__)[: scenes_entry(stock.recipe).views])
+    if not are_views_drawn(context):
+        return range(len(context.views))
+    hashed = shares(context.recipe.seed, "scene's views", subject, each=context.view_names)
+    return sorted(sorted(range(len(hashed)), key=hashed.__getitem__)[: scenes_entry(context.recipe).views])
 
 
-def are_views_drawn(stock: Stock) -> bool:
+def are_views_drawn(context: SamplingContext) -> bool:
     """Return whether scenes are taken from some of the viewpoints each, rather than from all."""
-    count = scenes_entry(stock.recipe).views
-    return count is not None and count < len(stock.views)
+    count = scenes_entry(context.recipe).views
+    return count is not None and count < len(context.views)
 
 
-def check_scene_models(stock: Stock) -> None:
+def check_scene_models(context: SamplingContext) -> None:
     """Raise RecipeError where a scene may ask for more models than there are, of one split where splits are by model."""
-    entry = scenes_entry(stock.recipe)
-    groups, names = {"": stock.models}, [""]
-    if stock.recipe.splits.by == "model":
-        groups, names = Counter(stock.dealt_splits.values()), list(_shares(stock))
+    entry = scenes_entry(context.recipe)
+    groups, names = {"": context.models}, [""]
+    if context.recipe.splits.by == "model":
+        groups, names = Counter(context.dealt_splits.values()), list(_shares(context))
     for name in names:
         if groups[name] < (1 if entry.repeat else entry.most_objects):
-            raise RecipeError(f"scenes.objects: {_too_few(entry, groups[name], stock.models, name)}")
+            raise RecipeError(f"scenes.objects: {_too_few(entry, groups[name], context.models, name)}")
 
 
 def _too_few(entry: ScenesEntry, there: int, models: int, split: str) -> str:
@@ -272,9 +272,9 @@ def _too_few(entry: ScenesEntry, there: int, models: int, split: str) -> str:
 
 
 @lru_cache(maxsize=2)
-def _shares(stock: Stock) -> dict[str, float]:
+def _shares(context: SamplingContext) -> dict[str, float]:
     """The share of the scenes that each split has, where splits are by model."""
-    splits = stock.recipe.splits
+    splits = context.recipe.splits
     if not any(isinstance(part, tuple) for part in splits.shares.values()):
         return shared(splits)
-    return {name: count / stock.models for name, count in sorted(Counter(stock.dealt_splits.values()).items())}
+    return {name: count / context.models for name, count in sorted(Counter(context.dealt_splits.values()).items())}

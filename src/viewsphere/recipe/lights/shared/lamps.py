@@ -9,10 +9,10 @@ from pydantic import Field, model_validator
 
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at as standing_at
-from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Length, Natural
 from viewsphere.model.scene import AimedLight, Light, PlacedLight, Vector
+from viewsphere.model.validation_errors import at as standing_at
+from viewsphere.model.validation_errors import shown
 from viewsphere.recipe.draws import Coordinate, Drawn, alternatives, is_random
 from viewsphere.recipe.entries import concrete, entry_of
 

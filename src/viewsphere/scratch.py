@@ -43,19 +43,19 @@ STALE_S = 86_400.0
 
 
 @dataclass(frozen=True)
-class Aside:
+class ScratchDir:
     """A folder of this process, which other users cannot read, and its open lock."""
 
     folder: Path
     lock: int
 
     @staticmethod
-    def make(place: Path, prefix: str = "") -> Aside:
+    def make(place: Path, prefix: str = "") -> ScratchDir:
         """A folder in this place, which exists; raises OSError where that is not possible."""
         for left in reversed(range(TRIES)):
             folder = Path(tempfile.mkdtemp(prefix=prefix + of_this_process(), dir=place))
             try:
-                made = Aside(folder, _lock_of(folder, is_sure=left > 0))
+                made = ScratchDir(folder, _lock_of(folder, is_sure=left > 0))
             except (FileNotFoundError, BlockingIOError):  # somebody sweeps, and takes it for a dead process's
                 with suppress(OSError):
                     (folder / LOCK).unlink(missing_ok=True)
@@ -79,7 +79,7 @@ class Aside:
             os.close(self.lock)
 
 
-_held: set[Aside] = set()
+_held: set[ScratchDir] = set()
 """Scratch folders of this process."""
 
 
@@ -89,9 +89,9 @@ def of_this_process() -> str:
 
 
 @contextmanager
-def aside(place: Path, prefix: str = "") -> Generator[Path]:
+def scratch_folder(place: Path, prefix: str = "") -> Generator[Path]:
     """A folder of this process in a place that exists, for as long as the block lasts; raises OSError if none can be made."""
-    made = Aside.make(place, prefix)
+    made = ScratchDir.make(place, prefix)
     try:
         yield made.folder
     finally:
@@ -105,7 +105,7 @@ def temporary(what: str) -> Generator[Path]:
     """
     place, prefix = Path(tempfile.gettempdir()), f"viewsphere-{what}-"
     sweep(place, prefix)
-    with aside(place, prefix) as own:
+    with scratch_folder(place, prefix) as own:
         folder = own / "new"
         folder.mkdir()
         yield folder

@@ -42,7 +42,7 @@ from viewsphere.recipe.recipe import Recipe
 
 
 @dataclass(frozen=True, eq=False)
-class Stock(Sendable):
+class SamplingContext(Sendable):
     """The material from which a sampler makes shots; its memory does not grow with the number of frames.
 
     `subjects`: the subjects of the frames, as the sampler defines them: models' keys, or scenes' names.
@@ -60,32 +60,32 @@ class Stock(Sendable):
     entries: tuple[int, ...] = ()  # of each model, the number of its entry in the recipe
     tracks: Tracks | None = None  # what every sequence's sensors follow
     timelines: tuple[Timeline | None, ...] = ()  # of each model, the animation of its file that it plays in sequences
-    tries: Mapping[int, int] = field(default_factory=dict[int, int])  # poses of which something is drawn again: the how manieth
-    untried: Stock | None = None  # the same without these tries
+    redraws: Mapping[int, int] = field(default_factory=dict[int, int])  # of poses, how often each is redrawn
+    original: SamplingContext | None = None  # the same without these redraws
     redraw: int = 0  # how often what its scenes leave to chance is drawn again
     distractors: tuple[tuple[ModelSpec, int], ...] = ()  # models that are not labelled, and the numbers of their entries
     memory: Remembering = unremembered  # of what is simulated
     variation: str = ""  # of the recipe's, that this is the light and the finish of
     sequence_numbers: tuple[int, ...] = ()  # of each viewpoint of sequences, a data set's number; none where it has the same
 
-    def trying(self, tries: Mapping[int, int]) -> Self:
-        """The same stock with poses at these tries; it shares what was computed, none of which follows from tries."""
-        return self._sharing(tries=tries)
+    def with_redraws(self, redraws: Mapping[int, int]) -> Self:
+        """The same context with poses redrawn this often; the two share computed values, none of which depends on redraws."""
+        return self._sharing(redraws=redraws)
 
     def redrawn(self, number: int) -> Self:
-        """The same stock with this redraw of its scenes; it shares what was computed, none of which follows from redraws."""
+        """The same context with this redraw of its scenes; it shares what was computed, none of which depends on redraws."""
         return self if number == self.redraw else self._sharing(redraw=number)
 
     def _sharing(self, **changes: Any) -> Self:
-        made = replace(self, **changes, untried=self.untried or self)
+        made = replace(self, **changes, original=self.original or self)
         known = {field.name for field in fields(self)}
         vars(made).update({name: value for name, value in vars(self).items() if name not in known})
         return made
 
     @property
-    def root(self) -> Stock:
-        """The same without tries and redraws."""
-        return self.untried or self
+    def root(self) -> SamplingContext:
+        """The same without any redraw."""
+        return self.original or self
 
     @property
     def views(self) -> Poses:
@@ -110,7 +110,7 @@ class Stock(Sendable):
     @cached_property
     def scenes(self) -> Scenes:
         """The draws of light, ground, materials, finishes and jitter."""
-        variations = (self.untried or self).recipe.variations
+        variations = (self.original or self).recipe.variations
         alone = variations.drawn_alone(self.variation) if self.variation and variations else frozenset[str]()
         return Scenes(self.recipe, self.pictures, self.variation, alone)
 
@@ -229,13 +229,13 @@ class Stock(Sendable):
         return thing.model_copy(update={"repaints": repaints}) if repaints else thing
 
     def view(self, views: Poses, pose: int) -> Viewpoint:
-        """The viewpoint of a pose, random ones as drawn at its try."""
-        again = self.tries.get(pose)
+        """The viewpoint of a pose, random ones as drawn at its redraw."""
+        again = self.redraws.get(pose)
         return (views.drawn_for(f"try {again}") if again else views)[pose]
 
     def layout_names(self, pose: int) -> Names:
-        """Further names that the placing of company is drawn by: a pose's try, and a redraw."""
-        again = self.tries.get(pose)
+        """Further names that the placing of company is drawn by: the redraws of a pose and of its scene."""
+        again = self.redraws.get(pose)
         is_redrawn = again and self.recipe.scene.company is not None and self.recipe.scene.company.draw == "per_frame"
         return ((f"try {again}",) if is_redrawn else ()) + redraw_names(self.redraw)
 
@@ -251,7 +251,7 @@ class Stock(Sendable):
         """Return the name for the draw of a pose's jitter; for jitter of each frame: the frame's name, and its redraw."""
         is_per_frame = self.recipe.scene.jitter.draw == "per_frame"
         name = self.pose_list.name if self.recipe.time is not None and is_per_frame else self.pose_list.place
-        again = self.tries.get(pose) if is_per_frame else None
+        again = self.redraws.get(pose) if is_per_frame else None
         return f"{name(pose)} try {again}" if again else name(pose)
 
     def instant(self, subject: str, view: Viewpoint, target: Vector | None, focus: Vector, split: str, number: int) -> Instant:

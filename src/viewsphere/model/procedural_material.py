@@ -8,7 +8,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Natural
 
 
-class Substance(Frozen):
+class ProceduralMaterial(Frozen):
     """One piece of a material of `viewsphere.materials`: its name, what colours, sizes and grain are drawn from, and the
     texels of its pictures a side.
     """

@@ -18,13 +18,13 @@ from viewsphere.composing.trajectories import RigPose, World, shaken
 from viewsphere.composing.trajectories import standing as steady
 from viewsphere.composing.viewpoints.sequence_poses import TrajectoryPoses
 from viewsphere.errors import RecipeError
-from viewsphere.model.mistakes import nearest
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.model.validation_errors import nearest
 from viewsphere.planning.samplers.shared.moving import Moving
 from viewsphere.planning.samplers.shared.random import scene_around, scene_distractors, scene_laid, scene_things
-from viewsphere.planning.samplers.shared.stock import Stock
+from viewsphere.planning.samplers.shared.sampling_context import SamplingContext
 from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.sequence import TimeEntry
 
@@ -33,7 +33,7 @@ Way = Callable[[float], Matrix4]
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class SequenceState:
     """One sequence: its things as they are placed, and what moves each, None where it stands still; what cameras look at that
     have no target of their own; and where the rig is at all instants, None where it stands still at its viewpoint.
     """
@@ -63,65 +63,67 @@ def _at(thing: Thing, moving: Moving | None, instant: int) -> Thing:
     return _with(thing, moving and moving.at(instant))
 
 
-def time_of(stock: Stock) -> TimeEntry:
+def time_of(context: SamplingContext) -> TimeEntry:
     """The recipe's time."""
-    assert stock.recipe.time is not None
-    return stock.recipe.time
+    assert context.recipe.time is not None
+    return context.recipe.time
 
 
 @lru_cache(maxsize=2)
-def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
+def sequence_state(context: SamplingContext, subject: str, start: int, box_of: BoxOf) -> SequenceState:
     """The sequence of a subject whose first pose has this number. The last ones are kept: shots of one follow one another.
 
     Raises RecipeError where there is no room, and for what cannot move as it should.
     """
-    around = stock.scene_pose(start)
-    targets = placed_targets(stock, subject, around, box_of)
+    around = context.scene_pose(start)
+    targets = placed_targets(context, subject, around, box_of)
     focus = middle(targets, box_of)
-    names = (subject, stock.pose_list.place(start), *redraw_names(stock.redraw))
-    lanes = () if stock.composition is None else stock.composition.lanes(subject, around, stock.redraw)
+    names = (subject, context.pose_list.place(start), *redraw_names(context.redraw))
+    lanes = () if context.composition is None else context.composition.lanes(subject, around, context.redraw)
 
     pieces: list[Moving | None] = []
 
     def piece_moved(thing: Thing, piece: SceneryPiece) -> Thing:
-        pieces.append(piece_moving(stock, thing, piece, names, lanes))
+        pieces.append(piece_moving(context, thing, piece, names, lanes))
         return thing
 
     things = targets
-    if stock.composition is not None:
-        things = stock.composition.things(subject, targets, around, box_of, piece_moved, stock.redraw)
-    ways = target_ways(stock, subject, around, box_of)
-    if stock.recipe.scenes is not None:
-        among, beneath = scene_distractors(stock, subject, around, box_of), scene_around(stock, subject, around, box_of)
+    if context.composition is not None:
+        things = context.composition.things(subject, targets, around, box_of, piece_moved, context.redraw)
+    ways = target_ways(context, subject, around, box_of)
+    if context.recipe.scenes is not None:
+        among, beneath = scene_distractors(context, subject, around, box_of), scene_around(context, subject, around, box_of)
         own_ways = zip(among, ways[len(targets) :], strict=True)
-        moving = [_distractor_moving(stock, thing, way, (*names, str(i)), lanes) for i, (thing, way) in enumerate(own_ways)]
+        moving = [_distractor_moving(context, thing, way, (*names, str(i)), lanes) for i, (thing, way) in enumerate(own_ways)]
         things, pieces = (*things, *among, *beneath), [*pieces, *moving, *[None] * len(beneath)]
-    own = [target_moving(stock, thing, i, names, lanes, way) for (i, thing), way in zip(enumerate(targets), ways, strict=False)]
-    made = Course(stock.repainted(things, subject, start), (*own, *pieces), focus, None)
-    return replace(made, rig=_rig(stock, made, subject, start, lanes, box_of))
+    own = [
+        target_moving(context, thing, i, names, lanes, way) for (i, thing), way in zip(enumerate(targets), ways, strict=False)
+    ]
+    made = SequenceState(context.repainted(things, subject, start), (*own, *pieces), focus, None)
+    return replace(made, rig=_rig(context, made, subject, start, lanes, box_of))
 
 
-def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+def placed_targets(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """The targets of a sequence where they are placed, on the floor; `pose` names what is drawn for each sequence."""
-    if stock.recipe.scenes is not None:
-        return scene_things(stock, subject, pose, box_of)
-    spec = stock.spec(subject)
-    if stock.composition is not None:
-        again = redraw_names(stock.redraw)
-        return stock.composition.targets(spec, pose, box_of, again, stock.memory, redraw=stock.redraw)
+    if context.recipe.scenes is not None:
+        return scene_things(context, subject, pose, box_of)
+    spec = context.spec(subject)
+    if context.composition is not None:
+        again = redraw_names(context.redraw)
+        return context.composition.targets(spec, pose, box_of, again, context.memory, redraw=context.redraw)
     return still((spec,), (standing(box_of(spec)),))
 
 
-def target_ways(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Way | None, ...]:
+def target_ways(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Way | None, ...]:
     """Return the path to its place of each target of a sequence, then of each distractor; None for a thing without a path."""
-    if stock.recipe.scenes is not None:
-        made = scene_laid(stock, subject, pose, box_of)
+    if context.recipe.scenes is not None:
+        made = scene_laid(context, subject, pose, box_of)
         return tuple(way.at for way in made.ways) or (None,) * len(made.members)
-    spec = stock.spec(subject)
+    spec = context.spec(subject)
     company = None
-    if stock.composition is not None:
-        company = stock.composition.company(
-            spec, pose, box_of, standing(box_of(spec)), redraw_names(stock.redraw), stock.memory, redraw=stock.redraw
+    if context.composition is not None:
+        company = context.composition.company(
+            spec, pose, box_of, standing(box_of(spec)), redraw_names(context.redraw), context.memory, redraw=context.redraw
         )
     if company is None:
         return (None,)
@@ -134,26 +136,30 @@ def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
 
 
 def target_moving(
-    stock: Stock, thing: Thing, slot: int, names: Names, lanes: tuple[Lane, ...], way: Way | None = None
+    context: SamplingContext, thing: Thing, slot: int, names: Names, lanes: tuple[Lane, ...], way: Way | None = None
 ) -> Moving | None:
     """Return the movement of the target with this number in the sequence of these names; None where it stands still."""
-    return _moving(stock, thing, *_motions(stock, thing.model, slot), (*names, str(slot), thing.model.key), lanes, way)
+    return _moving(context, thing, *_motions(context, thing.model, slot), (*names, str(slot), thing.model.key), lanes, way)
 
 
-def piece_moving(stock: Stock, thing: Thing, piece: SceneryPiece, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
+def piece_moving(
+    context: SamplingContext, thing: Thing, piece: SceneryPiece, names: Names, lanes: tuple[Lane, ...]
+) -> Moving | None:
     """Return the movement of a piece of scenery in the sequence of these names; None where it stands still."""
-    return _moving(stock, thing, piece.motion, piece.field, (*names, piece.name), lanes)
+    return _moving(context, thing, piece.motion, piece.field, (*names, piece.name), lanes)
 
 
-def _distractor_moving(stock: Stock, thing: Thing, way: Way | None, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
+def _distractor_moving(
+    context: SamplingContext, thing: Thing, way: Way | None, names: Names, lanes: tuple[Lane, ...]
+) -> Moving | None:
     """Return the movement of a model that is not labelled; None where it stands still."""
-    number = {spec.key: number for spec, number in stock.distractors}[thing.model.key]
-    motions, field = stock.recipe.models[number].motion, f"models[{number}].motion"
-    return _moving(stock, thing, motions, field, (*names, "distractor", thing.model.key), lanes, way)
+    number = {spec.key: number for spec, number in context.distractors}[thing.model.key]
+    motions, field = context.recipe.models[number].motion, f"models[{number}].motion"
+    return _moving(context, thing, motions, field, (*names, "distractor", thing.model.key), lanes, way)
 
 
 def _moving(
-    stock: Stock,
+    context: SamplingContext,
     thing: Thing,
     motions: Motions | None,
     field: str,
@@ -164,57 +170,57 @@ def _moving(
     """Return the movement of a thing, drawn for these names; None where it stands still."""
     if motions is None:
         return None
-    time, rng = time_of(stock), partial(generator, stock.recipe.seed, "motion", *names)
-    place = stock.position.get(thing.model.key)
-    line = None if place is None else stock.timelines[place]
+    time, rng = time_of(context), partial(generator, context.recipe.seed, "motion", *names)
+    place = context.position.get(thing.model.key)
+    line = None if place is None else context.timelines[place]
     start = Start(thing.world_from_object, thing.model, time.at(time.count - 1), rng, lanes, way=way)
     return Moving(mover(motions, start.playing(line, field)), time)
 
 
-def _motions(stock: Stock, spec: ModelSpec, slot: int) -> tuple[Motions | None, str]:
+def _motions(context: SamplingContext, spec: ModelSpec, slot: int) -> tuple[Motions | None, str]:
     """Return the motions of a target, and the recipe's field for them.
     The motions are those of its model, or for a target in company those of the company entry.
     """
-    company = stock.recipe.scene.company
+    company = context.recipe.scene.company
     if slot and company is not None:
         return company.motion, "scene.company.motion"
-    number = stock.entries[stock.position[spec.key]]
-    return stock.recipe.models[number].motion, f"models[{number}].motion"
+    number = context.entries[context.position[spec.key]]
+    return context.recipe.models[number].motion, f"models[{number}].motion"
 
 
 def _rig(
-    stock: Stock, course: Course, subject: str, start: int, lanes: tuple[Lane, ...], box_of: BoxOf
+    context: SamplingContext, state: SequenceState, subject: str, start: int, lanes: tuple[Lane, ...], box_of: BoxOf
 ) -> tuple[RigPose, ...] | None:
     """Return the rig's poses at all instants, None where it stands still."""
-    time, views = time_of(stock), stock.sequences_of(subject)
+    time, views = time_of(context), context.sequences_of(subject)
     times = np.array([time.at(i) for i in range(time.count)])
-    names = (subject, stock.pose_list.place(start), *redraw_names(stock.redraw))
+    names = (subject, context.pose_list.place(start), *redraw_names(context.redraw))
     world = World(
         time.fps,
-        course.focus,
-        lambda thing, instant: np.array(_center(course, thing, instant, box_of)),
-        partial(generator, stock.recipe.seed, "rig", *names),
+        state.focus,
+        lambda thing, instant: np.array(_center(state, thing, instant, box_of)),
+        partial(generator, context.recipe.seed, "rig", *names),
         lanes,
     )
     if isinstance(views.base, TrajectoryPoses):
         return views.base.trajectory.poses(times, world)
-    shake = stock.recipe.viewpoints.shake
+    shake = context.recipe.viewpoints.shake
     if shake is None:
         return None
-    follows = stock.recipe.viewpoints.target == "follow"
+    follows = context.recipe.viewpoints.target == "follow"
     held = []
     for i in range(time.count):
-        at = course.focus_at(i, follows, box_of)
-        held.append(steady(stock.viewpoint(subject, views[start + i], at), at))
+        at = state.focus_at(i, follows, box_of)
+        held.append(steady(context.viewpoint(subject, views[start + i], at), at))
     return shaken(held, shake, times, world)
 
 
-def _center(course: Course, wanted: int | str, instant: int, box_of: BoxOf) -> Vector:
+def _center(state: SequenceState, wanted: int | str, instant: int, box_of: BoxOf) -> Vector:
     """The middle of a thing, by its id or its model's key, at an instant."""
-    pairs = zip(course.things, course.moving, strict=True)
+    pairs = zip(state.things, state.moving, strict=True)
     thing, moving = next((pair for pair in pairs if wanted in (pair[0].id, pair[0].model.key)), (None, None))
     if thing is None:
-        raise no_such_thing(wanted, {thing.id: thing.model.key for thing in course.things if thing.id})
+        raise no_such_thing(wanted, {thing.id: thing.model.key for thing in state.things if thing.id})
     now = _at(thing, moving, instant)
     if not now.is_there:
         raise RecipeError(

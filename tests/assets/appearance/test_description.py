@@ -7,7 +7,7 @@ import pytest
 
 from truth_scenes import cube
 from viewsphere.assets.appearance.color_names import NAMES, nearest_names, oklab
-from viewsphere.assets.appearance.looks import is_alike, looks_of, words
+from viewsphere.assets.appearance.description import appearance_of, is_alike, words
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.srgb import linear
 from viewsphere.model.thing import Repaint
@@ -75,25 +75,25 @@ def test_oklab_has_the_values_of_its_author():
     ],
 )
 def test_materials_have_their_words(material, expected):
-    assert words(looks_of(painted(material))) == expected
+    assert words(appearance_of(painted(material))) == expected
 
 
 def test_most_of_a_surface_has_to_have_the_colour():
     two = painted(Material("a", RED), Material("b", BLACK))
-    assert words(looks_of(two)) == (None, "matte")
+    assert words(appearance_of(two)) == (None, "matte")
     three = painted(Material("a", RED), Material("b", RED), Material("c", BLACK))
-    assert words(looks_of(three))[0] == "red"
+    assert words(appearance_of(three))[0] == "red"
 
 
 def test_what_is_inside_or_below_does_not_count():
     inner = replace(cube(0.8), materials=(Material("inner", BLACK),))
     outer = replace(cube(1.0), materials=(Material("outer", RED),))
-    looks = looks_of(together(outer, inner))
+    looks = appearance_of(together(outer, inner))
     assert words(looks)[0] == "red"
     assert sum(patch.share for patch in looks.patches if patch.material == "outer") > 0.97
     below = replace(cube(1.0), materials=(Material("below", BLACK),))
     below = replace(below, vertices=below.vertices * np.float32([1, 1, 0.01]) - np.float32([0, 0, 1.1]))
-    assert words(looks_of(together(outer, below)))[0] == "red"
+    assert words(appearance_of(together(outer, below)))[0] == "red"
 
 
 def chequered(one, other, size=8):
@@ -111,9 +111,9 @@ def chequered(one, other, size=8):
 
 
 def test_a_texture_s_colours_are_told_apart():
-    looks = looks_of(chequered((200, 20, 20, 255), (20, 20, 20, 255)))
+    looks = appearance_of(chequered((200, 20, 20, 255), (20, 20, 20, 255)))
     assert len(looks.patches) == 2 and words(looks)[0] is None
-    assert looks_of(chequered((200, 20, 20, 255), (140, 20, 20, 255))).patches[0].share == 1
+    assert appearance_of(chequered((200, 20, 20, 255), (140, 20, 20, 255))).patches[0].share == 1
     reds = [patch for patch in looks.patches if patch.color[0] > 0.3]
     np.testing.assert_allclose(reds[0].color, linear(np.array([200, 20, 20]) / 255), atol=1e-4)
 
@@ -121,17 +121,17 @@ def test_a_texture_s_colours_are_told_apart():
 def test_vertex_colours_count():
     mesh = painted(Material("m"))
     colors = np.tile(np.float32(GREEN), (len(mesh.vertices), 1))
-    assert words(looks_of(replace(mesh, colors=colors)))[0] == "green"
+    assert words(appearance_of(replace(mesh, colors=colors)))[0] == "green"
 
 
 def test_clear_texels_of_cut_outs_are_no_surface():
     mesh = chequered((200, 20, 20, 255), (20, 20, 20, 0))
     cut = replace(mesh, materials=(replace(mesh.materials[0], alpha_mode="MASK"),))
-    assert words(looks_of(cut))[0] == "red"
+    assert words(appearance_of(cut))[0] == "red"
 
 
 def test_paint_changes_words():
-    looks = looks_of(painted(Material("paint", (0.9, 0.9, 0.9, 1.0)), Material("paint2", (0.9, 0.9, 0.9, 1.0))))
+    looks = appearance_of(painted(Material("paint", (0.9, 0.9, 0.9, 1.0)), Material("paint2", (0.9, 0.9, 0.9, 1.0))))
     assert words(looks) == ("white", "matte")
     assert words(looks, [Repaint(material="paint*", tint=(0.7, 0.02, 0.02))])[0] == "red"
     assert words(looks, [Repaint(material="paint", tint=(0.7, 0.02, 0.02))])[0] is None
@@ -144,13 +144,15 @@ def test_paint_changes_words():
 
 
 def test_rounding_is_no_difference_but_another_share_is():
-    looks = looks_of(painted(Material("a", RED), Material("b", BLACK)))
+    looks = appearance_of(painted(Material("a", RED), Material("b", BLACK)))
     one, other = looks.patches
     near = looks.model_copy(update={"patches": (one.model_copy(update={"share": one.share + 1e-4}), other)})
     far = looks.model_copy(update={"patches": (one.model_copy(update={"share": one.share + 1e-3}), other)})
-    assert is_alike(looks, near) and not is_alike(looks, far) and not is_alike(looks, looks_of(painted(Material("a", RED))))
+    assert (
+        is_alike(looks, near) and not is_alike(looks, far) and not is_alike(looks, appearance_of(painted(Material("a", RED))))
+    )
 
 
 def test_a_model_without_surface_looks_like_nothing():
-    looks = looks_of(cube(1.0).emptied(), color="red")
+    looks = appearance_of(cube(1.0).emptied(), color="red")
     assert looks.patches == () and words(looks) == ("red", None)

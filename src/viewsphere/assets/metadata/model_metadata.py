@@ -21,18 +21,18 @@ from viewsphere.caches.entries import kept
 from viewsphere.errors import ModelError
 from viewsphere.geometry.diameter import diameter
 from viewsphere.model.keypoints import Keypoints, Place
-from viewsphere.model.mistakes import nearest, shown
+from viewsphere.model.metadata import ModelMetadata
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
-from viewsphere.model.traits import Traits
+from viewsphere.model.validation_errors import nearest, shown
 from viewsphere.recipe.sidecar import Sidecar
 
 BEYOND = 0.1
 """Share of its diameter by which a point that a model names may lie outside of its box."""
 
 
-def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | None = None) -> Traits:
+def metadata_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | None = None) -> ModelMetadata:
     """Return the metadata of a normalised model at a time step (None: at rest); `facts` are its file's facts.
 
     Raises ModelError, which names the sidecar and the field, for a sidecar that cannot be read. The same holds for a symmetry
@@ -43,9 +43,9 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
     said = _in_object_axes(sidecar, facts)
     color, material = spec.color or said.color, spec.material or said.material
     if spec.parts is not None:
-        return Traits(across, color=color, material=material)
+        return ModelMetadata(across, color=color, material=material)
     if step is not None and step.frame != frame_of(spec, None):
-        return Traits(across, keypoints=_own(mesh, across, facts), color=color, material=material)
+        return ModelMetadata(across, keypoints=_own(mesh, across, facts), color=color, material=material)
     if said.symmetries is not None and (problem := next(lacking(Surface.of(mesh), said.symmetries), None)):
         raise ModelError(f"{path}: {problem}")
     if said.keypoints is not None and (problem := next(far_points(mesh, across, said.keypoints), None)):
@@ -53,7 +53,7 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
     symmetries = said.symmetries
     if symmetries is None and spec.symmetries == "found":
         symmetries = found_symmetries(mesh)
-    return Traits(
+    return ModelMetadata(
         across, symmetries, said.keypoints or _own(mesh, across, facts) or _spread(spec, mesh), color=color, material=material
     )
 

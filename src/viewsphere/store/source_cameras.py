@@ -22,7 +22,7 @@ class Drafted:
 
 
 @dataclass(frozen=True)
-class AgainModel:
+class SourceModel:
     """A model of the data set, whose axes and origin are those of its file, of which `unit` metres are one unit.
 
     `name` begins its key; `symmetries` are in the file's axes and unit.
@@ -37,7 +37,7 @@ class AgainModel:
 
 
 @dataclass(frozen=True)
-class Again:
+class SourceCameras:
     """The result of a format's `again`.
 
     `shots` are its pictures, in its world and in metres; `model` of their objects is a key of `models` here. Without any models
@@ -47,7 +47,7 @@ class Again:
 
     name: str
     shots: tuple[ListedShot, ...]
-    models: dict[str, AgainModel]
+    models: dict[str, SourceModel]
     formats: tuple[str | dict[str, Any], ...]
     annotations: tuple[str, ...] = ()
     up: Axis = "+z"

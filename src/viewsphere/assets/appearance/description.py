@@ -15,7 +15,7 @@ from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.assets.primitive import face_normals
 from viewsphere.assets.srgb import linear
 from viewsphere.materials import word
-from viewsphere.model.looks import Looks, Patch
+from viewsphere.model.appearance import Appearance, Patch
 from viewsphere.model.thing import Repaint
 
 Float = NDArray[np.float64]
@@ -61,7 +61,7 @@ MATERIALS = ("glass", "metal", "glossy", "matte")
 PLASTIC = 1.32471795724474602596
 
 
-def looks_of(mesh: Mesh, color: str | None = None, material: str | None = None) -> Looks:
+def appearance_of(mesh: Mesh, color: str | None = None, material: str | None = None) -> Appearance:
     """Return the appearance of a mesh, seen from all sides and above.
 
     `color` and `material` are words from its spec or sidecar.
@@ -69,7 +69,7 @@ def looks_of(mesh: Mesh, color: str | None = None, material: str | None = None) 
     normals = face_normals(mesh.vertices.astype(np.float64), mesh.triangles)
     areas = np.sqrt((normals**2).sum(axis=1)) / 2
     if not areas.any():
-        return Looks(color=color, material=material)
+        return Appearance(color=color, material=material)
     triangle, barycentrics = _spread(areas)
     corners = mesh.triangles[triangle]
     weights = _seen(_at(mesh.vertices, corners, barycentrics), normals[triangle] / areas[triangle, None] / 2)
@@ -80,7 +80,7 @@ def looks_of(mesh: Mesh, color: str | None = None, material: str | None = None) 
         found += _patches(mesh.materials[number], _spots(mesh, number, corners[at], barycentrics[at]), weights[at])
     shown = sum(patch.share for patch in found) or 1.0
     rounded = (patch.model_copy(update={"share": min(round(patch.share / shown, DIGITS), 1.0)}) for patch in found)
-    return Looks(patches=tuple(patch for patch in rounded if patch.share), color=color, material=material)
+    return Appearance(patches=tuple(patch for patch in rounded if patch.share), color=color, material=material)
 
 
 def _spread(areas: Float) -> tuple[NDArray[np.int64], Float]:
@@ -126,7 +126,7 @@ DIRECTIONS = tuple(_directions())
 """From where a model is looked at."""
 
 
-def is_alike(one: Looks, other: Looks) -> bool:
+def is_alike(one: Appearance, other: Appearance) -> bool:
     """Return whether two models look the same but for rounding; what somebody said of them does not count."""
     if [patch.material for patch in one.patches] != [patch.material for patch in other.patches]:
         return False
@@ -239,7 +239,7 @@ def _kinds(spots: _Spots, coated: NDArray[np.bool_] | bool) -> NDArray[np.int64]
     return np.select(holds, range(len(MATERIALS)), len(MATERIALS))
 
 
-def words(looks: Looks, repaints: Sequence[Repaint] = ()) -> tuple[str | None, str | None]:
+def words(looks: Appearance, repaints: Sequence[Repaint] = ()) -> tuple[str | None, str | None]:
     """The colour and the material of most of a surface whose materials are repainted so, each None where no word holds for most
     of it.
 

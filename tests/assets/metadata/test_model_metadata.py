@@ -8,10 +8,10 @@ import pytest
 import trimesh
 
 from viewsphere.assets.cache import load
-from viewsphere.assets.metadata import traits
+from viewsphere.assets.metadata import model_metadata as metadata
+from viewsphere.assets.metadata.model_metadata import metadata_of
 from viewsphere.assets.metadata.sidecars import sidecar_of
 from viewsphere.assets.metadata.spread_points import spread_points
-from viewsphere.assets.metadata.traits import traits_of
 from viewsphere.errors import ModelError
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import ModelSpec
@@ -44,7 +44,7 @@ def model(tmp_path):
 
 
 def read(spec):
-    return traits_of(spec, *load(spec))
+    return metadata_of(spec, *load(spec))
 
 
 SETTINGS = [
@@ -66,7 +66,7 @@ def test_points_and_symmetries_go_where_the_mesh_goes(model, settings, middle):
     said = {"keypoints": {"points": {"corner": corner, "face": face}}, "symmetries": {"discrete": [turn]}}
     spec = model(said, middle, **settings)
     mesh, facts = load(spec)
-    found = traits_of(spec, mesh, facts)
+    found = metadata_of(spec, mesh, facts)
     assert found.diameter == pytest.approx(np.linalg.norm(np.ptp(mesh.bounds, axis=0)), rel=1e-6)
     points, size = found.keypoints.points, found.diameter
     assert np.abs(mesh.vertices - points["corner"]).sum(axis=1).min() < 1e-6 * size
@@ -163,7 +163,7 @@ def test_found_ones_are_kept(model, monkeypatch):
     spec = model(symmetries="found")
     found = read(spec).symmetries
     assert len(found.discrete) == 3
-    monkeypatch.setattr(traits, "find", lambda surface: pytest.fail("looked for again"))
+    monkeypatch.setattr(metadata, "find", lambda surface: pytest.fail("looked for again"))
     assert read(spec).symmetries == found
     assert read(model({"symmetries": {}}, symmetries="found")).symmetries == Symmetries()
 

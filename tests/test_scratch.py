@@ -11,14 +11,24 @@ from pathlib import Path
 import pytest
 
 from deadline import DEADLINE, until
-from viewsphere.aside import LOCK, STALE_S, Aside, aside, left_by_dead, of_this_process, sweep, temporary, write_whole
 from viewsphere.errors import UserError
+from viewsphere.scratch import (
+    LOCK,
+    STALE_S,
+    ScratchDir,
+    left_by_dead,
+    of_this_process,
+    scratch_folder,
+    sweep,
+    temporary,
+    write_whole,
+)
 
 MAKER = """
 import sys, time
 from pathlib import Path
-from viewsphere.aside import Aside
-made = Aside.make(Path(sys.argv[1]), "x-")
+from viewsphere.scratch import ScratchDir
+made = ScratchDir.make(Path(sys.argv[1]), "x-")
 (made.folder / "half").write_text("half")
 print(made.folder, flush=True)
 time.sleep(600)
@@ -74,7 +84,7 @@ def test_one_that_is_stopped_is_not_dead(maker, tmp_path):
 def test_the_number_of_a_dead_process_may_be_ours(tmp_path):
     left = tmp_path / f"{of_this_process()}left"
     left.mkdir()
-    with aside(tmp_path) as own:
+    with scratch_folder(tmp_path) as own:
         assert list(left_by_dead(tmp_path)) == [left]
         assert list(tmp_path.iterdir()) == [own]
 
@@ -107,8 +117,8 @@ def test_where_there_are_no_locks_age_decides(maker, tmp_path, monkeypatch):
     process, folder = maker
     process.kill()
     process.wait(DEADLINE)
-    monkeypatch.setattr("viewsphere.aside._take", lambda lock: False)
-    with aside(tmp_path, "x-") as own:
+    monkeypatch.setattr("viewsphere.scratch._take", lambda lock: False)
+    with scratch_folder(tmp_path, "x-") as own:
         sweep(tmp_path, "x-")
         assert {path for path in tmp_path.iterdir()} == {own, folder}
         age(folder)
@@ -120,7 +130,7 @@ def test_where_there_are_no_locks_age_decides(maker, tmp_path, monkeypatch):
 def test_what_is_being_removed_has_another_name(tmp_path, monkeypatch):
     seen = []
     monkeypatch.setattr("shutil.rmtree", lambda folder, **_: seen.append(folder.name))
-    with aside(tmp_path) as own:
+    with scratch_folder(tmp_path) as own:
         pass
     assert seen == [f"{own.name}~"]
     assert not list(left_by_dead(tmp_path))
@@ -136,7 +146,7 @@ def refused(error):
 @pytest.mark.skipif(os.name == "nt", reason="what flock says")
 def test_a_system_that_forbids_locks_has_none(tmp_path, monkeypatch):
     monkeypatch.setattr("fcntl.flock", refused(PermissionError))
-    with aside(tmp_path) as own:
+    with scratch_folder(tmp_path) as own:
         sweep(tmp_path)
         assert list(tmp_path.iterdir()) == [own]
     assert not list(tmp_path.iterdir())
@@ -145,14 +155,14 @@ def test_a_system_that_forbids_locks_has_none(tmp_path, monkeypatch):
 @pytest.mark.skipif(os.name == "nt", reason="what flock says")
 def test_where_somebody_takes_every_folder_it_is_said_and_none_is_left(tmp_path, monkeypatch):
     monkeypatch.setattr("fcntl.flock", refused(BlockingIOError))
-    with pytest.raises(OSError, match="no folder stays"), aside(tmp_path):
+    with pytest.raises(OSError, match="no folder stays"), scratch_folder(tmp_path):
         pass
     assert not list(tmp_path.iterdir())
 
 
 def test_where_files_change_their_numbers_a_folder_is_made_all_the_same(tmp_path, monkeypatch):
     monkeypatch.setattr("os.path.samestat", lambda *_: False)
-    with aside(tmp_path) as own:
+    with scratch_folder(tmp_path) as own:
         assert list(tmp_path.iterdir()) == [own]
         assert list(own.iterdir()) == [own / LOCK]
 
@@ -160,12 +170,12 @@ def test_where_files_change_their_numbers_a_folder_is_made_all_the_same(tmp_path
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 def test_a_forked_process_removes_and_holds_nothing_of_its_parent_s(tmp_path):
-    made = Aside.make(tmp_path)
+    made = ScratchDir.make(tmp_path)
     done, go = os.pipe(), os.pipe()
     child = os.fork()
     if not child:
         try:
-            inside = Aside.make(tmp_path)  # whose lock may have the number of the parent's
+            inside = ScratchDir.make(tmp_path)  # whose lock may have the number of the parent's
             made.remove()
             inside.remove()
             os.write(done[1], b"x")
@@ -236,7 +246,7 @@ def test_nobody_loses_a_folder_to_those_who_sweep(tmp_path):
     """Makers are met by sweepers between any two of their steps."""
 
     def make(_: int) -> bool:
-        made = Aside.make(tmp_path)
+        made = ScratchDir.make(tmp_path)
         (made.folder / "a").write_text("a")
         whole = {path.name for path in made.folder.iterdir()} == {LOCK, "a"}
         made.remove()

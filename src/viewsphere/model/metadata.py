@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from viewsphere.model.appearance import Appearance
 from viewsphere.model.keypoints import Keypoints
-from viewsphere.model.looks import Looks
 from viewsphere.model.symmetries import Symmetries
 
 
-def unknown() -> Looks | None:
+def unknown() -> Appearance | None:
     """Nobody knows what the model looks like."""
     return None
 
 
 @dataclass(frozen=True)
-class Traits:
+class ModelMetadata:
     """Facts about a model in its own axes, metres: the largest distance between two of its vertices; its symmetries, None where
     nobody has said or looked, which is not the same as none; its named points, None without any; the words that are said of its
     colour and material, None without; and `looks`, which looks at it.
@@ -29,4 +29,4 @@ class Traits:
     keypoints: Keypoints | None = None
     color: str | None = None
     material: str | None = None
-    looks: Callable[[], Looks | None] = unknown
+    looks: Callable[[], Appearance | None] = unknown

@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Amount, Portion
+from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.validation_errors import shown
 
 LONGEST = 40
 """Characters of a word for a colour or a material."""
@@ -24,7 +24,7 @@ def _word(text: str) -> str:
 Word = Annotated[str, Field(min_length=1, max_length=LONGEST), AfterValidator(_word)]
 
 
-class Patch(Brief):
+class Patch(OmitNone):
     """The parts of a model that have one material, one basic colour and one word for the material.
 
     Their share is that of the model's visible surface. The means over them are the colour (linear [r, g, b]), metallic,
@@ -32,7 +32,7 @@ class Patch(Brief):
     they keep their material where models are made of another material, because they are not opaque.
     """
 
-    UNSAID = ("stays",)
+    OMIT_IF_NONE = ("stays",)
 
     material: str
     share: Portion
@@ -44,7 +44,7 @@ class Patch(Brief):
     stays: Literal[True] | None = None
 
 
-class Looks(Frozen):
+class Appearance(Frozen):
     """The surface of a model in patches, and the words for colour and material that somebody said of it, if anybody did."""
 
     patches: tuple[Patch, ...] = ()

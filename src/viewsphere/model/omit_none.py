@@ -9,15 +9,15 @@ from pydantic import SerializerFunctionWrapHandler, model_serializer
 from viewsphere.model.frozen import Frozen
 
 
-class Brief(Frozen):
-    """Plain data that is written without those of its fields in `UNSAID` that are None."""
+class OmitNone(Frozen):
+    """Plain data that is written without those of its fields in `OMIT_IF_NONE` that are None."""
 
-    UNSAID: ClassVar[tuple[str, ...]] = ()
+    OMIT_IF_NONE: ClassVar[tuple[str, ...]] = ()
 
     @model_serializer(mode="wrap")
     def _without_unsaid(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         found: dict[str, Any] = handler(self)
-        for name in self.UNSAID:
+        for name in self.OMIT_IF_NONE:
             if getattr(self, name) is None:
                 found.pop(name, None)
         return found
