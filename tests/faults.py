@@ -179,7 +179,7 @@ def _files(out: Path) -> int:
 
 
 @dataclass
-class SequenceState:
+class Course:
     """A work in a folder, which faults hit again and again until it is done; then it begins anew."""
 
     work: Work

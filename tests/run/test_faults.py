@@ -18,7 +18,7 @@ import pytest
 
 from command_line import Answer
 from deadline import DEADLINE
-from faults import SIGNALS, WORKS, SequenceState, Tally, finished, make_stock, recipe, small_disk, torn, undisturbed, workers_of
+from faults import SIGNALS, WORKS, Course, Tally, finished, make_stock, recipe, small_disk, torn, undisturbed, workers_of
 from small import tree_hash
 from viewsphere.run.generate import generate
 from viewsphere.scratch import scratch_folder
@@ -64,7 +64,7 @@ def obedient():
 @pytest.mark.parametrize("work", WORKS)
 def test_kills_at_any_moment(work, stock, tmp_path):
     source = tree_hash(stock / "small")
-    course = SequenceState(WORKS[work], stock, tmp_path, random.Random(f"kills {work}"), workers=2 if work == "render" else 1)
+    course = Course(WORKS[work], stock, tmp_path, random.Random(f"kills {work}"), workers=2 if work == "render" else 1)
     course.suffer(SIGNALS["SIGKILL of everything"], 1)
     course.renew()
     assert course.tally.is_good, course.tally
@@ -74,7 +74,7 @@ def test_kills_at_any_moment(work, stock, tmp_path):
 @pytest.mark.parametrize("fault", [fault for fault in SIGNALS if fault != "SIGKILL of everything"])
 def test_signals_at_any_moment(fault, stock, tmp_path):
     workers = 2 if "worker" in fault else 1  # a worker costs seconds: two where one dies beside another
-    course = SequenceState(WORKS["render"], stock, tmp_path, random.Random(f"signals {fault}"), workers)
+    course = Course(WORKS["render"], stock, tmp_path, random.Random(f"signals {fault}"), workers)
     course.suffer(SIGNALS[fault], 1)
     course.renew()
     assert course.tally.is_good, course.tally

@@ -9,10 +9,10 @@ from functools import partial
 from itertools import accumulate
 
 from viewsphere.check.failure import failure
-from viewsphere.check.frames.again import SourceCameras
 from viewsphere.check.frames.comparing import FRAME_PROOFS
 from viewsphere.check.frames.rays import RayCaster
 from viewsphere.check.frames.recomputed import CONTRADICTED, Recomputed, rows_of
+from viewsphere.check.frames.recomputed_labels import RecomputedLabels
 from viewsphere.check.frames.repainted import Repainted
 from viewsphere.check.frames.shots import contradictions
 from viewsphere.check.report import Finding, Report, in_short
@@ -56,7 +56,7 @@ class _Proofs:
         self._dataset, self._chosen = dataset, chosen
         self._not_run: dict[str, str] = {}
         self._scenery, self._models = Scenery(dataset), {info.key: info for info in dataset.models}
-        self._again = SourceCameras(dataset, self._scenery, self._models)
+        self._recomputed_labels = RecomputedLabels(dataset, self._scenery, self._models)
         self._caster = None if chosen.rays is False else self._make_caster()
         self._recomputed = recomputed
         self._repainted = Repainted(dataset, recomputed)
@@ -80,7 +80,7 @@ class _Proofs:
 
     def report(self) -> Report:
         """The outcome so far."""
-        not_run = self._not_run | self._again.not_run
+        not_run = self._not_run | self._recomputed_labels.not_run
         if self._chosen.rays is False:
             not_run["surface"] = "no rays were asked for"
         if self._scenery.notes:
@@ -94,9 +94,9 @@ class _Proofs:
 
     def _by_models(self, sample: Sample) -> Iterator[tuple[str, list[str]]]:
         """A frame's labels, computed again, and what Embree sees."""
-        if self._again.is_possible(sample):
+        if self._recomputed_labels.is_possible(sample):
             try:
-                for name, message in self._again.differences(sample):
+                for name, message in self._recomputed_labels.differences(sample):
                     yield name, [message]
             except Exception as error:
                 yield "models", [failure("models and shots from which labels can be computed", error)]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.check.frames.again import unequal
 from viewsphere.check.frames.recomputed import CONTRADICTED, Recomputed, rows_of
+from viewsphere.check.frames.recomputed_labels import unequal
 from viewsphere.check.report import in_short
 from viewsphere.errors import BlenderDied, BlenderError, UserError
 from viewsphere.kernels.build import PAINTER

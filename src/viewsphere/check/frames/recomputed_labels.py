@@ -1,4 +1,4 @@
-"""Labels computed again: from the exported models, where shots say that they stand, and compared with those that are kept."""
+"""Labels recomputed from the exported models and their stored places, and compared with the stored labels."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ Findings = Iterator[tuple[str, str]]
 """Names of labels, and what is wrong with them."""
 
 
-class SourceCameras:
-    """Computes labels of a data set again; `not_run` has the reason for each that cannot be, by its name."""
+class RecomputedLabels:
+    """Recomputes labels of a data set; `not_run` has the reason for each label that cannot be recomputed, by its name."""
 
     def __init__(self, dataset: Dataset, scenery: Scenery, models: Mapping[str, ModelInfo]) -> None:
         self._dataset = dataset
