@@ -5,4 +5,5 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def light_is_baked(monkeypatch):
-    monkeypatch.setattr("viewsphere.engines.raster.indirect.bounces.kept_light", lambda content, make, types: make())
+    for module in ("indirect.bounces", "shadows.occlusion", "sky.environment"):
+        monkeypatch.setattr(f"viewsphere.engines.raster.{module}.kept_light", lambda content, make, types: make())

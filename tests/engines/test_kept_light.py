@@ -5,8 +5,8 @@ import pytest
 from PIL import Image
 
 from viewsphere.caches import cache_of
+from viewsphere.engines.raster import kept_light
 from viewsphere.engines.raster.baking import _floor
-from viewsphere.engines.raster.indirect import kept_light
 from viewsphere.engines.raster.materials.surface import Lengths
 from viewsphere.engines.raster.records import NO_LIGHTMAP, Lightmap
 from viewsphere.model.scene import Ground

@@ -12,6 +12,8 @@ from light_stage import LightStage, Samples, ball, cuboid, distances, flat, poin
 
 from quick import quick
 from viewsphere import zoo
+from viewsphere.engines.raster import kept_light
+from viewsphere.engines.raster.materials.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.shadows import occlusion
 from viewsphere.engines.raster.shadows.occlusion import NO_OCCLUSION, bake_occlusion, sky_directions, with_ground_light
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
@@ -189,3 +191,37 @@ def test_points_that_surfaces_read_are_the_same_in_blocks_and_at_once(monkeypatc
     in_blocks = occlusion._read_points(casters, np.zeros(3), 3.0, np.array([10, 10, 10]))
     assert np.array_equal(in_blocks, at_once)
     assert 0 < at_once.sum() < at_once.size
+
+
+@pytest.fixture
+def bakes(monkeypatch, tmp_path):
+    """Counts the calls of `hidden_by`, with a cache of the test's own."""
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
+    monkeypatch.setattr(occlusion, "kept_light", kept_light.kept_light)
+    hidden_by, made = occlusion.hidden_by, []
+    monkeypatch.setattr(occlusion, "hidden_by", lambda *args: made.append(1) or hidden_by(*args))
+    return made
+
+
+def test_the_occlusion_of_a_target_alone_is_kept_for_other_runs(bakes):
+    stage = LightStage(flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1))))
+    first, again = (bake_occlusion(stage.casters, True, "fast", is_alone=True) for _ in range(2))
+    assert len(bakes) == 1
+    for kept, made in zip(again, bake_occlusion(stage.casters, True, "fast"), strict=True):
+        np.testing.assert_array_equal(kept, made)
+    assert first.volume.dtype == again.volume.dtype
+    del bakes[:]
+    for other in (False, True):
+        bake_occlusion(stage.casters, other, "fine", is_alone=True)
+    taller = LightStage(flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1.1))))
+    bake_occlusion(taller.casters, True, "fast", is_alone=True)
+    assert len(bakes) == 3
+
+
+def test_cut_out_surfaces_are_baked_in_each_run(bakes):
+    """The pixels of a texture decide what they hide."""
+    stage = LightStage(flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1))))
+    stage.casters.surfaces.looks[:, L_CASTS_FROM] = 0.5
+    for _ in range(2):
+        bake_occlusion(stage.casters, True, "fast", is_alone=True)
+    assert len(bakes) == 2

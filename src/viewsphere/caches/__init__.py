@@ -17,7 +17,7 @@ import platformdirs
 
 KINDS: Mapping[str, str] = {
     "kernels": "compiled kernels",
-    "light": "baked light of places",
+    "light": "baked light",
     "models": "model files as they were read",
     "parts": "convex parts of models",
     "zoo": "models of the zoo",

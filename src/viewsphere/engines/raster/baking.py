@@ -134,7 +134,7 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
     if packed.arranged.is_sequence:
         occlusion = shades.bake(packed.arranged, casters, lengths.unit, has_ground, options.ambient_occlusion)
     else:
-        occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
+        occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion, arranged.targets == 1)
     hall = halls.of(packed.arranged, packed.rows, casters, floor, ground, lengths, has_ground, options.bounces)
     bounces = NO_BOUNCES if hall is None else bake_bounces(hall, surrounding, lights)
     if hall is not None and hall.has_map:

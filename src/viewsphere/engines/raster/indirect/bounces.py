@@ -30,13 +30,13 @@ from viewsphere.engines.raster.indirect.irradiance_volumes import (
     settle,
     volume_of,
 )
-from viewsphere.engines.raster.indirect.kept_light import digest_of, kept_light
 from viewsphere.engines.raster.indirect.kernels_bounce import COLUMNS, terms
 from viewsphere.engines.raster.indirect.kernels_emissive import shine_at, shine_at_probes, shine_near
 from viewsphere.engines.raster.indirect.kernels_views import FOLD, NODES, send_views, spread_views
 from viewsphere.engines.raster.indirect.patch_rays import RAYS as PATCH_RAYS
 from viewsphere.engines.raster.indirect.patch_rays import WAYS, PatchRays, rays_of
 from viewsphere.engines.raster.indirect.radiosity_patches import Patches, Rays, Table, patches_of
+from viewsphere.engines.raster.kept_light import digest_of, kept_light
 from viewsphere.engines.raster.lightmaps.lightmaps import Charts, has_planes
 from viewsphere.engines.raster.lightmaps.vertex_light import Facets, Sites
 from viewsphere.engines.raster.records import (

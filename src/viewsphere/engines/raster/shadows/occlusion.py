@@ -14,6 +14,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.engines.raster.kept_light import kept_light
+from viewsphere.engines.raster.materials.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.shading.kernels_block import BLOCK, ROWS
 from viewsphere.engines.raster.shadows import kernels_occlusion as kernels
@@ -102,25 +104,40 @@ class _Baking:
     has_ground: bool
     fineness: Fineness
     casters: Casters = field(compare=False)
+    is_alone: bool = field(compare=False)
 
 
-def bake_occlusion(casters: Casters, has_ground: bool, quality: Quality) -> Occlusion:
+def bake_occlusion(casters: Casters, has_ground: bool, quality: Quality, is_alone: bool = False) -> Occlusion:
     """Return the occlusion that depends on the targets alone; `with_ground_light` adds the light of lamps and sky to the floor.
 
-    The last result is kept for the same `casters.targets`.
+    The last result is kept for the same `casters.targets`. is_alone: there is one target. The cache keeps its result as well,
+    since other runs have the same; places of several targets are drawn anew.
     """
     if quality == "off" or not casters.extent.triangles or not (casters.extent.high - casters.extent.low).max() > 0:
         return NO_OCCLUSION
     has_scenery = casters.scenery is not None
     fineness = Fineness(quality, _MOST_OPEN_CELLS if has_scenery else _MOST_CELLS[quality], _FLOOR, has_scenery)
-    baking = _Baking(casters.targets, has_ground, fineness, casters)
+    baking = _Baking(casters.targets, has_ground, fineness, casters, is_alone)
     return _bake.__wrapped__(baking) if casters.targets is None else _bake(baking)
 
 
 @lru_cache(maxsize=1)
 def _bake(baking: _Baking) -> Occlusion:
     everywhere = np.array([-np.inf, np.inf] * 3)
-    return joined([hidden_by(baking.casters, baking.has_ground, baking.fineness)], [IN_PLACE], everywhere[None])
+    return joined([_hidden(baking)], [IN_PLACE], everywhere[None])
+
+
+def _hidden(baking: _Baking) -> Hidden:
+    """`hidden_by`, from the cache where it holds that of an equal target."""
+    casters, extent = baking.casters, baking.casters.extent
+    triangles = casters.surfaces.triangles[: extent.triangles]
+    opaque_from = casters.surfaces.looks[casters.surfaces.material[: extent.triangles], L_CASTS_FROM]
+    if not baking.is_alone or casters.scenery is not None or ((opaque_from > 0) & (opaque_from <= 1)).any():
+        return hidden_by(casters, baking.has_ground, baking.fineness)  # textures decide what is opaque
+    vertices = casters.surfaces.vertices[: int(triangles.max()) + 1]
+    box = extent.low, extent.high, extent.ground_z
+    content = "occlusion", vertices[:, :3], vertices[:, 11:14], triangles, opaque_from, *box, baking.has_ground, baking.fineness
+    return kept_light(content, lambda: hidden_by(casters, baking.has_ground, baking.fineness), (Hidden,))
 
 
 def hidden_by(casters: Casters, has_ground: bool, fineness: Fineness) -> Hidden:

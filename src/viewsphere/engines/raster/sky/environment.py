@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster.indirect.kernels_probes import sky_from
+from viewsphere.engines.raster.kept_light import kept_light
 from viewsphere.engines.raster.records import Float32, Int32, PictureRays
 from viewsphere.engines.raster.shadows.arriving import arriving
 from viewsphere.engines.raster.shadows.kernels_direct_light import DISTANT
@@ -251,6 +252,10 @@ def _visible_sun(sky: AnySky, sun: Sun | None) -> tuple[Float, float]:
 @lru_cache(maxsize=1)
 def _gradient_maps() -> _Maps:
     """Maps that serve every gradient: how far each direction is from the horizon's colour towards the zenith's, 0 to 1."""
+    return kept_light(("gradient",), _make_gradient_maps, (_Maps,))
+
+
+def _make_gradient_maps() -> _Maps:
     height = _SKY_HEIGHT
     sine = np.maximum(np.sin((0.5 - (np.arange(height) + 0.5) / height) * np.pi), 0)
     share = gradient_share(sine).astype(np.float32)
@@ -469,7 +474,12 @@ def _lobe_samples(rough: float, rings: int, width: int, levels: int) -> Float32:
 
 
 @lru_cache(maxsize=1)
-def lobe_albedo(size: int = 32) -> Float32:
+def lobe_albedo() -> Float32:
+    """`make_lobe_albedo`, kept."""
+    return kept_light(("lobe albedo",), make_lobe_albedo, ())
+
+
+def make_lobe_albedo(size: int = 32) -> Float32:
     """Share of white light that GGX with height-correlated Smith reflects altogether, (size, size, 2): by perceptual roughness
     and by the square root of the cosine to the viewer, both from 0 to 1.
 

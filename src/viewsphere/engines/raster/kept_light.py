@@ -1,4 +1,4 @@
-"""Baked light in the cache: made once for a place, and shared in memory by the processes that use it."""
+"""Baked light in the cache: made once for equal places, skies and models, and shared in memory by the processes that use it."""
 
 from __future__ import annotations
 
@@ -41,5 +41,5 @@ def digest_of(content: Iterable[Any]) -> str:
 @cache
 def _sources() -> str:
     """Digest of the sources, of the kernels' build, and of what numpy's sines depend on: the processor's type."""
-    package = Path(__file__).parents[3]
+    package = Path(__file__).parents[2]
     return " ".join([HOST, np.__version__, *(package_digest(package / name) for name in PACKAGES)])
