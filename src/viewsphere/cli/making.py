@@ -397,8 +397,8 @@ def render(
         print_plan(planned)
         if addition is not None and any(Store(output).gaps(addition.record)):
             say(f"{output}: {addition}")
-    output = redirect_stdout(sys.stderr) if json_ else nullcontext()  # what libraries print is no JSON
-    with ProgressBar(quiet=json_) as bar, output:
+    diverted = redirect_stdout(sys.stderr) if json_ else nullcontext()  # what libraries print is no JSON
+    with ProgressBar(quiet=json_) as bar, diverted:
         try:
             summary = generate(
                 loaded,
