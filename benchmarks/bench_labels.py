@@ -16,7 +16,12 @@ import numpy as np
 from viewsphere import Recipe, plan
 from viewsphere.labels import (
     ChannelLabel,
+    LidarScan,
     ObjectLabel,
+    ObjectPoints,
+    OwnView,
+    Poses,
+    RigPoses,
     SampleLabel,
     annotated,
     channel_labels,
@@ -24,6 +29,7 @@ from viewsphere.labels import (
     labels,
     object_labels,
     on_request,
+    requires,
     sample_labels,
 )
 from viewsphere.labels.shared.context import LabelContext
@@ -54,9 +60,14 @@ def recipe(objects: int) -> Recipe:
     )
 
 
+def _compares_poses(label: Any) -> bool:
+    """Return whether a label reads poses of other instants or sensors."""
+    return any(requires(label.needs, kind) for kind in (Poses, RigPoses))
+
+
 def asked() -> list[str]:
     """Annotations that still pictures of one camera have."""
-    return [name for name, label in on_request().items() if not (label.needs.poses or label.needs.rig)]
+    return [name for name, label in on_request().items() if not _compares_poses(label)]
 
 
 def moving_recipe(objects: int) -> Recipe:
@@ -88,7 +99,7 @@ def moving_labels() -> list[str]:
 def still_labels() -> list[str]:
     """Labels of objects and of whole pictures that stills of one camera have."""
     known = (*object_labels(), *sample_labels().values())
-    return [label.name for label in known if not (label.needs.poses or label.needs.rig)]
+    return [label.name for label in known if not _compares_poses(label)]
 
 
 def measure_moving(objects: int, rounds: int) -> dict[str, float]:
@@ -102,9 +113,9 @@ def measure_moving(objects: int, rounds: int) -> dict[str, float]:
     for round_ in range(rounds + 1):
         for name in moving_labels():
             label = labels()[name]
-            sensor = 2 if label.needs.lidar else 0
+            sensor = 2 if requires(label.needs, LidarScan) else 0
             views.followed(sensor)
-            view, around = views.view(1, sensor), views.around(1, sensor)
+            view, around = views.view(1, sensor), views.neighbours(1, sensor)
             for instant in (0, 2):
                 _ = views.view(instant, sensor).visibility
             seen = context_of(
@@ -131,7 +142,7 @@ def of_any(label: Any, seen: LabelContext) -> None:
 def still_channels() -> list[str]:
     """Channels that still pictures of one camera have."""
     known = channel_labels().items()
-    return [n for n, label in known if not label.needs.is_some or (label.needs.points and not label.needs.lidar)]
+    return [n for n, label in known if all(isinstance(need, (OwnView, ObjectPoints)) for need in label.needs)]
 
 
 def measure(objects: int, rounds: int, embree: Callable[[Any], Any]) -> tuple[dict[str, float], int]:
@@ -147,7 +158,7 @@ def measure(objects: int, rounds: int, embree: Callable[[Any], Any]) -> tuple[di
     for round_ in range(rounds + 1):
         for instant in range(len(shot.instants)):
             view = views.view(instant, 0)
-            around = views.around(instant, 0)
+            around = views.neighbours(instant, 0)
 
             def context(view: Any = view, around: Any = around, instant: int = instant) -> LabelContext:
                 files = ["model.obj"] * len(boxes)

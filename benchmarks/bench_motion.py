@@ -139,7 +139,7 @@ def time_channels(clock: Clock, label: str, world: World, names: Sequence[str]) 
 
 def _channels(views: ShotViews, instant: int, sensor: int, names: Sequence[str]) -> None:
     view = views.view(instant, sensor)
-    observe(view.geometry, view.camera, view.visibility, names, views.around(instant, sensor))
+    observe(view.geometry, view.camera, view.visibility, names, views.neighbours(instant, sensor))
 
 
 def channels(world: World) -> list[Row]:

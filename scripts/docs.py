@@ -27,7 +27,17 @@ from typer.models import ArgumentInfo
 from viewsphere import plugins
 from viewsphere.assets import readers as model_readers
 from viewsphere.cli.commands import app
-from viewsphere.labels import ChannelLabel, Field, Label, ObjectLabel, SampleLabel, channels, labels, object_labels, on_request
+from viewsphere.labels import (
+    ChannelLabel,
+    Field,
+    LabelSpec,
+    ObjectLabel,
+    SampleLabel,
+    channels,
+    labels,
+    object_labels,
+    on_request,
+)
 from viewsphere.limits import table
 from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.plugins.engine import EngineSpec
@@ -172,7 +182,7 @@ surface, which all labels share, takes {:g}. Meanings and axes are in [channels 
 """
 
 
-def unit_of(label: Label) -> str:
+def unit_of(label: LabelSpec) -> str:
     """The unit of a label, or those of its fields, each once."""
     units = [label.unit] if isinstance(label, ChannelLabel) else [field.unit for field in getattr(label, "fields", ())]
     return ", ".join(dict.fromkeys(filter(None, units)))
@@ -221,7 +231,7 @@ A plug-in is one module, named by an entry point of its group, that holds its sp
 def plugins_page() -> str:
     """The fields of all specs."""
     text = NOTE + PLUGINS
-    for spec in (spec for spec in SPECS if spec is not Label):
+    for spec in (spec for spec in SPECS if spec is not LabelSpec):
         text += f"\n## {spec.__name__}\n\n{inspect.getdoc(spec)}\n\n"
         text += f"Entry points `viewsphere.{spec.KIND}`; the module holds `{plugins.SEAMS[spec.KIND].constant}`.\n"
         text += "\n| field | default | meaning |\n|---|---|---|\n"

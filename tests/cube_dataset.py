@@ -90,7 +90,7 @@ def render(shot: Shot):
         channels = {name: channels[name] for name in shot.channels}
         metadata = [partial(ModelMetadata, diameter(mesh.vertices), looks=partial(appearance_of, mesh)) for mesh in meshes]
         context = context_of(
-            shot, instant, camera, geometry, visibility, boxes, files, None, views.around(instant, sensor), metadata
+            shot, instant, camera, geometry, visibility, boxes, files, None, views.neighbours(instant, sensor), metadata
         )
         objects = annotated(context)
         more = sample_values(context, objects)

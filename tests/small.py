@@ -10,10 +10,10 @@ ROOT = Path(__file__).parent.parent
 
 def still_channels() -> tuple[str, ...]:
     """Names of the pictures, and of the labels of pixels that need no other picture."""
-    from viewsphere.labels import Needs, channel_labels
+    from viewsphere.labels import channel_labels
     from viewsphere.model.channel import PICTURES
 
-    return (*PICTURES, *(name for name, label in channel_labels().items() if label.needs == Needs() and label.components))
+    return (*PICTURES, *(name for name, label in channel_labels().items() if not label.needs and label.components))
 
 
 def small_recipe(**changes):

@@ -1,6 +1,5 @@
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ from viewsphere.check.frames.comparing import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
 from viewsphere.formats import native
 from viewsphere.geometry.mask import decode_rle, encode_rle
-from viewsphere.labels import Needs, channel_labels, channels, labels, labels_of, object_labels, on_request
+from viewsphere.labels import Randomness, ShotAppearance, channel_labels, channels, labels, labels_of, object_labels, on_request
 from viewsphere.labels.shared.spec import no_record
 from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
@@ -100,10 +99,10 @@ def test_a_whole_data_set_passes(whole):
     assert json.loads(json.dumps(report.to_json()))["ok"] is True
 
 
-STILL = [name for name, label in channel_labels().items() if label.needs == Needs() and label.components]
-ROWS = [name for name, label in channel_labels().items() if label.needs == Needs() and not label.components]
+STILL = [name for name, label in channel_labels().items() if not label.needs and label.components]
+ROWS = [name for name, label in channel_labels().items() if not label.needs and not label.components]
 """Labels of a still picture that are pixels, or rows of a number of their own."""
-PLAIN = [name for name, label in labels().items() if label.needs == Needs() and name not in (*on_request(), *ROWS)]
+PLAIN = [name for name, label in labels().items() if not label.needs and name not in (*on_request(), *ROWS)]
 LIFTED = ["nocs", "position"]
 """Labels that are proved by depth, where that is exact, and by object coordinates."""
 
@@ -676,7 +675,9 @@ def test_frames_of_another_split_than_the_plan_dealt(tmp_path):
     assert {name for name, _ in failures(Dataset(tmp_path), rays=False)} == {"shot", "recipe"}
 
 
-ASKED = tuple(name for name, label in on_request().items() if replace(label.needs, looks=False, chance=False) == Needs())
+ASKED = tuple(
+    name for name, label in on_request().items() if all(isinstance(need, (ShotAppearance, Randomness)) for need in label.needs)
+)
 
 
 @pytest.fixture(scope="module")

@@ -74,12 +74,12 @@ def labelled(install: Callable[[str, str, str], Path]) -> Iterator[Callable[[str
 
 UNSEEN = """
 import numpy as np
-from viewsphere.labels import ChannelLabel, Needs
+from viewsphere.labels import ChannelLabel, Next
 
 LABEL = ChannelLabel(
-    name="unseen", meaning="whether the point is hidden an instant later", needs=Needs(instants=(1,)), dtype=np.uint8, empty=4,
+    name="unseen", meaning="whether the point is hidden an instant later", needs=(Next(),), dtype=np.uint8, empty=4,
     ids={}, encoding="png", compute=lambda context: np.zeros(context.visibility.triangle.shape, np.uint8)
-    if context.match(1) is None else context.match(1).state,
+    if context.match(Next()) is None else context.match(Next()).state,
 )
 """
 
@@ -166,8 +166,8 @@ def test_a_faulty_label_is_refused_where_it_is_named_and_nowhere_else(labelled, 
 
 
 def test_a_channel_that_needs_its_neighbours_is_refused_for_still_pictures(labelled):
-    code = EXAMPLES["borders"].replace("import ChannelLabel", "import ChannelLabel, Needs")
-    labelled("borders", code.replace("compute=compute,", "compute=compute, needs=Needs(instants=(-1, 1)),"))
+    code = EXAMPLES["borders"].replace("import ChannelLabel", "import ChannelLabel, Next, Previous")
+    labelled("borders", code.replace("compute=compute,", "compute=compute, needs=(Previous(), Next()),"))
     with pytest.raises(RecipeError, match=r"channels\[1\]: expected time beside borders, .*; found none: set time"):
         plan(small_recipe(channels=["rgb", "borders"]))
 

@@ -6,7 +6,7 @@ import pytest
 
 import viewsphere as vs
 from viewsphere.check import check
-from viewsphere.labels import Label, channel_labels, labels, on_request
+from viewsphere.labels import LabelSpec, channel_labels, labels, on_request
 
 CYCLES = {"name": "cycles", "samples": 1, "bounces": 1, "denoise": "off"}
 RASTER = {"name": "raster", "ambient_occlusion": "off", "bounces": "off"}
@@ -20,10 +20,9 @@ LABELS = [
 ]
 
 
-def is_still(label: Label) -> bool:
+def is_still(label: LabelSpec) -> bool:
     """Whether pictures of one camera that stand alone have the label."""
-    needs = label.needs
-    return not (needs.instants or needs.poses or needs.rectified or needs.rig or needs.tracks or needs.lidar)
+    return not any(need.SECTION for need in label.needs)
 
 
 def still_recipe(engine, *, motion=None, **changed):

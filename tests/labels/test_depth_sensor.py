@@ -131,7 +131,8 @@ def test_it_is_the_same_whether_other_labels_compare_pictures_or_not():
     geometry, camera = placed(cube(0.7), ground=True), orbit_camera(lens(96, 72, 1.1), 0.4, 0.5, 5.0)
     around = SimpleNamespace(drawn_as=("shot", "camera", "0.0"))
     rounded, exact = (
-        LabelContext(geometry, camera, rasterize(geometry, camera, keeps_exact=keeps), around=around) for keeps in (False, True)
+        LabelContext(geometry, camera, rasterize(geometry, camera, keeps_exact=keeps), neighbours=around)
+        for keeps in (False, True)
     )
     assert (rounded.inverse_depth != exact.inverse_depth).mean() > 0.5
     for one, other in zip(_seen(rounded), _seen(exact), strict=True):

@@ -38,8 +38,8 @@ def sampled(seed, lens_name, count=200, move=None, ground=False):
     own = {thing.model.key: mesh for thing, mesh in zip(things, meshes, strict=True)}
     shot = with_camera(still_shot(things, labels={"surface_samples": {"count": count}}), camera)
     views = views_of(shot, lambda thing: own[thing.model.key])
-    view, around = views.view(0, 0), views.around(0, 0)
-    rows = observe(view.geometry, camera, view.visibility, ["instances", "depth", "surface_samples"], around)
+    view, neighbours = views.view(0, 0), views.neighbours(0, 0)
+    rows = observe(view.geometry, camera, view.visibility, ["instances", "depth", "surface_samples"], neighbours, shot.labels)
     objects = [thing for thing in things if thing.id]
     boxes = [box_vertices(*own[thing.model.key].bounds) for thing in objects]
     told = annotated(context_of(shot, 0, camera, view.geometry, view.visibility, boxes, ["m.obj"] * len(objects)))
@@ -125,7 +125,7 @@ def test_what_is_not_there_or_has_no_surface_has_no_points():
     flat = mesh_of([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
     views = views_of(still_shot(things[:1]), lambda thing: flat)
     view = views.view(0, 0)
-    rows = observe(view.geometry, view.camera, view.visibility, ["surface_samples"], views.around(0, 0))["surface_samples"]
+    rows = observe(view.geometry, view.camera, view.visibility, ["surface_samples"], views.neighbours(0, 0))["surface_samples"]
     assert rows.shape == (0,) and rows.dtype == SURFACE_SAMPLE
     back = decode(channels()["surface_samples"], "x.npz", lambda: encode(channels()["surface_samples"], rows))
     assert back.shape == (0,)

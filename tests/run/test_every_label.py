@@ -12,7 +12,18 @@ from built_once import QUICK
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.check import check
 from viewsphere.errors import PluginError
-from viewsphere.labels import ChannelLabel, Field, ObjectLabel, by_table, channel_labels, in_attributes, labels, on_request
+from viewsphere.labels import (
+    ChannelLabel,
+    Field,
+    FollowedPoints,
+    ObjectLabel,
+    by_table,
+    channel_labels,
+    in_attributes,
+    labels,
+    on_request,
+    requires,
+)
 from viewsphere.labels.shared.ids import has_whole_numbers
 from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.datasets.merging import merge
@@ -183,7 +194,7 @@ def test_appending_twice_is_one_run(recipe_of, rendered, tmp_path):
 def test_models_and_poses_that_are_appended_are_those_of_one_run(recipe_of, tmp_path):
     """New models come first in the recipe, and new poses between the old ones, so that all have other numbers."""
     stills = {"scenes": None, "time": None, "tracks": None, "splits": {"by": "model", "train": 1}}
-    moving = {name for name, label in labels().items() if label.needs.instants or label.needs.poses or label.needs.tracks}
+    moving = {name for name, label in labels().items() if label.pose_offsets or requires(label.needs, FollowedPoints)}
     names = [name for name in channel_labels() if name not in moving]
     few = {"viewpoints": {"azimuth": [0, 60], "elevation": 20, "distance": 6}}
     more = {"viewpoints": {"azimuth": [0, 30, 60, 90], "elevation": 20, "distance": 6}, "shot_frames": 3}

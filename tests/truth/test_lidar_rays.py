@@ -36,7 +36,7 @@ def turned(rng):
 
 def measured(geometry, camera, said):
     sensor = Sensor(intrinsics=camera.intrinsics, lidar=said.measuring(0))
-    return LABEL.compute(LabelContext(geometry, camera, rasterize(geometry, camera), around=Alone(sensor)))
+    return LABEL.compute(LabelContext(geometry, camera, rasterize(geometry, camera), neighbours=Alone(sensor)))
 
 
 def entry(**more):

@@ -12,7 +12,7 @@ from proven import close, equal
 from quick import quick
 from truth_scenes import FISHEYE, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere.geometry.rotation import rigid
-from viewsphere.labels import LabelContext, Needs, channel_labels
+from viewsphere.labels import LabelContext, Partner, channel_labels
 from viewsphere.labels.shared.drawing.flow_colors import picture, wheel
 from viewsphere.model.camera import Camera
 from viewsphere.model.files import Files
@@ -103,7 +103,7 @@ def test_all_have_the_shapes_and_types_of_the_contract():
         assert array.shape == label.channel.shape(72, 96) and array.dtype == label.dtype
         is_whole = name == "motion_boundaries" or "state" in name
         assert label.dtype == (np.uint8 if is_whole else np.float32)
-        assert label.drawing is not None and label.needs != Needs()
+        assert label.drawing is not None and label.needs
 
 
 @pytest.mark.parametrize("kind", ["tiff", "exr", "npz"])
@@ -134,7 +134,7 @@ def test_flow_is_that_of_depth_and_motion():
     context = whole()
     channels = observed(context, "flow", "depth", "scene_flow", "flow_backward", "scene_flow_backward")
     centers = np.stack(np.meshgrid(np.arange(96) + 0.5, np.arange(72) + 0.5), axis=-1)
-    owners = np.append(context.neighbour().owners, -1)[context.visibility.triangle]
+    owners = np.append(context.own_view.owners, -1)[context.visibility.triangle]
     z, still = channels["depth"][..., None], (owners != 1) & (owners >= 0)
     expected = (centers - (48, 36)) * 0.2 / (z - 0.2)
     near = still & (z[..., 0] < 100)
@@ -177,7 +177,7 @@ def test_disparity_times_depth_is_focal_length_times_baseline():
 )
 def test_states_are_those_of_brute_force(name, where):
     context = whole(sky=False)
-    own, there = context.around.views[0, None], context.around.views[where]
+    own, there = context.neighbours.views[0, None], context.neighbours.views[where]
     triangle, world, sure = brute_points(own, there)
     seen = (triangle >= 0) & sure
     first = np.minimum(triangle[seen], own.geometry.triangle_start[-1])
@@ -195,7 +195,7 @@ def test_left_and_right_agree():
     seen = np.isfinite(other["depth"])
     product = other["disparity"][seen].astype(np.float64) * other["depth"][seen]
     np.testing.assert_allclose(product, 0.1 * LENS.fx, rtol=2e-7)
-    expected = -(context.match(0, "right").xy[..., 0] - (np.arange(96) + 0.5))
+    expected = -(context.match(Partner()).xy[..., 0] - (np.arange(96) + 0.5))
     np.testing.assert_allclose(own["disparity"], expected, atol=1e-5)
 
 

@@ -17,12 +17,12 @@ from numba.core import event
 import viewsphere as vs
 from truth_scenes import LENSES, cube, lens, orbit_camera, placed, random_soup, silhouette, sphere
 from viewsphere.kernels.build import IS_STOCK, NUMBA
-from viewsphere.labels import channel_labels, observe
+from viewsphere.labels import LidarScan, channel_labels, observe, requires
 from viewsphere.truth.raster.visibility import rasterize
 
-LABELS = [name for name, label in channel_labels().items() if not label.needs.is_some]
+LABELS = [name for name, label in channel_labels().items() if not label.needs]
 """Those that still pictures of one sensor have."""
-ALL = [name for name, label in channel_labels().items() if name != "tracks" and not label.needs.lidar]
+ALL = [name for name, label in channel_labels().items() if name != "tracks" and not requires(label.needs, LidarScan)]
 """Those of cameras; a recipe with tracks keeps tracks anyway."""
 SEEDS = range(3)
 VOXELS = {"size": [80, 48, 80], "cell": 0.06}

@@ -16,6 +16,21 @@ from viewsphere.errors import PluginError
 from viewsphere.homes import names_of
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.ids import IdKind, by_number, by_table, in_attributes, in_column, renumbered
+from viewsphere.labels.shared.needs import (
+    FollowedPoints,
+    LidarScan,
+    Need,
+    Next,
+    ObjectPoints,
+    OwnView,
+    Partner,
+    Poses,
+    Previous,
+    Randomness,
+    RigPoses,
+    ShotAppearance,
+    requires,
+)
 from viewsphere.labels.shared.placement import Placement, view_of
 from viewsphere.labels.shared.record import Makers, finite, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.labels.shared.spec import (
@@ -24,9 +39,8 @@ from viewsphere.labels.shared.spec import (
     Color,
     Drawing,
     Extent,
-    Label,
+    LabelSpec,
     ModelFacts,
-    Needs,
     ObjectLabel,
     Picture,
     SampleLabel,
@@ -36,7 +50,7 @@ from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel, picture_
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.computing import annotated, context_of, observe, sample_values
+    from viewsphere.labels.shared.computing import annotated, computed_channel, context_of, observe, sample_values
     from viewsphere.labels.shared.context import LabelContext
 
 __all__ = [
@@ -47,20 +61,32 @@ __all__ = [
     "Drawing",
     "Extent",
     "Field",
+    "FollowedPoints",
     "IdKind",
-    "Label",
     "LabelContext",
+    "LabelSpec",
+    "LidarScan",
     "Makers",
     "ModelFacts",
-    "Needs",
+    "Need",
+    "Next",
     "ObjectLabel",
+    "ObjectPoints",
+    "OwnView",
+    "Partner",
     "Placement",
+    "Poses",
+    "Previous",
+    "Randomness",
+    "RigPoses",
     "SampleLabel",
+    "ShotAppearance",
     "annotated",
     "by_number",
     "by_table",
     "channel_labels",
     "channels",
+    "computed_channel",
     "context_of",
     "drawable",
     "drawings",
@@ -82,6 +108,7 @@ __all__ = [
     "observe",
     "on_request",
     "renumbered",
+    "requires",
     "sample_labels",
     "sample_labels_of",
     "sample_values",
@@ -102,6 +129,7 @@ __getattr__ = names_of(
     {
         "LabelContext": "viewsphere.labels.shared.context",
         "annotated": _COMPUTING,
+        "computed_channel": _COMPUTING,
         "observe": _COMPUTING,
         "sample_values": _COMPUTING,
         "context_of": _COMPUTING,
@@ -110,7 +138,7 @@ __getattr__ = names_of(
 
 
 @cache
-def labels() -> Table[Label]:
+def labels() -> Table[LabelSpec]:
     """Return every label by name: first the channels that recipes keep by default, then the others in alphabetical order."""
     return Table(label_names, _loadable)
 
@@ -122,7 +150,7 @@ def label_names() -> tuple[str, ...]:
 
 
 @cache
-def _loadable(name: str) -> Label | None:
+def _loadable(name: str) -> LabelSpec | None:
     """The label of this name; None for one of a third party that cannot be loaded."""
     try:
         return label_named(name)
@@ -133,11 +161,11 @@ def _loadable(name: str) -> Label | None:
 
 
 @cache
-def label_named(name: str) -> Label | None:
+def label_named(name: str) -> LabelSpec | None:
     """The label of this name, None where there is none; loads no other. Raises PluginError for one that cannot be loaded."""
     if name not in plugins.names("labels"):
         return None
-    return plugins.load(Label, name)
+    return plugins.load(LabelSpec, name)
 
 
 def is_on_request(name: str) -> bool:

@@ -42,15 +42,16 @@ from viewsphere.labels.shared.captions.statements import (
 from viewsphere.labels.shared.drawing.lines import written
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.ids import in_attributes
+from viewsphere.labels.shared.needs import Randomness, Scenery, ShotAppearance
 from viewsphere.labels.shared.randomness import generator
-from viewsphere.labels.shared.spec import Drawing, Models, Needs, Picture, SampleLabel
+from viewsphere.labels.shared.spec import Drawing, Models, Picture, SampleLabel
 from viewsphere.model.classes import SKY, STUFF_IDS
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Natural, Portion
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import LabelContext, NeighbourViews
+    from viewsphere.labels.shared.context import LabelContext
 
 MOST = 100
 """Sentences about one picture."""
@@ -129,31 +130,31 @@ class Seen:
 
 def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The sentences of a picture; of a LiDAR's none."""
-    options, around = context.options_of("captions", Captions), context.around
-    if around is None:
+    options, scenery, names = context.options_of("captions", Captions), context.get(ShotAppearance()), context.get(Randomness())
+    if scenery is None or names is None:
         raise ValueError("captions: expected a sample of a shot, found none")
-    if around.sensor.lidar is not None:
+    if scenery.sensor.lidar is not None:
         return {"captions": ()}
-    seen, rng = _seen(context, around, objects, options), generator(options.seed, "captions", *around.drawn_as)
+    seen, rng = _seen(context, scenery, objects, options), generator(options.seed, "captions", *names)
     found = _by_templates(seen, options, rng) if options.templates else _sentences(seen, options.count, rng)
     return {"captions": tuple(found)}
 
 
-def _seen(context: LabelContext, around: NeighbourViews, objects: Sequence[ObjectAnnotation], options: Captions) -> Seen:
+def _seen(context: LabelContext, scenery: Scenery, objects: Sequence[ObjectAnnotation], options: Captions) -> Seen:
     told = [o for o in objects if is_told(o, options.min_visibility)]
     fronts = frozenset(o.id for o in told if has_front(context.placement(o.id - 1).facts))
-    weather, sun_is_low = _weather(around)
+    weather, sun_is_low = _weather(scenery)
     size = context.camera.width, context.camera.height
     return Seen(
-        told, words_of(context), fronts, size, weather, sun_is_low, _surroundings(context), options.plurals, _air(around)
+        told, words_of(context), fronts, size, weather, sun_is_low, _surroundings(context), options.plurals, _air(scenery)
     )
 
 
-def _weather(around: NeighbourViews) -> tuple[str, bool]:
+def _weather(scenery: Scenery) -> tuple[str, bool]:
     """Return the words for the sky, and whether the sun is low. The words are empty without daylight, or where the picture does
     not show the sky.
     """
-    scene, behind = around.shot.scene, around.finish.background
+    scene, behind = scenery.shot.scene, scenery.finish.background
     is_sky = behind.color is None and behind.image is None and not behind.transparent
     if scene.sky.kind != "daylight" or scene.blend is not None or not is_sky:
         return "", False
@@ -162,9 +163,9 @@ def _weather(around: NeighbourViews) -> tuple[str, bool]:
     return weather, clouds < CLOUDY and scene.sun is not None and scene.sun.elevation < LOW_DEG
 
 
-def _air(around: NeighbourViews) -> tuple[str, ...]:
+def _air(scenery: Scenery) -> tuple[str, ...]:
     """Words for what hangs in the air, and what falls: mist that rain makes by itself is not told of."""
-    scene = around.shot.scene
+    scene = scenery.shot.scene
     falls = [word for word, what in (("raining", scene.rain), ("snowing", scene.snow)) if what is not None]
     is_foggy = scene.fog is not None and (not falls or scene.fog.visibility < FOGGY)
     return ("foggy", *falls) if is_foggy else tuple(falls)
@@ -334,7 +335,7 @@ def beside(sample: Sample) -> Picture:
 LABEL = SampleLabel(
     name="captions",
     meaning="sentences about the picture",
-    needs=Needs(chance=True, looks=True),
+    needs=(Randomness(), ShotAppearance()),
     options=Captions,
     fields=(
         Field(

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from pydantic import Field as Limits
 
 from viewsphere.geometry.camera import pixel_rays
+from viewsphere.labels.shared.needs import Randomness
 from viewsphere.labels.shared.randomness import generator
-from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture, channel_of
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Natural, Number
 from viewsphere.model.sample import Sample
@@ -63,10 +64,10 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
     axial and lateral noise. J. Barron, J. Malik, Intrinsic Scene Properties from a Single RGB-D Image, CVPR 2013: steps. A
     point that the projector, or the second camera, does not see because something in its row lies before it is a hole.
     """
-    options, around = context.options_of("depth_sensor", Options), context.around
-    if around is None:
+    options, names = context.options_of("depth_sensor", Options), context.get(Randomness())
+    if names is None:
         raise ValueError("depth_sensor: expected a sample of a shot, found none")
-    names, shape = around.drawn_as, context.visibility.triangle.shape
+    shape = context.visibility.triangle.shape
 
     def draw(purpose: str) -> Float:
         return generator(options.seed, *names, "depth_sensor", purpose).standard_normal(shape)
@@ -166,7 +167,7 @@ LABEL = ChannelLabel(
     name="depth_sensor",
     meaning="depth as a depth camera measures it, with noise, steps and holes",
     axes="camera",
-    needs=Needs(chance=True),
+    needs=(Randomness(),),
     options=Options,
     dtype=np.float32,
     unit="m",

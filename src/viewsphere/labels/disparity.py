@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
+from viewsphere.labels.shared.needs import Partner
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Extent, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
     The other picture is that of the first of the rig's sensors that is rectified with the own one. NaN without such a sensor,
     and where a flat picture is seen.
     """
-    out, baseline, own = context.empty(np.float32), context.baseline, context.neighbour()
+    out, baseline, own = context.empty(np.float32), context.baseline, context.own_view
     if baseline is None or own is None:
         out.fill(np.nan)
         return out
@@ -61,7 +62,7 @@ LABEL = ChannelLabel(
     name="disparity",
     meaning="x in the left picture less x in the right one, of the rectified pair",
     axes="image",
-    needs=Needs(rectified=True),
+    needs=(Partner(),),
     dtype=np.float32,
     unit="px",
     empty=np.nan,

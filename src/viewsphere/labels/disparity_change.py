@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
+from viewsphere.labels.shared.needs import Next, Partner
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Extent, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.surface_points.raster import in_lens
 
@@ -21,7 +22,7 @@ def compute(context: LabelContext) -> NDArray[np.float32]:
 
     NaN where the point is behind the camera then, where it is gone, and without a rectified sensor or a later instant.
     """
-    out, baseline, match = context.empty(np.float32), context.baseline, context.match(1)
+    out, baseline, match = context.empty(np.float32), context.baseline, context.match(Next())
     if baseline is None or match is None:
         out.fill(np.nan)
         return out
@@ -59,7 +60,7 @@ LABEL = ChannelLabel(
     name="disparity_change",
     meaning="the seen point's disparity one instant later, less its disparity",
     axes="image",
-    needs=Needs(instants=(1,), rectified=True),
+    needs=(Next(), Partner()),
     dtype=np.float32,
     unit="px",
     empty=np.nan,

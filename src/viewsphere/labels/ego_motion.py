@@ -11,7 +11,8 @@ import numpy as np
 from viewsphere.geometry.rotation import compose, rigid, rotation_vector
 from viewsphere.labels.shared.drawing.inset_map import NEXT, OWN, PREVIOUS, inset
 from viewsphere.labels.shared.field import Field
-from viewsphere.labels.shared.spec import Drawing, Models, Needs, SampleLabel
+from viewsphere.labels.shared.needs import Poses
+from viewsphere.labels.shared.spec import Drawing, Models, SampleLabel
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
@@ -25,7 +26,7 @@ TOLERANCE = 1e-9
 
 def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The relative poses, as odometry measures them."""
-    found = (context.moment(-1), context.moment(1))
+    found = (context.get(Poses(-1)), context.get(Poses(1)))
     before, after = (None if moment is None else relative(context.camera, moment.camera) for moment in found)
     return {"camera_from_previous": before, "camera_from_next": after}
 
@@ -63,7 +64,7 @@ LABEL = SampleLabel(
     name="ego_motion",
     meaning="how the camera moves",
     axes="camera",
-    needs=Needs(poses=(-1, 1)),
+    needs=(Poses(-1), Poses(1)),
     fields=(
         Field(
             "camera_from_previous",

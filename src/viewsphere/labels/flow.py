@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels.shared.drawing.flow_colors import drawing
-from viewsphere.labels.shared.spec import Array, ChannelLabel, Models, Needs, channel_of
+from viewsphere.labels.shared.needs import Next, Previous
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Models, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.correspondences.correspondence import pixel_centers
 from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE
@@ -21,12 +22,12 @@ EDGE = 1e-3
 """Pixels from the picture's border within which the rounding of stored flow decides whether it leads outside."""
 
 
-def flow(context: LabelContext, instants: int) -> NDArray[np.float32]:
-    """Return the motion of each seen point to so many instants later, (H, W, 2) pixels, right and down.
+def flow(context: LabelContext, to: Next | Previous) -> NDArray[np.float32]:
+    """Return the motion of each seen point to another instant, (H, W, 2) pixels, right and down.
 
     NaN where the point has no pixel then: behind the camera, on a thing that is absent then, on a flat picture.
     """
-    match = context.match(instants)
+    match = context.match(to)
     return np.full((*context.visibility.triangle.shape, 2), np.nan, np.float32) if match is None else match.flow
 
 
@@ -55,7 +56,7 @@ def _against(vectors: Array, states: Array, state: str) -> Iterator[str]:
         yield f"expected {state} 2 where the vectors lead outside; found others at {wrong.sum()} pixels"
 
 
-def _label(name: str, instants: int, when: str) -> ChannelLabel:
+def _label(name: str, to: Next | Previous, when: str) -> ChannelLabel:
     """One direction of flow."""
 
     def prove(sample: Sample, models: Models) -> Iterator[str]:
@@ -65,15 +66,15 @@ def _label(name: str, instants: int, when: str) -> ChannelLabel:
         name=name,
         meaning=f"where the seen point is one instant {when}, right and down of where it is",
         axes="image",
-        needs=Needs(instants=(instants,)),
+        needs=(to,),
         dtype=np.float32,
         components=2,
         unit="px",
         empty=np.nan,
-        compute=lambda context: flow(context, instants),
+        compute=lambda context: flow(context, to),
         prove=prove,
         drawing=drawing(name),
     )
 
 
-LABELS = (_label("flow", 1, "later"), _label("flow_backward", -1, "earlier"))
+LABELS = (_label("flow", Next(), "later"), _label("flow_backward", Previous(), "earlier"))

@@ -13,8 +13,9 @@ from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.needs import OwnView
 from viewsphere.labels.shared.placement import Placement
-from viewsphere.labels.shared.spec import Drawing, Models, Needs, ObjectLabel, rendered
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Number
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -59,7 +60,7 @@ def _states(context: LabelContext) -> dict[int, tuple[int, ...]]:
 
     A point is tested at the place on its ray that lies nearer to the camera by the slack.
     """
-    view, slack = context.neighbour(), context.options_of("keypoints", Options).depth_slack
+    view, slack = context.get(OwnView()), context.options_of("keypoints", Options).depth_slack
     if view is None:
         raise ValueError("keypoints: expected a sample of a shot, found none")
     found, places = dict[int, int](), list[Float]()
@@ -159,7 +160,7 @@ LABEL = ObjectLabel(
     name="keypoints",
     meaning="its model's named points",
     on_request=True,
-    needs=Needs(points=True),
+    needs=(OwnView(),),
     options=Options,
     fields=(
         Field("keypoint_names", "names of the points; the data set's models have skeletons and flips, too", str, many=True),

@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels.shared.drawing.scan_map import from_above
 from viewsphere.labels.shared.ids import in_column
+from viewsphere.labels.shared.needs import LidarScan, Randomness, Scanner
 from viewsphere.labels.shared.randomness import generator
 from viewsphere.labels.shared.reflectance import albedo
-from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Needs, channel_of
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of
 from viewsphere.model.lidar import POINT, Lidar
 from viewsphere.model.sample import Sample
 from viewsphere.truth.lidar.sweeping import Hits, still_hits, swept_hits
 
 if TYPE_CHECKING:
-    from viewsphere.labels.shared.context import LabelContext, NeighbourViews
+    from viewsphere.labels.shared.context import LabelContext
 
 Float = NDArray[np.float64]
 Rays = tuple[NDArray[np.intp], NDArray[np.intp]]
@@ -33,14 +34,14 @@ def compute(context: LabelContext) -> NDArray[np.void]:
     """One row a point that returns, (N,) of `viewsphere.model.lidar.POINT`, ring by ring. Raises ValueError where the sample's
     sensor is no LiDAR.
     """
-    around = context.around
-    lidar = None if around is None else around.sensor.lidar
-    if around is None or lidar is None:
+    scanner, names = context.get(LidarScan()), context.get(Randomness())
+    lidar = None if scanner is None else scanner.sensor.lidar
+    if scanner is None or names is None or lidar is None:
         raise ValueError("lidar: expected a sample of a LiDAR, found a camera's")
-    hits, width = _hits(context, around, lidar), context.camera.width
+    hits, width = _hits(context, scanner, lidar), context.camera.width
     ring, column, distance = hits.ring, hits.column, hits.distance
-    intensity = _intensity(lidar, distance, hits.cosine * albedo(context.geometry, around.painted, hits))
-    draw = partial(_drawn, lidar.seed, around.drawn_as, context.visibility.triangle.shape, (ring, column))
+    intensity = _intensity(lidar, distance, hits.cosine * albedo(context.geometry, scanner.painted, hits))
+    draw = partial(_drawn, lidar.seed, names, context.visibility.triangle.shape, (ring, column))
     returns = _returns(lidar, distance, intensity, draw)
     distance = distance + lidar.sigma * draw("range", np.random.Generator.standard_normal) if lidar.sigma else distance
     out = np.empty(len(ring), POINT)
@@ -55,9 +56,9 @@ def compute(context: LabelContext) -> NDArray[np.void]:
     return out[returns & (out["range"] > 0) & (out["range"] >= low) & (out["range"] <= high)]
 
 
-def _hits(context: LabelContext, around: NeighbourViews, lidar: Lidar) -> Hits:
+def _hits(context: LabelContext, scanner: Scanner, lidar: Lidar) -> Hits:
     if lidar.sweep:
-        return swept_hits(context.geometry, context.camera, around.turning(lidar.sweep))
+        return swept_hits(context.geometry, context.camera, scanner.turning(lidar.sweep))
     return still_hits(context.geometry, context.camera, context.visibility)
 
 
@@ -135,7 +136,7 @@ LABEL = ChannelLabel(
     name="lidar",
     meaning="points that a LiDAR returns, a row each: place, range, intensity, incidence, time, object, category, ring, column",
     axes="LiDAR: x ahead, y left, z up",
-    needs=Needs(lidar=True),
+    needs=(LidarScan(), Randomness()),
     dtype=POINT,
     components=0,
     unit="m, rad, s",

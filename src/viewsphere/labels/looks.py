@@ -9,8 +9,9 @@ from viewsphere.labels.shared.captions.statements import words_of
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.drawing.lines import note
 from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.needs import ShotAppearance
 from viewsphere.labels.shared.placement import Placement
-from viewsphere.labels.shared.spec import Drawing, Models, Needs, ObjectLabel, rendered
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.appearance import LONGEST
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
@@ -54,7 +55,7 @@ LABEL = ObjectLabel(
     name="looks",
     meaning="words for what it looks like",
     on_request=True,
-    needs=Needs(looks=True),
+    needs=(ShotAppearance(),),
     fields=(
         Field(
             "color", "one of eleven basic colour terms, or the model's own word; None: none holds for most", str, optional=True

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
+from viewsphere.labels.shared.needs import Next, Partner, Previous
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
-from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.surface_points.raster import INVALID
 
 if TYPE_CHECKING:
@@ -20,8 +20,9 @@ MEANING = "0 visible, 1 occluded, 2 outside the picture, 3 behind the camera, 4 
 COLORS = np.array([(235, 235, 235), (200, 60, 50), (60, 110, 200), (120, 70, 160), (0, 0, 0)], np.uint8)
 
 
-def states(context: LabelContext, match: Match | None) -> NDArray[np.uint8]:
+def states(context: LabelContext, other: Next | Previous | Partner) -> NDArray[np.uint8]:
     """The states of the seen points in another view, (H, W); all invalid without one."""
+    match = context.match(other)
     return np.full(context.visibility.triangle.shape, INVALID, np.uint8) if match is None else match.state
 
 
@@ -41,7 +42,7 @@ def picture(states: NDArray[np.uint8]) -> Picture:
     return COLORS[np.minimum(states, INVALID)]
 
 
-def _label(name: str, where: str, needs: Needs, match: Callable[[LabelContext], Match | None]) -> ChannelLabel:
+def _label(name: str, where: str, other: Next | Previous | Partner) -> ChannelLabel:
     """The states in one other picture."""
 
     def prove(sample: Sample, models: Models) -> Iterator[str]:
@@ -52,21 +53,19 @@ def _label(name: str, where: str, needs: Needs, match: Callable[[LabelContext], 
     return ChannelLabel(
         name=name,
         meaning=f"the seen point {where}: {MEANING}",
-        needs=needs,
+        needs=(other,),
         dtype=np.uint8,
         ids={},
         empty=4,
         encoding="png",
-        compute=lambda context: states(context, match(context)),
+        compute=lambda context: states(context, other),
         prove=prove,
         drawing=drawing(name),
     )
 
 
 LABELS = (
-    _label("flow_state", "one instant later", Needs(instants=(1,)), lambda context: context.match(1)),
-    _label("flow_backward_state", "one instant earlier", Needs(instants=(-1,)), lambda context: context.match(-1)),
-    _label(
-        "disparity_state", "in the rectified sensor's picture", Needs(rectified=True), lambda context: context.partner_match()
-    ),
+    _label("flow_state", "one instant later", Next()),
+    _label("flow_backward_state", "one instant earlier", Previous()),
+    _label("disparity_state", "in the rectified sensor's picture", Partner()),
 )

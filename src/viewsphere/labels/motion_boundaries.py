@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
+from viewsphere.labels.shared.needs import Next
+from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.correspondences.correspondence import pixel_centers
 
@@ -34,7 +35,7 @@ def compute(context: LabelContext) -> NDArray[np.uint8]:
     flows to the next instant differ by more than `APART`.
     """
     out = np.zeros(context.visibility.triangle.shape, np.uint8)
-    own, match = context.neighbour(), context.match(1)
+    own, match = context.own_view, context.match(Next())
     if own is None or match is None:
         return out
     vectors = match.xy - pixel_centers(out.shape)
@@ -80,7 +81,7 @@ def lined(picture: Picture, sample: Sample) -> Picture:
 LABEL = ChannelLabel(
     name="motion_boundaries",
     meaning="1 where a pixel beside shows something else that moves otherwise",
-    needs=Needs(instants=(1,)),
+    needs=(Next(),),
     dtype=np.uint8,
     ids={},
     encoding="png",

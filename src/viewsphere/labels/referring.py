@@ -28,7 +28,8 @@ from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.drawing.lines import note
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.ids import in_attributes
-from viewsphere.labels.shared.spec import Drawing, Models, Needs, SampleLabel
+from viewsphere.labels.shared.needs import ShotAppearance
+from viewsphere.labels.shared.spec import Drawing, Models, SampleLabel
 from viewsphere.model.camera import Scan
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Portion
@@ -186,10 +187,10 @@ def _used(own: Words) -> int:
 
 def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The expressions, in the order of the objects' ids; of a LiDAR's picture none."""
-    options, around = context.options_of("referring", Referring), context.around
-    if around is None:
+    options, scenery = context.options_of("referring", Referring), context.get(ShotAppearance())
+    if scenery is None:
         raise ValueError("referring: expected a sample of a shot, found none")
-    if around.sensor.lidar is not None:
+    if scenery.sensor.lidar is not None:
         return {"referring": ()}
     visible = [o for o in objects if o.box2d is not None]
     scene = Scene(visible, words_of(context), (context.camera.width, context.camera.height))
@@ -247,7 +248,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
 LABEL = SampleLabel(
     name="referring",
     meaning="expressions that single objects out",
-    needs=Needs(looks=True),
+    needs=(ShotAppearance(),),
     options=Referring,
     fields=(
         Field(

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels.shared.drawing.flow_colors import NEAR, drawing
-from viewsphere.labels.shared.spec import ChannelLabel, Models, Needs, channel_of
+from viewsphere.labels.shared.needs import Next, Previous
+from viewsphere.labels.shared.spec import ChannelLabel, Models, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.truth.surface_points.raster import INVALID
 
@@ -17,11 +18,11 @@ if TYPE_CHECKING:
     from viewsphere.labels.shared.context import LabelContext
 
 
-def scene_flow(context: LabelContext, instants: int) -> NDArray[np.float32]:
-    """Return X so many instants later less X now, (H, W, 3) metres, each in its own instant's camera axes: the camera's motion
+def scene_flow(context: LabelContext, to: Next | Previous) -> NDArray[np.float32]:
+    """Return X at another instant less X now, (H, W, 3) metres, each in its own instant's camera axes: the camera's motion
     is in it. NaN of the sky, and of what is not there then.
     """
-    match = context.match(instants)
+    match = context.match(to)
     return np.full((*context.visibility.triangle.shape, 3), np.nan, np.float32) if match is None else match.scene_flow
 
 
@@ -41,7 +42,7 @@ def _prove(sample: Sample, name: str, state: str) -> Iterator[str]:
             yield f"expected vectors where something is seen and {state} is not 4; found NaN at {missing.sum()} pixels"
 
 
-def _label(name: str, instants: int, when: str, state: str) -> ChannelLabel:
+def _label(name: str, to: Next | Previous, when: str, state: str) -> ChannelLabel:
     """One direction of scene flow; `state` is the channel of the same direction's states."""
 
     def prove(sample: Sample, models: Models) -> Iterator[str]:
@@ -51,18 +52,18 @@ def _label(name: str, instants: int, when: str, state: str) -> ChannelLabel:
         name=name,
         meaning=f"motion of the seen point to one instant {when}, each place in its own instant's camera axes",
         axes="camera",
-        needs=Needs(instants=(instants,)),
+        needs=(to,),
         dtype=np.float32,
         components=3,
         unit="m",
         empty=np.nan,
-        compute=lambda context: scene_flow(context, instants),
+        compute=lambda context: scene_flow(context, to),
         prove=prove,
         drawing=drawing(name, NEAR),
     )
 
 
 LABELS = (
-    _label("scene_flow", 1, "later", "flow_state"),
-    _label("scene_flow_backward", -1, "earlier", "flow_backward_state"),
+    _label("scene_flow", Next(), "later", "flow_state"),
+    _label("scene_flow_backward", Previous(), "earlier", "flow_backward_state"),
 )

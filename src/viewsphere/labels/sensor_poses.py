@@ -13,7 +13,8 @@ from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.drawing.inset_map import OWN, inset
 from viewsphere.labels.shared.drawing.lines import axes
 from viewsphere.labels.shared.field import Field
-from viewsphere.labels.shared.spec import Drawing, Models, Needs, SampleLabel
+from viewsphere.labels.shared.needs import RigPoses
+from viewsphere.labels.shared.spec import Drawing, Models, SampleLabel
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ TOLERANCE = 1e-9
 
 def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The poses of all sensors at the picture's instant, its own among them."""
-    now = context.moment()
+    now = context.get(RigPoses())
     if now is None:
         raise ValueError("sensor_poses: expected a sample of a rig, found none")
     own = rigid(context.camera.R, context.camera.t)
@@ -63,7 +64,7 @@ LABEL = SampleLabel(
     name="sensor_poses",
     meaning="where the rig's sensors are",
     axes="camera",
-    needs=Needs(rig=True),
+    needs=(RigPoses(),),
     fields=(
         Field(
             "camera_from_sensors",

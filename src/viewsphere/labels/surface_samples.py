@@ -12,7 +12,8 @@ from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.ids import in_column
-from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Needs, channel_of, rendered
+from viewsphere.labels.shared.needs import ObjectPoints
+from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, channel_of, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.surface_samples import SURFACE_SAMPLE, SurfaceSamples
 from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE, VISIBLE
@@ -41,10 +42,10 @@ def compute(context: LabelContext) -> NDArray[np.void]:
     The points are drawn evenly by area on the model as it is then, the same on all instances and wherever these stand. Whether
     one is seen is said as `tracks` say it: the segment from the camera's centre to the point meets no other surface.
     """
-    own = context.neighbour()
-    if own is None or context.around is None:
+    own, draw = context.own_view, context.get(ObjectPoints())
+    if own is None or draw is None:
         raise ValueError("surface_samples: expected a sample of a shot, found none")
-    points = context.around.surface
+    points = draw(context.options_of("surface_samples", SurfaceSamples).count)
     now, g = points.in_view(own), own.geometry
     out = np.zeros(len(points), SURFACE_SAMPLE)
     start, ids = np.array(g.triangle_start), np.array([thing.id for thing in own.things], np.int32)
@@ -131,7 +132,7 @@ LABEL = ChannelLabel(
     meaning="points on each object's surface, a row each, with normals, in the object, in the world and in the picture, and "
     "whether it is seen",
     axes="object, world, image",
-    needs=Needs(points=True),
+    needs=(ObjectPoints(),),
     options=SurfaceSamples,
     dtype=SURFACE_SAMPLE,
     components=0,

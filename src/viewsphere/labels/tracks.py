@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels.shared.ids import in_column
-from viewsphere.labels.shared.spec import ChannelLabel, Color, Drawing, Models, Needs, channel_of
+from viewsphere.labels.shared.needs import FollowedPoints
+from viewsphere.labels.shared.spec import ChannelLabel, Color, Drawing, Models, channel_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.tracks import TRACK
 from viewsphere.truth.surface_points.points import SKY
@@ -32,10 +33,8 @@ WORST = 4
 
 def compute(context: LabelContext) -> NDArray[np.void]:
     """One row a point, (N,) of `viewsphere.model.tracks.TRACK`. Raises ValueError where the sample's shot follows none."""
-    followed = (
-        None if context.around is None else context.around.followed
-    )  # first: its triangles may take the place of a view's
-    own = context.neighbour()
+    followed = context.get(FollowedPoints())  # first: its triangles may take the place of a view's
+    own = context.own_view
     if own is None or followed is None:
         raise ValueError("tracks: expected a sample of a sequence, found none")
     now = followed.points.in_view(own)
@@ -114,7 +113,7 @@ LABEL = ChannelLabel(
     name="tracks",
     meaning="points followed through the sequence, a row each: where each was picked, where it is now, whether it is seen",
     axes="world, image",
-    needs=Needs(tracks=True),
+    needs=(FollowedPoints(),),
     dtype=TRACK,
     components=0,
     unit="m, px",

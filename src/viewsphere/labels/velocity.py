@@ -12,8 +12,9 @@ from viewsphere.geometry.rotation import product, rotation_vector, transform
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.drawing.lines import in_space
 from viewsphere.labels.shared.field import Field
+from viewsphere.labels.shared.needs import Poses
 from viewsphere.labels.shared.placement import Placement
-from viewsphere.labels.shared.spec import Drawing, Models, Needs, ObjectLabel, rendered
+from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 
+AROUND = (Poses(-1), Poses(0), Poses(1))
 FIELDS = ("velocity", "angular_velocity", "acceleration")
 
 
@@ -33,9 +35,9 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     Of a model that deforms the point is the middle of the box at this instant and moves with the pose: its own motion counts,
     that of its surface does not.
     """
-    placement, now = context.placement(i), context.moment()
+    placement = context.placement(i)
     middle = (placement.box[2] + placement.box[4]) / 2
-    known = [(m.seconds, np.array(m.poses[i])) for m in (context.moment(-1), now, context.moment(1)) if m and m.poses[i]]
+    known = [(m.seconds, np.array(m.poses[i])) for m in map(context.get, AROUND) if m and m.poses[i]]
     if len(known) < 2:
         return dict.fromkeys(FIELDS)
     (start, before), (end, after) = known[0], known[-1]
@@ -86,7 +88,7 @@ LABEL = ObjectLabel(
     meaning="how it moves",
     axes="world",
     on_request=True,
-    needs=Needs(poses=(-1, 1)),
+    needs=AROUND,
     fields=(
         Field(
             "velocity",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from viewsphere.composing.viewpoints.pose_files.motions import nearest_rotation
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import compose, rigid, transform
+from viewsphere.labels import Partner, label_named, requires
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import PASSES
 from viewsphere.model.lidar import LIDAR, Lidar
@@ -204,7 +205,7 @@ def _sized(found: Calibrated, lens: Intrinsics) -> Intrinsics:
 
 
 def _check_disparity(recipe: Recipe, rig: Rig) -> None:
-    asked = next((name for name in recipe.channels if name.startswith("disparity")), None)
+    asked = next((name for name in recipe.channels if (label := label_named(name)) and requires(label.needs, Partner)), None)
     if asked and not rig.rectified:
         raise RecipeError(
             f"channels: expected a rig with two rectified sensors (equal pinhole lenses and axes, one to the "

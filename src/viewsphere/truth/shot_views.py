@@ -19,7 +19,6 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Sensor
 from viewsphere.model.scene import Finish, Ground, Matrix4
 from viewsphere.model.shot import Shot
-from viewsphere.model.surface_samples import SurfaceSamples
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.model.tracks import TRACK, Tracks
 from viewsphere.truth.lidar.sweeping import Turning
@@ -78,8 +77,8 @@ class ShotViews:
     _geometries: dict[int, tuple[Geometry, Geometry]] = field(default_factory=dict[int, "tuple[Geometry, Geometry]"])
     _views: dict[tuple[int, int], View] = field(default_factory=dict[tuple[int, int], View])
     _followed: dict[int, Followed] = field(default_factory=dict[int, Followed])
-    _drawn: dict[tuple[ModelSpec, TimeStep | None], Drawn] = field(
-        default_factory=dict[tuple[ModelSpec, "TimeStep | None"], Drawn]
+    _drawn: dict[tuple[ModelSpec, TimeStep | None, int], Drawn] = field(
+        default_factory=dict[tuple[ModelSpec, "TimeStep | None", int], Drawn]
     )
 
     def labelled(self, instant: int) -> Geometry:
@@ -119,10 +118,6 @@ class ShotViews:
         """The number of instants whose views are kept at once; still pictures are not compared with those of other instants."""
         return ROOMS if self.shot.sequence else 1
 
-    @cached_property
-    def _samples(self) -> int:
-        return SurfaceSamples.model_validate(self.shot.labels.get("surface_samples", {})).count
-
     @property
     def _sensors(self) -> int:
         return len(self.shot.rig.sensors)
@@ -131,9 +126,9 @@ class ShotViews:
         background = self.shot.finish(instant).background
         return background.color is None and background.image is None and not background.transparent
 
-    def around(self, instant: int, sensor: int) -> SampleViews:
+    def neighbours(self, instant: int, sensor: int) -> NeighbourViews:
         """The views beside that of a sensor at an instant."""
-        return SampleViews(self, instant, sensor)
+        return NeighbourViews(self, instant, sensor)
 
     def followed(self, sensor: int) -> Followed:
         """The points that a sensor follows through the sequence; picked once for the shot."""
@@ -141,14 +136,14 @@ class ShotViews:
             self._followed[sensor] = self._picked(sensor)
         return self._followed[sensor]
 
-    def surface(self, instant: int, sensor: int) -> SurfacePoints:
-        """Points on each object that is there at an instant, as many as options say; drawn once for each model."""
+    def surface(self, instant: int, sensor: int, count: int) -> SurfacePoints:
+        """So many points on each object that is there at an instant; drawn once for each model."""
         view = self.view(instant, sensor)
         things, drawn = list[int](), list[Drawn]()
         for i, thing in enumerate(view.things[: view.geometry.object_count]):
-            key = thing.model, thing.step
+            key = thing.model, thing.step, count
             if thing.is_there and key not in self._drawn:
-                self._drawn[key] = points_on_model(view, i, self._samples)
+                self._drawn[key] = points_on_model(view, i, count)
             if thing.is_there:
                 things.append(i)
                 drawn.append(self._drawn[key])
@@ -238,7 +233,7 @@ def _back(pose: Float) -> Float:
 
 
 @dataclass(frozen=True, eq=False)
-class SampleViews:
+class NeighbourViews:
     """The views beside that of one sample: of a sensor at an instant of a shot."""
 
     views: ShotViews
@@ -344,7 +339,6 @@ class SampleViews:
         """The points that the sample's sensor follows."""
         return self.views.followed(self.sensor_number)
 
-    @property
-    def surface(self) -> SurfacePoints:
-        """The points that are drawn on the objects."""
-        return self.views.surface(self.instant, self.sensor_number)
+    def surface(self, count: int) -> SurfacePoints:
+        """Return so many points on each object."""
+        return self.views.surface(self.instant, self.sensor_number, count)

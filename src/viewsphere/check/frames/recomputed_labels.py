@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError, ViewsphereError
-from viewsphere.labels import ChannelLabel, LabelContext, annotated, channel_labels, labels_of, sample_labels, sample_values
+from viewsphere.labels import (
+    ChannelLabel,
+    LabelContext,
+    annotated,
+    channel_labels,
+    computed_channel,
+    labels_of,
+    sample_labels,
+    sample_values,
+)
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.run.shots.reconstruct import ViewReconstructor
 from viewsphere.run.shots.scenery import Scenery
@@ -48,7 +57,7 @@ class RecomputedLabels:
     def _computed(self, label: ChannelLabel, context: LabelContext) -> NDArray[Any] | None:
         """A channel, computed again; None where a picture of the scene is no longer there: it is no part of the data set."""
         try:
-            return label.compute(context)
+            return computed_channel(label, context)
         except RecipeError as error:
             self.not_run[label.name] = str(error)
             return None

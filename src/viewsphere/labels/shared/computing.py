@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels import channel_labels, labels_of, makers, sample_labels_of
-from viewsphere.labels.shared.context import LabelContext, NeighbourViews
+from viewsphere.labels.shared.context import LabelContext
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.record import Makers, computed
-from viewsphere.labels.shared.spec import derived
+from viewsphere.labels.shared.spec import ChannelLabel, derived
 from viewsphere.model.appearance import Appearance
 from viewsphere.model.camera import Camera
 from viewsphere.model.keypoints import Keypoints
@@ -25,6 +25,7 @@ from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility
+from viewsphere.truth.shot_views import NeighbourViews
 
 
 def observe(
@@ -32,21 +33,26 @@ def observe(
     camera: Camera,
     visibility: Visibility,
     names: Iterable[str],
-    around: NeighbourViews | None = None,
+    neighbours: NeighbourViews | None = None,
     options: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """The named labels of pixels, each (H, W) or (H, W, components) as its file says.
 
-    `visibility` is `rasterize(geometry, camera)`; `around`: what labels of motion and of stereo pairs compare it with;
+    `visibility` is `rasterize(geometry, camera)`; `neighbours`: what labels of motion and of stereo pairs compare it with;
     `options`: those of labels, by their names. The array of `instances` is shared with the visibility and must not be written
     to. Raises ValueError for names that are no labels of pixels.
     """
     known, names = channel_labels(), tuple(names)
-    context = LabelContext(geometry, camera, visibility, around=around, options=options or {})
+    context = LabelContext(geometry, camera, visibility, neighbours=neighbours, options=options or {})
     unknown = [name for name in names if name not in known]
     if unknown:
         raise ValueError(f"channel {unknown[0]!r}: expected one of {', '.join(known)}")
-    return {name: known[name].compute(context) for name in names}
+    return {name: computed_channel(known[name], context) for name in names}
+
+
+def computed_channel(label: ChannelLabel, context: LabelContext) -> NDArray[Any]:
+    """A label of pixels; it may read only the inputs that it needs."""
+    return label.compute(context.read_by(label))
 
 
 def context_of(
@@ -58,7 +64,7 @@ def context_of(
     boxes: Sequence[NDArray[np.float64]],
     models: Sequence[str],
     real_sizes: Sequence[Size | None] | None = None,
-    around: NeighbourViews | None = None,
+    neighbours: NeighbourViews | None = None,
     metadata: Sequence[Callable[[], ModelMetadata]] | None = None,
 ) -> LabelContext:
     """Return the view that a camera has of a shot at an instant (counted from 0 there), with the places of its objects.
@@ -86,7 +92,7 @@ def context_of(
         for thing, known in zip(objects, facts, strict=True)
         for pose, step in ((thing.motion.at(instant), thing.motion.step_at(instant)),)
     )
-    return LabelContext(geometry, camera, visibility, places, around, shot.annotations, shot.labels)
+    return LabelContext(geometry, camera, visibility, places, neighbours, shot.annotations, shot.labels)
 
 
 def _unsaid() -> ModelMetadata:
@@ -103,10 +109,10 @@ def annotated(context: LabelContext) -> tuple[ObjectAnnotation, ...]:
     no pixel has an empty mask, no `box2d` and visibility 0.
     """
     asked = labels_of(context.asked)
-    seen = [label for label in asked if label.compute is not derived]
+    seen = [(label, context.read_by(label)) for label in asked if label.compute is not derived]
     every = Makers(makers(), asked, context.asked, "this frame")
     return tuple(
-        computed(i + 1, [label.compute(context, i) for label in seen], place, every)
+        computed(i + 1, [label.compute(own, i) for label, own in seen], place, every)
         for i, place in enumerate(context.placements)
         if place
     )
@@ -116,7 +122,7 @@ def sample_values(context: LabelContext, objects: Sequence[ObjectAnnotation]) ->
     """The fields of the labels of whole pictures that were asked for; `objects` are `annotated(context)`."""
     found: dict[str, Any] = {}
     for label in sample_labels_of(context.asked):
-        found |= label.compute(context, objects)
+        found |= label.compute(context.read_by(label), objects)
     return found
 
 

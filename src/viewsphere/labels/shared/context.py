@@ -4,86 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, Protocol, TypeVar
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.errors import PluginError
 from viewsphere.geometry.box import Bounds, is_behind, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
+from viewsphere.labels.shared.needs import Need, OwnView, Partner
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.rig import Sensor
-from viewsphere.model.scene import Finish
-from viewsphere.model.shot import Shot
 from viewsphere.truth.correspondences.correspondence import Match
-from viewsphere.truth.lidar.sweeping import Turning
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
-from viewsphere.truth.shot_views import Followed, Moment, Painted
-from viewsphere.truth.surface_points.points import SurfacePoints
+from viewsphere.truth.shot_views import NeighbourViews
 from viewsphere.truth.view import View
 
+if TYPE_CHECKING:
+    from viewsphere.labels.shared.spec import LabelSpec
 
-class NeighbourViews(Protocol):
-    """The views beside that of a picture."""
-
-    @property
-    def partner(self) -> tuple[str, float] | None:
-        """Name of a sensor that is rectified with the picture's own, and the metres between them; None without one."""
-        ...
-
-    def view(self, instants: int, sensor: str | None) -> View | None:
-        """That of a sensor, None for the picture's own, so many instants later; None without such a sensor or instant."""
-        ...
-
-    def moment(self, instants: int) -> Moment | None:
-        """Return the state of the scene so many instants later; None where the shot does not have that instant."""
-        ...
-
-    @property
-    def followed(self) -> Followed:
-        """The points that the picture's sensor follows."""
-        ...
-
-    @property
-    def surface(self) -> SurfacePoints:
-        """The points that are drawn on the objects."""
-        ...
-
-    @property
-    def shot(self) -> Shot:
-        """The shot that the picture is of."""
-        ...
-
-    @property
-    def finish(self) -> Finish:
-        """The settings by which light becomes the picture."""
-        ...
-
-    @property
-    def sensor(self) -> Sensor:
-        """The picture's own sensor."""
-        ...
-
-    def turning(self, seconds: float) -> Turning:
-        """Return the motion of the scene while the columns of the picture are measured in turn, within so many seconds."""
-        ...
-
-    @property
-    def painted(self) -> Painted:
-        """The appearance of surfaces at the picture's instant."""
-        ...
-
-    @property
-    def drawn_as(self) -> tuple[str, ...]:
-        """The names that determine the randomness in the picture's labels, besides a seed."""
-        ...
-
-
+NeedT = TypeVar("NeedT")
 OptionsT = TypeVar("OptionsT", bound=Frozen)
 Made = TypeVar("Made")
 
@@ -117,25 +60,36 @@ class IsolatedMask:
         return self.left, self.top, self.left + columns, self.top + rows
 
 
+class _Shared(Generic[Made]):
+    """A property with one value for all contexts of a picture, computed at the first access."""
+
+    def __init__(self, method: Callable[[Any], Made]) -> None:
+        self._method, self.__doc__ = method, method.__doc__
+
+    def __get__(self, context: LabelContext, owner: type[LabelContext]) -> Made:
+        return context.once(f"context.{self._method.__name__}", lambda: self._method(context))
+
+
 @dataclass(frozen=True, eq=False)
 class LabelContext:
-    """A camera's view of a geometry: `visibility` is `rasterize(geometry, camera)`. `placements` belong to the objects 1, 2,
-    ...; an absent object's is None; labels of pixels need no placements. `around`: what the picture is compared with; `asked`:
-    the annotations that were asked for; `options`: those of labels, by their names.
+    """The inputs that the labels of a picture share: a camera's view of a geometry, seen as `rasterize(geometry, camera)`.
+
+    `placements` belong to the objects 1, 2, ...; an absent object's is None; labels of pixels need no placements. `neighbours`
+    are the views that the picture is compared with; `asked` are the requested annotations; `options` are those of labels, by
+    their names. `label` is the one that reads the context, and gets no inputs but its `needs`; None: all inputs.
     """
 
     geometry: Geometry
     camera: Camera
     visibility: Visibility
     placements: Sequence[Placement | None] = ()
-    around: NeighbourViews | None = None
+    neighbours: NeighbourViews | None = None
     asked: tuple[str, ...] = ()
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
+    label: LabelSpec | None = None
     _isolated: dict[int, IsolatedMask] = field(default_factory=dict[int, "IsolatedMask"], repr=False)
     _made: dict[str, Any] = field(default_factory=dict[str, Any], repr=False)
-    _matches: dict[tuple[int, str | None], Match | None] = field(
-        default_factory=dict[tuple[int, str | None], "Match | None"], repr=False
-    )
+    _matches: dict[Need[Any], Match | None] = field(default_factory=dict[Need[Any], "Match | None"], repr=False)
 
     def once(self, name: str, make: Callable[[], Made]) -> Made:
         """Return a label's result for all objects at once; `make` computes it for the first object."""
@@ -143,22 +97,37 @@ class LabelContext:
             self._made[name] = make()
         return self._made[name]
 
-    def neighbour(self, instants: int = 0, sensor: str | None = None) -> View | None:
-        """Return the possible view of a sensor, by default this one, so many instants later. None without such a sensor or
-        instant.
+    def read_by(self, label: LabelSpec) -> LabelContext:
+        """Return this context for a label; all contexts of a picture share their results."""
+        return replace(self, label=label)
+
+    def get(self, need: Need[NeedT]) -> NeedT | None:
+        """Return the input that a need stands for; None for a picture without neighbours. Raises PluginError for a need that
+        the label does not list.
         """
-        return self.around.view(instants, sensor) if self.around else None
+        self._check(need)
+        return need.read(self.neighbours) if self.neighbours else None
 
-    def moment(self, instants: int = 0) -> Moment | None:
-        """Return the state of the scene so many instants later; None without such an instant."""
-        return self.around.moment(instants) if self.around else None
+    def _check(self, need: Need[Any]) -> None:
+        if self.label is not None and need not in self.label.needs:
+            raise PluginError(f"label {self.label.name}: `compute` reads {need}, which `needs` does not list. Add it there.")
 
-    def match(self, instants: int = 0, sensor: str | None = None) -> Match | None:
-        """Return the places of the picture's points in a neighbour. The result is kept, so that labels share it."""
-        if (instants, sensor) not in self._matches:
-            own, other = self.neighbour(), self.neighbour(instants, sensor)
-            self._matches[instants, sensor] = Match(own, self.visibility, other) if own and other else None
-        return self._matches[instants, sensor]
+    @property
+    def own_view(self) -> View | None:
+        """The picture's own view, which points of other views are compared with; None for a picture without neighbours. Labels
+        have it if they need anything.
+        """
+        if self.label is None or not self.label.needs:
+            self._check(OwnView())
+        return self.neighbours.view(0, None) if self.neighbours else None
+
+    def match(self, need: Need[View | None]) -> Match | None:
+        """Return the places of the picture's points in a neighbouring view. The result is kept, so that labels share it."""
+        self._check(need)
+        if need not in self._matches:
+            own, other = self.own_view, self.get(need)
+            self._matches[need] = Match(own, self.visibility, other) if own and other else None
+        return self._matches[need]
 
     def options_of(self, name: str, kind: type[OptionsT]) -> OptionsT:
         """The options of a label, as their class reads them."""
@@ -166,16 +135,12 @@ class LabelContext:
 
     @property
     def baseline(self) -> float | None:
-        """Metres to the sensor that is rectified with the picture's own, None without one."""
-        partner = self.around.partner if self.around else None
+        """Metres to the sensor that is rectified with the picture's own, None without one. Needs `Partner`."""
+        self._check(Partner())
+        partner = self.neighbours.partner if self.neighbours else None
         return partner and partner[1]
 
-    def partner_match(self) -> Match | None:
-        """Return the places of the picture's points in the picture that is rectified with it; None without such a picture."""
-        partner = self.around.partner if self.around else None
-        return None if partner is None else self.match(0, partner[0])
-
-    @cached_property
+    @_Shared
     def rays(self) -> NDArray[np.float64]:
         """The ray of each pixel of a distorted lens (H, W, 3), in camera axes; (0, 0, 3) for a pinhole, which needs none."""
         rays = lens_rays(self.camera)
@@ -184,12 +149,12 @@ class LabelContext:
             rays.setflags(write=False)  # read-only like a lens's rays, so that kernels are compiled once for both
         return rays
 
-    @cached_property
+    @_Shared
     def corners(self) -> NDArray[np.float64]:
         """The vertices of the scene before the perspective division, as `truth.raster.visibility.homogeneous` gives them."""
         return homogeneous(self.geometry, self.camera) if self.visibility.corners is None else self.visibility.corners
 
-    @cached_property
+    @_Shared
     def camera_from_ray(self) -> NDArray[np.float64]:
         """Matrix (3, 3) from rays to camera axes: K^-1 for a pinhole, whose rays are pixels (x, y, 1); else the identity."""
         return inverse_camera_matrix(self.camera.intrinsics) if self.camera.distortion is None else np.eye(3)
@@ -204,7 +169,7 @@ class LabelContext:
         """The object that each pixel shows, and area and box of each object's visible pixels."""
         return self.visibility.instances(self.geometry)
 
-    @cached_property
+    @_Shared
     def projected(self) -> tuple[tuple[Bounds | None, bool], ...]:
         """For each object the 2D box of its projected triangles, and whether the lens shows all of them."""
         return tuple(self._projected(i) for i in range(self.geometry.object_count))
@@ -234,7 +199,7 @@ class LabelContext:
                 return False
         return geometry.ground_z is None or float(self.camera.center[2]) > geometry.ground_z
 
-    @cached_property
+    @_Shared
     def _reaches(self) -> NDArray[np.float64]:
         """For each object the 2D box, (N, 4), beyond which it hides nothing: everywhere where the lens does not show all of it,
         nowhere (NaN) for an object that is behind the camera.

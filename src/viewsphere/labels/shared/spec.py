@@ -13,6 +13,7 @@ from pydantic import ConfigDict, InstanceOf, SkipValidation, model_validator
 from viewsphere.errors import PluginError, ViewsphereError
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.ids import Ids, check_ids, has_whole_numbers
+from viewsphere.labels.shared.needs import Need
 from viewsphere.labels.shared.placement import ModelFacts, Placement
 from viewsphere.model.channel import Channel
 from viewsphere.model.frozen import Frozen
@@ -43,31 +44,6 @@ Proof = Callable[[Sample, Models], Iterator[str]]
 def no_proof(sample: Sample, models: Models) -> Iterator[str]:
     """The proof of a label about which nothing else in a sample says anything: only computing the label again proves it."""
     yield from ()
-
-
-@dataclass(frozen=True)
-class Needs:
-    """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), of those of which
-    poses are enough, whether a sensor that is rectified with its own, whether any others, whether points that are followed,
-    whether points on objects, which are looked up in the picture, whether how a LiDAR measures, whether chance has a part, and
-    whether what the shot's things look like.
-    """
-
-    instants: tuple[int, ...] = ()
-    poses: tuple[int, ...] = ()
-    rectified: bool = False
-    rig: bool = False
-    tracks: bool = False
-    points: bool = False
-    lidar: bool = False
-    chance: bool = False
-    looks: bool = False
-
-    @property
-    def is_some(self) -> bool:
-        """Return whether the label does not follow from what the picture's own camera sees at its instant."""
-        beside = self.rectified or self.rig or self.tracks or self.points or self.lidar or self.chance or self.looks
-        return bool(self.instants or self.poses or beside)
 
 
 TAIL = 8
@@ -108,9 +84,10 @@ class Drawing:
         return self.beside(sample) if self.beside else None
 
 
-class Label(Spec):
-    """The properties of all labels: `name` (that of their file), `meaning`, `axes`, their frame of reference, and `options`,
-    the class of those that a recipe's `labels` may give.
+class LabelSpec(Spec):
+    """The properties of all labels: `name` (that of their file), `meaning`, `axes`, their frame of reference, `needs`, the
+    inputs besides what the picture's camera sees at its instant, and `options`, the class of those that a recipe's `labels` may
+    give.
 
     `prove` compares a stored sample with itself, which is quick; besides, `check` computes every label again.
     """
@@ -122,17 +99,27 @@ class Label(Spec):
     name: str
     meaning: str
     axes: str = ""
-    needs: InstanceOf[Needs] = Needs()
+    needs: tuple[InstanceOf[Need[Any]], ...] = ()
     options: type[Frozen] | None = None
     prove: Proof = no_proof
     drawing: InstanceOf[Drawing] | None = None
+
+    @property
+    def view_offsets(self) -> frozenset[int]:
+        """Instants from a picture's own to those whose triangles the label reads."""
+        return frozenset(need.view_offset for need in self.needs) - {0}
+
+    @property
+    def pose_offsets(self) -> frozenset[int]:
+        """Instants from a picture's own to those whose poses the label reads, with or without triangles."""
+        return frozenset(need.pose_offset for need in self.needs) - {0}
 
     def is_in(self, sample: Sample) -> bool:
         """Return whether a sample has it."""
         return self.name in sample.requested
 
 
-class ChannelLabel(Label):
+class ChannelLabel(LabelSpec):
     """A label of pixels, stored as a separate file: (height, width) or (height, width, components); `empty` where nothing is
     seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact; `colors` are those of the
     first ids in files with a palette.
@@ -178,7 +165,7 @@ def no_record(annotation: ObjectAnnotation) -> None:
     return
 
 
-class ObjectLabel(Label):
+class ObjectLabel(LabelSpec):
     """A label of objects: one field or several that are computed together.
 
     `compute(context, i)` gives the fields of the object of id i + 1; `derived`: `restore` does. `keep` gives, as JSON, the part
@@ -198,7 +185,7 @@ class ObjectLabel(Label):
     @property
     def follows(self) -> bool:
         """Return whether it follows from what every data set has: it is there whether it was asked for or not."""
-        return self.keep is no_record and self.options is None and not self.needs.is_some
+        return self.keep is no_record and self.options is None and not self.needs
 
     def is_in(self, sample: Sample) -> bool:
         """Return whether the sample's objects have it: it was asked for, or did not have to be."""
@@ -229,7 +216,7 @@ class ObjectLabel(Label):
         )
 
 
-class SampleLabel(Label):
+class SampleLabel(LabelSpec):
     """A label of a whole picture, computed where a recipe's `annotations` name it.
 
     `compute(context, objects)` gives its fields. The store keeps them as they are.

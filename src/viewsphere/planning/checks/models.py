@@ -13,7 +13,7 @@ from viewsphere.composing.layouts import check_layout, check_orientation
 from viewsphere.composing.redraws import redraws_frames
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.errors import RecipeError
-from viewsphere.labels import Needs, channels, is_channel, is_on_request, label_named, labels, on_request
+from viewsphere.labels import channels, is_channel, is_on_request, label_named, labels, on_request
 from viewsphere.model.channel import MATERIAL_PASSES, PASSES
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.suggestions import suggestion
@@ -25,7 +25,6 @@ from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.rig import SensorList
 from viewsphere.recipe.scenes import SamplerEntry, ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
 from viewsphere.recipe.weather import FogEntry
@@ -141,17 +140,11 @@ def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) ->
 
 def check_needs(recipe: Recipe, where: str, name: str) -> None:
     """See that the recipe has what a label compares: instants, sensors, a LiDAR, tracks; raises RecipeError."""
-    label, rig = label_named(name), recipe.rig
-    needs = label.needs if label else Needs()
-    for field, what, is_lacking in (
-        ("time", "whose instants are compared", bool(needs.instants or needs.poses) and recipe.time is None),
-        ("rig", "whose sensors are compared", needs.rig and recipe.rig is None),
-        ("rig", "with a sensor that is rectified with its own", needs.rectified and recipe.rig is None),
-        ("rig", "with a LiDAR among its sensors", needs.lidar and not (isinstance(rig, SensorList) and rig.has_lidar)),
-        ("tracks", "which say what is followed", needs.tracks and recipe.tracks is None),
-    ):
-        if is_lacking:
-            raise RecipeError(f"{where}: expected {field} beside {name}, {what}; found none: set {field}")
+    label = label_named(name)
+    for need in label.needs if label else ():
+        if need.is_missing(recipe):
+            section = need.SECTION
+            raise RecipeError(f"{where}: expected {section} beside {name}, {need.PURPOSE}; found none: set {section}")
 
 
 def _check_painted(recipe: Recipe, where: str, name: str) -> None:

@@ -157,8 +157,8 @@ def _needed(context: SamplingContext, taken: Set[int]) -> set[int]:
     """The instants that labels of those that are taken need besides."""
     names = {name for sensor in context.rig.sensors for name in sensor.kept(context.recipe.channels)}
     names.update(context.recipe.annotations)
-    needs = (label.needs for name in names if (label := label_named(name)))
-    offsets = {offset for some in needs for offset in (*some.instants, *some.poses)}
+    known = (label for name in names if (label := label_named(name)))
+    offsets = {offset for label in known for offset in (*label.view_offsets, *label.pose_offsets)}
     offsets |= {-1, 1} if any(sensor.lidar and sensor.lidar.sweep for sensor in context.rig.sensors) else set()
     count = time_of(context).count
     compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}

@@ -11,7 +11,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError, UserError
-from viewsphere.labels import LabelContext, annotated, channel_labels, labels, on_request, sample_values
+from viewsphere.labels import LabelContext, annotated, channel_labels, computed_channel, labels, on_request, sample_values
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
@@ -95,8 +95,7 @@ class Completed(Exported):
 
     def _context(self, sample: Sample, names: list[str]) -> LabelContext:
         asked = [name for name in names if name in on_request()]
-        needs = [labels()[name].needs for name in names]
-        compares = any(need.instants or need.poses for need in needs)
+        compares = any(labels()[name].pose_offsets for name in names)
         context = self.reconstructor.of(sample, names, asked, continued=compares)
         if context is None:
             raise StoreError(
@@ -116,7 +115,7 @@ class _Computed(Mapping[str, NDArray[Any]]):
         if name not in self._names:
             return self._kept[name]
         if name not in self._made:
-            self._made[name] = channel_labels()[name].compute(self._context())
+            self._made[name] = computed_channel(channel_labels()[name], self._context())
         return self._made[name]
 
     def __contains__(self, name: object) -> bool:

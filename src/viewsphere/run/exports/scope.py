@@ -11,7 +11,7 @@ from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.refusals import lacking_labels
-from viewsphere.labels import Needs, label_named, label_names
+from viewsphere.labels import label_named, label_names
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.sample import Sample
 from viewsphere.planning.plan import Plan
@@ -99,8 +99,7 @@ def is_computed(name: str) -> bool:
     A painted pass does not, and neither do point tracks, a LiDAR's points and drawn looks.
     """
     label = label_named(name)
-    needs = label.needs if label else Needs()
-    return name not in PASSES and not (needs.tracks or needs.lidar or needs.looks)
+    return name not in PASSES and not any(need.IS_RECORDED for need in (label.needs if label else ()))
 
 
 def refuse(entries: Sequence[FormatEntry], scope: Scope, where: object) -> None:

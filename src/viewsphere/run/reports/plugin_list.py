@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from viewsphere.errors import UserError
-from viewsphere.labels import Label
+from viewsphere.labels import LabelSpec
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.light import LightSpec
@@ -20,7 +20,7 @@ from viewsphere.plugins.spec import Spec
 SPECS: tuple[type[Spec], ...] = (
     EngineSpec,
     FormatSpec,
-    Label,
+    LabelSpec,
     LightSpec,
     MaterialSpec,
     MotionSpec,

@@ -18,7 +18,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError, each
 from viewsphere.files import read_bytes
 from viewsphere.geometry.box import box_size, box_vertices
-from viewsphere.labels import labels
+from viewsphere.labels import ShotAppearance, labels, requires
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
@@ -49,7 +49,7 @@ class Models:
     def _keeps_looks(self) -> bool:
         """Return whether a label of the data set needs what models look like."""
         asked = {name for part in self.record.parts for name in part.recipe.get("annotations", ())}
-        return any(labels()[name].needs.looks for name in asked if name in labels())
+        return any(requires(labels()[name].needs, ShotAppearance) for name in asked if name in labels())
 
     def make(self, spec: ModelSpec, steps: Iterable[TimeStep] = (), credit: Credit | None = None, trusted: bool = True) -> None:
         """Normalise a model, at these time steps if it deforms, and export it into the store, or see that the one there is the

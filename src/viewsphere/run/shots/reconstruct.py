@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
-from viewsphere.labels import LabelContext, Needs, Placement, labels
+from viewsphere.labels import FollowedPoints, LabelContext, LidarScan, Need, Placement, labels, requires
 from viewsphere.model.model_spec import ModelSpec, step_key
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4
@@ -24,7 +24,7 @@ from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Dataset, ModelInfo, Row
 from viewsphere.truth.raster.geometry import Geometry, build_geometry, present
 from viewsphere.truth.raster.visibility import rasterize
-from viewsphere.truth.shot_views import SampleViews, ShotViews, views_of
+from viewsphere.truth.shot_views import NeighbourViews, ShotViews, views_of
 
 MODELS = 200
 """Exported models that are kept in memory."""
@@ -61,13 +61,13 @@ class ViewReconstructor:
         It is None where scenery has changed. `continued`: labels may compare it with instants of the shots before and after.
         """
         known = labels()
-        needs = tuple(dict.fromkeys(known[name].needs for name in (*names, *asked) if name in known))
+        needs = tuple(dict.fromkeys(need for name in (*names, *asked) if name in known for need in known[name].needs))
         key = sample.index, tuple(asked), continued, needs
         if self._last is None or self._last[0] != key:
             self._last = key, self._seen(sample, needs, tuple(asked), continued)
         return self._last[1]
 
-    def _seen(self, sample: Sample, needs: Sequence[Needs], asked: tuple[str, ...], continued: bool) -> LabelContext | None:
+    def _seen(self, sample: Sample, needs: Sequence[Need[Any]], asked: tuple[str, ...], continued: bool) -> LabelContext | None:
         key = self._scenery.key_of(sample.index)
         made = self._continued(key) if continued else self._made(key)
         assert made is not None
@@ -80,7 +80,8 @@ class ViewReconstructor:
         placed = tuple(self._placement(by_id.get(i + 1), sample, shot) for i in range(geometry.object_count))
         visibility = rasterize(geometry, camera, keeps_exact=True)
         annotations = tuple(dict.fromkeys((*shot.annotations, *asked)))
-        views = self._compared(key, sample, shot, around, (*needs, *(labels()[name].needs for name in shot.annotations)))
+        kept = (need for name in shot.annotations for need in labels()[name].needs)
+        views = self._compared(key, sample, shot, around, (*needs, *kept))
         return LabelContext(geometry, camera, visibility, placed, views, annotations, shot.labels)
 
     def _made(self, key: str) -> _Made | None:
@@ -137,14 +138,14 @@ class ViewReconstructor:
         return self._geometry[1]
 
     def _compared(
-        self, key: str, sample: Sample, shot: Shot, around: SceneryRecord, needs: Sequence[Needs]
-    ) -> SampleViews | None:
+        self, key: str, sample: Sample, shot: Shot, around: SceneryRecord, needs: tuple[Need[Any], ...]
+    ) -> NeighbourViews | None:
         """Return the views that labels of motion and stereo compare a sample with; None without any, and where scenery has
         changed.
 
         Points are picked here, before any label requests triangles, which would overwrite them.
         """
-        if not any(need.is_some for need in needs):
+        if not needs:
             return None
         keys = {o.id: o.track or o.key for o in sample.objects}
         known = key, len(shot.instants)  # with neighbours or without; shots of merged data sets may share the key they had
@@ -153,9 +154,9 @@ class ViewReconstructor:
             self._views = known, self._shot_views(shot, around)
         self._keys.update(keys)
         views, (instant, sensor) = self._views[1], self._scenery.taken(sample, shot)
-        if views and any(need.tracks for need in needs):
+        if views and requires(needs, FollowedPoints):
             views.followed(sensor)
-        return views and views.around(instant, sensor)
+        return views and views.neighbours(instant, sensor)
 
     def _shot_views(self, shot: Shot, around: SceneryRecord) -> ShotViews | None:
         """The views of a shot whose things stand where the shot says, in the exported models."""
@@ -178,7 +179,8 @@ class ViewReconstructor:
 
     def _read(self, key: str) -> Mesh:
         info = self._models[key]
-        whole = "lidar" in self._dataset.plan.channels  # its intensity follows from colours, too
+        kept = (labels().get(name) for name in self._dataset.plan.channels)
+        whole = any(requires(label.needs, LidarScan) for label in kept if label)  # whose intensity follows from colours
         return read_exported(self._dataset.path(info.glb), info.parts, info.node, whole=whole)
 
 

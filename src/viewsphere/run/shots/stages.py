@@ -19,7 +19,7 @@ from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
 from viewsphere.geometry.box import box_size, box_vertices
-from viewsphere.labels import annotated, context_of, labels, observe, sample_values
+from viewsphere.labels import FollowedPoints, annotated, context_of, labels, observe, requires, sample_values
 from viewsphere.model.channel import PASSES
 from viewsphere.model.metadata import ModelMetadata
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
@@ -200,15 +200,15 @@ def render_sample(
     _arrange(views, instant, sensor, [*names, *shot.annotations])
     view, geometry = views.view(instant, sensor), stage.at(instant)
     now, camera, labelled, visibility = shot.instants[instant], view.camera, view.geometry, view.visibility
-    around = views.around(instant, sensor)
-    observed = observe(labelled, camera, visibility, names, around, shot.labels)
+    neighbours = views.neighbours(instant, sensor)
+    observed = observe(labelled, camera, visibility, names, neighbours, shot.labels)
     passes = [name for name in PASSES if name in kept]
     if passes:
         painted = visibility if labelled is geometry else with_ground(geometry, camera, visibility)
         observed |= stage.paint(instant, sensor, painted, passes)
     steps = [thing.motion.step_at(instant) for thing in shot.objects]
     files = [model_files(p.model.key, step and step.frame)[0] for p, step in zip(shot.objects, steps, strict=True)]
-    context = context_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, around, metadata)
+    context = context_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, neighbours, metadata)
     objects = annotated(context)
     return Sample(
         index=number,
@@ -235,10 +235,10 @@ def _arrange(views: ShotViews, instant: int, sensor: int, names: Sequence[str]) 
 
     Before that the points that the sensor follows are picked: at so many instants that these triangles would be written over.
     """
-    needs = [labels()[name].needs for name in names]
-    if any(need.tracks for need in needs):
+    known = [labels()[name] for name in names]
+    if any(requires(label.needs, FollowedPoints) for label in known):
         views.followed(sensor)
-    offsets = sorted({0, *(offset for need in needs for offset in need.instants)})
+    offsets = sorted({0, *(offset for label in known for offset in label.view_offsets)})
     compared = [other for other in (views.shot.instant_after(instant, offset) for offset in offsets) if other is not None]
     views.keep(compared)
     for other in compared:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.appearance.description import words
 from viewsphere.geometry.box import Bounds
 from viewsphere.labels.shared.captions.english import noun_of, noun_phrase
+from viewsphere.labels.shared.needs import ShotAppearance
 from viewsphere.labels.shared.placement import ModelFacts
 from viewsphere.model.sample import ObjectAnnotation
 
@@ -65,10 +66,11 @@ def words_of(context: LabelContext) -> Mapping[int, Words]:
     """For each id the words for what the object looks like, as the shot paints it."""
 
     def all_words() -> Mapping[int, Words]:
-        if context.around is None:
+        scenery = context.get(ShotAppearance())
+        if scenery is None:
             raise ValueError("expected a sample of a shot, whose materials are known; found none")
         found = dict[int, Words]()
-        for thing in context.around.shot.objects:
+        for thing in scenery.shot.objects:
             place = context.placements[thing.id - 1]
             looks = place and place.facts.looks
             color, material = words(looks, thing.repaints) if looks else (None, None)
