@@ -7,6 +7,7 @@ import json
 
 import numpy as np
 
+from scratch import scratch_cache
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.sandbox.client import READ_HERE
@@ -56,7 +57,7 @@ def let_walk(monkeypatch, folder) -> None:
     monkeypatch.setattr(Blenders, "timeline", timeline)
     monkeypatch.setattr("viewsphere.assets.load.load_frames", load_frames)
     monkeypatch.setenv(READ_HERE, "1")
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(folder / "cache"))
+    scratch_cache(monkeypatch, folder / "cache")
 
 
 def leaf(path, clips: dict[str, float]) -> None:

@@ -19,6 +19,7 @@ from PIL import Image
 
 from deadline import DEADLINE
 from installed import example, installed, write_package
+from scratch import scratch_cache
 from sealing import seal_again
 from sequence_recipe import eventful_recipe
 from small import small_recipe, tree_hash
@@ -258,7 +259,7 @@ def zoo_modules(monkeypatch, tmp_path):
         (folder / f"{name}.py").write_text(next(code for code in EXAMPLES.values() if code.startswith(f'"""{begins}')))
         whole = importlib.import_module(package)
         monkeypatch.setattr(whole, "__path__", [*whole.__path__, str(folder)])
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    scratch_cache(monkeypatch, tmp_path / "cache")
     yield
     for package, (name, _) in ZOO.items():
         sys.modules.pop(f"{package}.{name}", None)
@@ -458,7 +459,7 @@ def tri(install, monkeypatch, tmp_path):
     """Installs the page's reader; returns a function that writes a model file. Files are read in processes of their own."""
     install("readers", "tri", EXAMPLES["Triangles as text"])
     monkeypatch.delenv(READ_HERE)
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    scratch_cache(monkeypatch, tmp_path / "cache")
 
     def write(name: str, text: str = TETRAHEDRON) -> Path:
         file = tmp_path / "models" / name

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from animated import leaf
+from scratch import scratch_cache
 from shots import camera_of
 from viewsphere import Dataset, Recipe, generate, plan
 from viewsphere.assets import cache as model_cache
@@ -166,7 +167,7 @@ def timeline(path):
 
 @pytest.fixture
 def own_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    scratch_cache(monkeypatch, tmp_path / "cache")
 
 
 def usd(path, moves="", **named):

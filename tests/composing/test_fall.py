@@ -8,6 +8,7 @@ import pytest
 import trimesh
 
 from resting import deepest, one_more_second, placed, shape_of, solids, spec
+from scratch import scratch_cache
 from small import small_recipe, tree_hash
 from viewsphere import plugins
 from viewsphere.composing.physics import Board
@@ -165,7 +166,7 @@ def test_what_is_simulated_is_kept_and_the_first_counts(tmp_path):
 @pytest.mark.slow
 def test_things_fall_into_what_is_concave_where_parts_collide(tmp_path, monkeypatch):
     """Into a trough that stands there: its hull would close it."""
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
+    scratch_cache(monkeypatch, tmp_path)
     whole = trimesh.util.concatenate(
         [trimesh.creation.box((w, n, h), trimesh.transformations.translation_matrix(at)) for at, (w, n, h) in SIDES]
     )

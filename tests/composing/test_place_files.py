@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from place_files import RAMP, YARD, write_marked, write_place
+from scratch import scratch_cache
 from viewsphere.assets.cache import load
 from viewsphere.assets.normalise import rotation
 from viewsphere.composing.scene.scenery import free_floor, is_indoors, place_lanes, place_pieces, place_surfaces
@@ -22,7 +23,7 @@ UPS = [a + b for a in "+-" for b in "xyz"]
 @pytest.fixture(autouse=True)
 def read_here(monkeypatch, tmp_path):
     monkeypatch.setenv("VIEWSPHERE_READ_HERE", "1")
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    scratch_cache(monkeypatch, tmp_path / "cache")
 
 
 def box_of(spec, step=None):

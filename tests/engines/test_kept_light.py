@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from scratch import scratch_cache
 from viewsphere.caches import cache_of
 from viewsphere.engines.raster import kept_light
 from viewsphere.engines.raster.baking import _floor
@@ -31,7 +32,7 @@ def test_grounds_with_pictures_of_one_mean_differ(tmp_path):
 
 @pytest.fixture
 def lit(tmp_path, monkeypatch):
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
+    scratch_cache(monkeypatch, tmp_path)
     made = []
 
     def make():

@@ -14,6 +14,7 @@ from changed_samples import with_channels
 
 from proven import close, equal
 from rigged import person, write_gltf
+from scratch import scratch_cache
 from small import tree_hash
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.assets.load import load_model
@@ -86,7 +87,7 @@ def let_walk(monkeypatch, folder, names):
     monkeypatch.setattr(Blenders, "timeline", lambda *_, **__: Timeline(1, 12, 10.0, True))
     monkeypatch.setattr("viewsphere.assets.load.load_frames", load_frames)
     monkeypatch.setenv(READ_HERE, "1")
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(folder / "cache"))
+    scratch_cache(monkeypatch, folder / "cache")
 
 
 @pytest.fixture

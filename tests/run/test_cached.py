@@ -2,6 +2,7 @@
 
 import pytest
 
+from scratch import scratch_cache
 from small import small_recipe, tree_hash
 from viewsphere.caches import budget
 from viewsphere.engines.raster.indirect import bounces
@@ -40,7 +41,7 @@ def rendered(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_the_cache_changes_no_byte(rendered, tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(kernel_folder()))
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    scratch_cache(monkeypatch, tmp_path / "cache")
     cold, times = rendered("cold")
     assert times >= 1  # one more where kernels are compiled first, for which a tiny scene is baked
     kinds = {entry.kind for entry in budget.entries()}

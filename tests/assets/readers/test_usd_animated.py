@@ -2,6 +2,7 @@
 
 import pytest
 
+from scratch import scratch_cache
 from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.assets.timeline import Blenders, animation_of
 from viewsphere.errors import ModelError
@@ -44,7 +45,7 @@ MOVES = {
 
 @pytest.fixture(autouse=True)
 def _no_blender(monkeypatch, tmp_path):
-    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    scratch_cache(monkeypatch, tmp_path / "cache")
     monkeypatch.setattr(Blenders, "told", lambda *_: pytest.fail("Blender was asked"))
 
 
