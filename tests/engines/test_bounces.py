@@ -192,8 +192,8 @@ def test_a_bulb_that_few_rays_hit_lights_all_walls_evenly(monkeypatch):
     monkeypatch.setattr(volumes, "RAYS", 64)
     radius, radiance = 0.02, 3000.0
     bulb = replace(ball(radius, (0, 0, 0), 16), materials=(matt(0.0, radiance),))
-    hall = painted_mesh((inside_out(box((-1.5, -1.2, -1), (1.5, 1.2, 1))), matt(0.0)))
-    stage = stage_of(bulb, Scene(sun=None, sky=DARK), both(hall, bulb))
+    bounce_scene = painted_mesh((inside_out(box((-1.5, -1.2, -1), (1.5, 1.2, 1))), matt(0.0)))
+    stage = stage_of(bulb, Scene(sun=None, sky=DARK), both(bounce_scene, bulb))
     places, normals = walls((-1.5, -1.2, -1), (1.5, 1.2, 1), 8)
     places, normals = places.reshape(-1, 3), normals.reshape(-1, 3)
     distance = np.linalg.norm(places, axis=1)

@@ -48,7 +48,7 @@ def near_of(stage, view: Camera) -> np.ndarray:
     triangle, depth = seen.triangle.reshape(-1), seen.inverse_depth.reshape(-1)
     baked.rows.write_seen(view, seen, baked.geometry)
     slots = np.flatnonzero(triangle >= 0).astype(np.int32)
-    found = with_near(baked.bounces, baked.hall, baked.tree, view_of(baked, view), slots, triangle, depth)
+    found = with_near(baked.bounces, baked.bounce_scene, baked.tree, view_of(baked, view), slots, triangle, depth)
     return found.near.reshape(view.height, view.width, 4)
 
 

@@ -27,7 +27,7 @@ def coarse(monkeypatch):
     monkeypatch.setattr(volumes, "CELL", 0.4)
 
 
-def hall(roughness: float):
+def bounce_scene(roughness: float):
     """A dark room with a floor of this roughness, and an upright red plate above it."""
     floor = flat(quad((0, 0, 0.01), (4, 0, 0), (0, 3, 0)), Material("floor", (0.02, 0.02, 0.02, 1.0), roughness=roughness))
     small = flat(quad((1.4, 2.2, 0.3), (1.2, 0, 0), (0, 0, 0.6)), SIGN)
@@ -35,7 +35,7 @@ def hall(roughness: float):
 
 
 def light(how: str, roughness: float, is_mirrored: bool):
-    small, place = hall(roughness)
+    small, place = bounce_scene(roughness)
     stage = stage_of(small, Scene(sun=None, sky=DARK), place, bounces=how)
     seen, radiance = rasterize(stage.at(0), VIEW), np.zeros((VIEW.width * VIEW.height, 4), np.float32)
 
@@ -76,7 +76,7 @@ def test_matt_floors_and_pictures_without_bounces_stay_as_they_are():
 
 
 def test_a_camera_below_sees_no_mirror_and_labels_do_not_change():
-    small, place = hall(0.1)
+    small, place = bounce_scene(0.1)
     stage = stage_of(small, Scene(sun=None, sky=DARK), place)
     low = camera(32, 24, 20, 0, -30, 2.0, (2.0, 1.4, 0.4))
     seen = rasterize(stage.at(0), low)

@@ -147,10 +147,10 @@ def test_without_scenery_there_are_no_wide_maps():
 
 def test_no_corner_of_a_place_is_beyond_its_shadow_map():
     """A sun that looks along a diagonal sees corners far from the middle of its map: what lies in a closed hall stays dark."""
-    hall = mesh_of(box((-8, -8, -0.2), (8, 8, 4)))
+    bounce_scene = mesh_of(box((-8, -8, -0.2), (8, 8, 4)))
     sun = Sun(azimuth=45, elevation=30, strength=3.0)
     small = mesh_of(box((0, 0, 0), (0.3, 0.3, 0.3)))
-    baked = stage_of(small, [(hall, moved(0, 0))], Scene(sun=sun, sky=DARK)).baked(0)
+    baked = stage_of(small, [(bounce_scene, moved(0, 0))], Scene(sun=sun, sky=DARK)).baked(0)
     x, y = np.meshgrid(np.linspace(-7.4, 7.4, 40), np.linspace(-7.4, 7.4, 40))
     places = (np.stack([x, y, np.full_like(x, 0.01)], axis=-1).reshape(-1, 3) - baked.origin) / baked.unit
     _, share = arriving(baked.lights, 0, places, 0.4 / baked.unit)

@@ -29,7 +29,7 @@ def rendered(tmp_path, monkeypatch):
     monkeypatch.setattr(bounces, "_baked", lambda lighting: baked.append(1) or bake(lighting))
 
     def render(name):
-        for kept in (bounces._bake, bounces._look, bounces.tree_of_hall):
+        for kept in (bounces._bake, bounces._look, bounces.tree_of_scene):
             kept.cache_clear()
         baked.clear()
         generate(small_recipe(**ROOM), tmp_path / name, workers=0)

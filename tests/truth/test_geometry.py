@@ -183,7 +183,7 @@ def test_which_triangles_need_the_test_at_all():
     for material, expected in cases:
         geometry = placed(card(material, image), label_alpha=0.5)
         assert geometry.triangle_cutout.tolist() == [expected] * 2, material
-        assert len(geometry.cutouts.texels) == 0
+        assert len(geometry.alpha_masks.texels) == 0
         assert seen_head_on(card(material, image)).all() == (expected == SURFACE)
 
 
@@ -222,9 +222,9 @@ def test_cutouts_of_a_mesh_that_many_things_show_are_held_once():
     image, _ = grid(np.random.default_rng(3), 8, 8)
     one = card(material, image)
     alike, copies = placed(*[one] * 5, cube(0.1)), placed(*[card(material, image) for _ in range(5)], cube(0.1))
-    assert len(copies.cutouts.texels) == 5 * len(alike.cutouts.texels) == 5 * 64
-    assert len(copies.cutouts.corners) == 5 * len(alike.cutouts.corners)
-    assert len(alike.cutouts.layout) == len(alike.cutouts.levels) == 1
+    assert len(copies.alpha_masks.texels) == 5 * len(alike.alpha_masks.texels) == 5 * 64
+    assert len(copies.alpha_masks.corners) == 5 * len(alike.alpha_masks.corners)
+    assert len(alike.alpha_masks.layout) == len(alike.alpha_masks.levels) == 1
     camera = orbit_camera(lens(64, 64, fx=64, fy=64), distance=2.0)
     for object_id in (None, 1, 3, 5):
         seen = [rasterize(geometry, camera, object_id=object_id) for geometry in (alike, copies)]

@@ -16,7 +16,7 @@ from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.raster.geometry import Geometry, build_geometry, present
 from viewsphere.truth.raster.visibility import rasterize
 
-UNLIKE = ("cutouts", "meshes", "labels", "facing", "spare")
+UNLIKE = ("alpha_masks", "meshes", "labels", "facing", "spare")
 HELD = [field.name for field in dataclasses.fields(Geometry) if field.name not in UNLIKE]
 OF_LABELS = [f"triangle_{name}" for name in ("part", "category", "class", "material", "body_part")]
 ARRAYS = [*HELD, *OF_LABELS, "vertices", "normals", "triangle_normals", "triangle_side", "triangle_tops"]
@@ -53,7 +53,7 @@ def same(geometry, things, meshes, ground, floor):
             assert own.dtype == other.dtype and own.tobytes() == other.tobytes(), name
         else:
             assert own == other, name
-    for own, other in zip(geometry.cutouts.arrays, built.cutouts.arrays, strict=True):
+    for own, other in zip(geometry.alpha_masks.arrays, built.alpha_masks.arrays, strict=True):
         assert np.array_equal(own, other)
 
 

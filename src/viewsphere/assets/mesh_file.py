@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import TEXTURE_FIELDS, FileFacts
-from viewsphere.assets.scene_annotations import Mark
+from viewsphere.assets.scene_annotations import Annotation
 from viewsphere.caches.arrays import Content, read_arrays, write_arrays
 from viewsphere.model.keypoints import Keypoints
 
@@ -70,7 +70,7 @@ def unpacked(content: Content, source: Path) -> tuple[Mesh, FileFacts]:
         warnings=tuple(header["warnings"]),
     )
     points = None if header["keypoints"] is None else Keypoints.model_validate(header["keypoints"])
-    marks = tuple(Mark(**{name: _tupled(value) for name, value in mark.items()}) for mark in header["marks"])
+    marks = tuple(Annotation(**{name: _tupled(value) for name, value in mark.items()}) for mark in header["marks"])
     told = {name: _tupled(value) for name, value in header["facts"].items()}
     return mesh, FileFacts(source, **told, keypoints=points, marks=marks)
 

@@ -13,7 +13,7 @@ from viewsphere.assets.appearance.unseen import is_unseen
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.readers.shared.coordinates import check_coordinates
-from viewsphere.assets.scene_annotations import Mark
+from viewsphere.assets.scene_annotations import Annotation
 from viewsphere.assets.skin import joined
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import Axis
@@ -52,7 +52,7 @@ class FileFacts:
     size: tuple[float, float, float] = (0.0, 0.0, 0.0)
     files: tuple[Path, ...] = ()
     keypoints: Keypoints | None = None
-    marks: tuple[Mark, ...] = ()
+    marks: tuple[Annotation, ...] = ()
     object_from_file: Matrix4 = IDENTITY
 
 

@@ -23,7 +23,7 @@ Edge = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Mark:
+class Annotation:
     """An object that says what it is. `part`: the mesh's part that it is, empty where it has no triangles. `points`: of a lane,
     in the file's coordinates, in the direction of travel. `width`: metres, None where it says none. `problem`: why it cannot
     be what it says; empty for none.
@@ -77,7 +77,7 @@ def naturally(name: str) -> tuple[Any, ...]:
     return tuple((not t.isdecimal(), int(t) if t.isdecimal() else 0, t) for t in re.split(r"(\d+)", name.lower()) if t)
 
 
-def mark_of(marker: Marker) -> Mark | None:
+def annotation_of(marker: Marker) -> Annotation | None:
     """Return the annotation of an object; None without one. A name alone makes an object a floor or surface only where it has
     triangles, which the mesh's parts show. It makes a lane only of a line, or of an object without triangles.
     """
@@ -92,15 +92,15 @@ def mark_of(marker: Marker) -> Mark | None:
     problem = "expected a mesh of faces; found none" if lacks else ""
     if kind not in KINDS:
         problem = f"expected one of {', '.join(KINDS)} as its property {PROPERTY!r}; found {kind!r}"
-    return Mark(kind, marker.name, marker.part, problem=problem)
+    return Annotation(kind, marker.name, marker.part, problem=problem)
 
 
-def _lane(marker: Marker, is_said: bool) -> Mark | None:
+def _lane(marker: Marker, is_said: bool) -> Annotation | None:
     if not marker.points and (marker.part or (marker.is_group and not marker.children)):
         if not is_said:
             return None  # a road that is called so, or a group of things
         found = "faces" if marker.part else "an object without either"
-        return Mark(LANE, marker.name, problem=f"expected a line, or empties below it; found {found}")
+        return Annotation(LANE, marker.name, problem=f"expected a line, or empties below it; found {found}")
     if not is_said and not marker.points and not marker.children:
         return None  # a lamp or a camera that is called so
     closed, problem = marker.said.get("closed", False) in (True, 1), ""
@@ -117,7 +117,7 @@ def _lane(marker: Marker, is_said: bool) -> Mark | None:
     if width is not None and not (isinstance(width, (int, float)) and 0 < width < 1e6):
         problem = problem or f"expected its width as metres above 0; found {width!r}"
         width = None
-    return Mark(LANE, marker.name, "", points, None if width is None else float(width), closed, problem)
+    return Annotation(LANE, marker.name, "", points, None if width is None else float(width), closed, problem)
 
 
 def chained(points: Sequence[Point], edges: Sequence[Edge]) -> tuple[tuple[Point, ...], bool, str]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.paths.inside import split_source
-from viewsphere.assets.scene_annotations import FLOOR, INDOORS, LANE, SURFACE, Mark, kind_of, naturally, own_name
+from viewsphere.assets.scene_annotations import FLOOR, INDOORS, LANE, SURFACE, Annotation, kind_of, naturally, own_name
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.hull import convex_hull, smallest_rectangle
@@ -133,7 +133,7 @@ def told(mesh: Mesh, facts: FileFacts) -> list[dict[str, Any]]:
     found = [_lane(mark, facts) for mark in facts.marks if not mark.part]
     for number, part in enumerate(mesh.parts):
         name = part.rpartition("/")[2]
-        mark = said.get(part) or Mark(kind_of(name), name)
+        mark = said.get(part) or Annotation(kind_of(name), name)
         if mark.kind in (FLOOR, SURFACE):
             corners = np.unique(mesh.triangles[mesh.triangle_part == number])
             found += _level(mark, mesh.vertices[corners].astype(np.float64), part in said)
@@ -142,7 +142,7 @@ def told(mesh: Mesh, facts: FileFacts) -> list[dict[str, Any]]:
     return found
 
 
-def _lane(mark: Mark, facts: FileFacts) -> dict[str, Any]:
+def _lane(mark: Annotation, facts: FileFacts) -> dict[str, Any]:
     points = transform(facts.object_from_file, mark.points).tolist() if mark.points else []
     return {
         "kind": mark.kind,
@@ -154,7 +154,7 @@ def _lane(mark: Mark, facts: FileFacts) -> dict[str, Any]:
     }
 
 
-def _level(mark: Mark, points: Float, is_said: bool) -> Iterator[dict[str, Any]]:
+def _level(mark: Annotation, points: Float, is_said: bool) -> Iterator[dict[str, Any]]:
     """The rectangle of a floor or of a surface; nothing of what is higher than wide, as a floor lamp is, by its name alone."""
     top, low = float(points[:, 2].max()), float(points[:, 2].min())
     whole, face = _around(points), points

@@ -85,8 +85,8 @@ class PatchLight(NamedTuple):
     """The light that patches send.
 
     keys (S,) uint64, patch (S,) int32: their table, see `kernels_probes.patch`. light (M, 3): the radiance of each patch, -1
-    for lanterns, whose light arrives through the probes. frame (7,): the box of the probes, and the number of patches in a
-    length. materials (T,): of the triangles that rays meet, numbered as when the table was made.
+    for emissive triangles, whose light arrives through the probes. frame (7,): the box of the probes, and the number of patches
+    in a length. materials (T,): of the triangles that rays meet, numbered as when the table was made.
     """
 
     keys: NDArray[np.uint64]

@@ -16,7 +16,7 @@ from viewsphere.engines._passes import shading_of
 from viewsphere.engines.raster.antialiasing.supersampling import paint_finely
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
 from viewsphere.engines.raster.blurring import Blur
-from viewsphere.engines.raster.indirect.bounce_scene import Halls
+from viewsphere.engines.raster.indirect.bounce_scene import BounceScenes
 from viewsphere.engines.raster.materials.surface import Lengths
 from viewsphere.engines.raster.options import Options, parse_options
 from viewsphere.engines.raster.records import Float32
@@ -48,7 +48,7 @@ class RasterStage:
     _packed: list[Packed] = field(default_factory=list[Packed])
     _baked: dict[tuple[Geometry, bool], Baked] = field(default_factory=dict[tuple[Geometry, bool], Baked])
     _shades: TargetShades = field(default_factory=TargetShades)
-    _halls: Halls = field(default_factory=Halls)
+    _halls: BounceScenes = field(default_factory=BounceScenes)
     _canvases: dict[int, Float32] = field(default_factory=dict[int, Float32])
 
     @property

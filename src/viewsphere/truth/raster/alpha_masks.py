@@ -19,7 +19,7 @@ _BORDERS: dict[Wrap, Literal["wrap", "symmetric", "edge"]] = {"repeat": "wrap", 
 
 
 @dataclass(frozen=True, eq=False)
-class Cutouts:
+class AlphaMasks:
     """The cut-out materials of a stage and the triangles that use them, packed for the kernels.
 
     A point is surface where `texel / 255 * factor * a >= threshold`: the nearest texel at its (u, v) and the interpolated
@@ -41,7 +41,7 @@ class Cutouts:
         return self.texels, self.layout, self.levels, self.material, self.corners
 
 
-NO_CUTOUTS = Cutouts(
+NO_CUTOUTS = AlphaMasks(
     np.zeros(0, np.uint8),
     np.zeros((0, 5), np.int64),
     np.zeros((0, 2), np.float64),
@@ -50,13 +50,13 @@ NO_CUTOUTS = Cutouts(
 )
 
 
-def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[Cutouts, NDArray[np.int32]]:
+def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[AlphaMasks, NDArray[np.int32]]:
     """The mesh's cut-outs and, for each triangle (T,), SURFACE, NEVER or its row of `corners`.
 
     Without `label_alpha`, a BLEND material is surface wherever it has a colour, and one texel beyond, which filtering colours.
     """
     rows = np.full(len(mesh.triangles), SURFACE, np.int32)
-    cutouts = NO_CUTOUTS
+    alpha_masks = NO_CUTOUTS
     for index, material in enumerate(mesh.materials):
         chosen = np.flatnonzero(mesh.triangle_material == index)
         if len(chosen) == 0 or material.alpha_mode == "OPAQUE" or material.transmission > 0:
@@ -69,23 +69,23 @@ def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[Cutouts, NDArra
         mixed = (lowest * alpha.min(axis=1) < threshold) & (highest * alpha.max(axis=1) >= threshold)
         rows[chosen[highest * alpha.max(axis=1) < threshold]] = NEVER
         if mixed.any():
-            rows[chosen[mixed]] = len(cutouts.corners) + np.arange(mixed.sum())
-            kept = Cutouts(own.texels, own.layout, own.levels, own.material[mixed], own.corners[mixed])
-            cutouts = _joined([cutouts, kept])
-    return cutouts, rows
+            rows[chosen[mixed]] = len(alpha_masks.corners) + np.arange(mixed.sum())
+            kept = AlphaMasks(own.texels, own.layout, own.levels, own.material[mixed], own.corners[mixed])
+            alpha_masks = _joined([alpha_masks, kept])
+    return alpha_masks, rows
 
 
-def cutouts_of(meshes: Sequence[Mesh], label_alpha: float | None) -> list[tuple[Cutouts, NDArray[np.int32]]]:
+def alpha_masks_of(meshes: Sequence[Mesh], label_alpha: float | None) -> list[tuple[AlphaMasks, NDArray[np.int32]]]:
     """`mesh_cutouts` of each mesh; a mesh that several things show is looked at once."""
     known = {id(mesh): mesh_cutouts(mesh, label_alpha) for mesh in {id(mesh): mesh for mesh in meshes}.values()}
     return [known[id(mesh)] for mesh in meshes]
 
 
-def stack_cutouts(parts: Sequence[tuple[Cutouts, NDArray[np.int32]]]) -> tuple[Cutouts, NDArray[np.int32]]:
+def stack_cutouts(parts: Sequence[tuple[AlphaMasks, NDArray[np.int32]]]) -> tuple[AlphaMasks, NDArray[np.int32]]:
     """The cut-outs of all meshes as one, and for each triangle (T,) SURFACE, NEVER or its row of `corners` there. Cut-outs that
     occur again, as those of a mesh that several things show, are there once.
     """
-    firsts, distinct, count = dict[int, int](), list[Cutouts](), 0
+    firsts, distinct, count = dict[int, int](), list[AlphaMasks](), 0
     rows = [np.zeros(0, np.int32)]
     for own, own_rows in parts:
         if id(own) not in firsts:
@@ -97,13 +97,13 @@ def stack_cutouts(parts: Sequence[tuple[Cutouts, NDArray[np.int32]]]) -> tuple[C
     return _joined(distinct), np.concatenate(rows)
 
 
-def _joined(parts: Sequence[Cutouts]) -> Cutouts:
+def _joined(parts: Sequence[AlphaMasks]) -> AlphaMasks:
     """One after another; all offsets and numbers are those of the whole."""
     texels = np.cumsum([0, *(len(part.texels) for part in parts)]).tolist()
     layouts = np.cumsum([0, *(len(part.layout) for part in parts)]).tolist()
     placed = [part.layout + np.array([first, 0, 0, 0, 0]) for part, first in zip(parts, texels, strict=False)]
     numbered = [part.material + np.int32(first) for part, first in zip(parts, layouts, strict=False)]
-    return Cutouts(
+    return AlphaMasks(
         np.concatenate([NO_CUTOUTS.texels, *(part.texels for part in parts)]),
         np.concatenate([NO_CUTOUTS.layout, *placed]),
         np.concatenate([NO_CUTOUTS.levels, *(part.levels for part in parts)]),
@@ -112,7 +112,9 @@ def _joined(parts: Sequence[Cutouts]) -> Cutouts:
     )
 
 
-def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], threshold: float, is_spread: bool) -> Cutouts:
+def _material_cutouts(
+    mesh: Mesh, material: Material, chosen: NDArray[np.intp], threshold: float, is_spread: bool
+) -> AlphaMasks:
     texture = material.base_color_texture
     uv = None if texture is None else (mesh.uv0, mesh.uv1)[texture.texcoord]
     corners = np.zeros((len(chosen), 3, 3))
@@ -124,7 +126,7 @@ def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], 
         texels = mesh.images[texture.image].pixels[:, :, 3]
         texels = _spread(texels, texture) if is_spread and not texture.nearest else texels
         wraps = (WRAPS.index(texture.wrap_s), WRAPS.index(texture.wrap_t))
-    return Cutouts(
+    return AlphaMasks(
         np.ascontiguousarray(texels).reshape(-1),
         np.array([[0, texels.shape[1], texels.shape[0], *wraps]], np.int64),
         np.array([[material.base_color[3], threshold]]),

@@ -14,7 +14,7 @@ from viewsphere.assets.deforming import Load
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing
-from viewsphere.truth.raster.alpha_masks import ENDLESS, NEVER, NO_CUTOUTS, Cutouts, cutouts_of, stack_cutouts
+from viewsphere.truth.raster.alpha_masks import ENDLESS, NEVER, NO_CUTOUTS, AlphaMasks, alpha_masks_of, stack_cutouts
 from viewsphere.truth.raster.sparse import Spare
 from viewsphere.truth.raster.triangle_labels import TriangleLabels, ground_classes, scenery_classes
 
@@ -45,7 +45,7 @@ class Geometry:
     triangles (T, 3) int32; triangle_object (T,) int32: 0 for scenery and ground; single_sided (n,) int32: the triangles that a
     camera sees from their fronts alone, see `seen_from`; labels: further numbers of triangles, of the objects' alone, which
     come first, all others have 0, but for classes of things and stuff; triangle_cutout (T,) int32: -1 all surface, -2 never
-    seen, -3 and -4 `alpha_masks.ENDLESS`, else a row of `Cutouts.corners`.
+    seen, -3 and -4 `alpha_masks.ENDLESS`, else a row of `AlphaMasks.corners`.
 
     is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
     the highest of its used vertices, infinite where it has none.
@@ -64,7 +64,7 @@ class Geometry:
     triangles: NDArray[np.int32]
     triangle_object: NDArray[np.int32]
     triangle_cutout: NDArray[np.int32]
-    cutouts: Cutouts
+    alpha_masks: AlphaMasks
     single_sided: NDArray[np.int32]
     is_used: NDArray[np.bool_]
     bounds: NDArray[np.float64]
@@ -356,15 +356,15 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
     if not any(material.alpha_mode == "BLEND" for mesh in meshes for material in mesh.materials):
         return geometry
     ground = geometry.triangle_cutout[geometry.triangle_start[-1] :]
-    cutouts, rows = stack_cutouts([*cutouts_of(meshes, None), (NO_CUTOUTS, ground)])
-    return replace(geometry, cutouts=cutouts, triangle_cutout=rows)
+    alpha_masks, rows = stack_cutouts([*alpha_masks_of(meshes, None), (NO_CUTOUTS, ground)])
+    return replace(geometry, alpha_masks=alpha_masks, triangle_cutout=rows)
 
 
 def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
     vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
     triangle_start = (0, *accumulate(len(m.triangles) for m in meshes))
     objects = sum(p.id > 0 for p in things)
-    cutouts, rows = stack_cutouts(cutouts_of(meshes, label_alpha))
+    alpha_masks, rows = stack_cutouts(alpha_masks_of(meshes, label_alpha))
     part = Geometry(
         poses=np.array([thing.world_from_object for thing in things]).reshape(-1, 4, 4),
         meshes=meshes,
@@ -373,7 +373,7 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         triangles=_offset_triangles([mesh.triangles for mesh in meshes], vertex_start),
         triangle_object=np.repeat(np.array([thing.id for thing in things], np.int32), np.diff(triangle_start)),
         triangle_cutout=rows,
-        cutouts=cutouts,
+        alpha_masks=alpha_masks,
         single_sided=_offset([_single_sided(*pair) for pair in zip(things, meshes, strict=True)], triangle_start),
         is_used=_are_used(meshes),
         bounds=np.empty((len(things), 2, 3)),
@@ -399,13 +399,13 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
     """One after another; where the last is the ground, it stays that."""
     firsts = (0, *accumulate(len(part.coordinates) for part in parts))
     first_triangles = (0, *accumulate(len(part.triangles) for part in parts))
-    cutouts, rows = stack_cutouts([(part.cutouts, part.triangle_cutout) for part in parts])
+    alpha_masks, rows = stack_cutouts([(part.alpha_masks, part.triangle_cutout) for part in parts])
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in STACKED}
     return Geometry(
         **arrays,
         triangles=_offset_triangles([part.triangles for part in parts], firsts),
         triangle_cutout=rows,
-        cutouts=cutouts,
+        alpha_masks=alpha_masks,
         single_sided=_offset([part.single_sided for part in parts], first_triangles),
         vertex_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.vertex_start))),
         triangle_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.triangle_start))),
@@ -468,7 +468,7 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
         triangle_object=background,
         triangle_cutout=np.array(ENDLESS, np.int32),
-        cutouts=NO_CUTOUTS,
+        alpha_masks=NO_CUTOUTS,
         single_sided=none,
         is_used=np.ones(4, np.bool_),
         bounds=np.empty((0, 2, 3)),

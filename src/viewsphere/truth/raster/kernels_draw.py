@@ -22,7 +22,7 @@ BEHIND = -(1 << 30)
 ROUNDED_UP = 1.0 + 1e-9  # bounds the rounding of 1/z between a triangle's corners
 SLIVER = 1e-5  # twice the area in pixels below which the sign of a triangle's area is not trusted
 SMALL = 2 * FOUR  # pixels: up to this width testing every pixel is faster than computing spans
-NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py; values below NEVER stand for endless triangles
+NEVER, CLAMP, MIRROR = -2, 1, 2  # as in alpha_masks.py; values below NEVER stand for endless triangles
 ENDLESS_1 = -3  # of an endless triangle's edges only the one opposite corner 1 counts; else the one opposite corner 2
 HORIZON = 1e-10  # of 1/z's coefficients: a point nearer than this to a plane's horizon may be beyond it by rounding
 
@@ -60,9 +60,9 @@ def cells(q, samples, x0, y0, width, height, cell):
 
 
 @inner
-def is_surface(cutouts, row, b0, b1, b2):
-    """Return whether the point with these barycentrics of cut-out triangle `row` is surface; see `alpha_masks.Cutouts`."""
-    texels, layout, levels, material, corners = cutouts
+def is_surface(alpha_masks, row, b0, b1, b2):
+    """Return whether the point with these barycentrics of cut-out triangle `row` is surface; see `alpha_masks.AlphaMasks`."""
+    texels, layout, levels, material, corners = alpha_masks
     c = corners[row]
     m = layout[material[row]]
     i = _texel(b0 * c[0, 0] + b1 * c[1, 0] + b2 * c[2, 0], m[1], m[3])
@@ -127,7 +127,7 @@ def _inside(a, b, c, px, f0, f1, f2):
 
 
 @njit
-def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
+def draw(q, cell, triangles, span, canvas, cutout, alpha_masks, nearest, seen):
     """Draw triangles into nearest (1/z, 0 where none) and seen (triangle, -1 where none), both in C order.
 
     `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; `canvas` is the number of samples
@@ -160,7 +160,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
         w0, w1, w2 = q0[2], q1[2], q2[2]
         if cutout[ut] >= 0 or (not crossing and abs(det) < SLIVER * (w0 * w1 * w2)):
             bounds = (0.0, np.inf) if crossing else (1.0 / max(w0, w1, w2), 1.0 / min(w0, w1, w2))
-            _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout[ut], cutouts, nearest, seen)
+            _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout[ut], alpha_masks, nearest, seen)
             continue
         e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
         inverse = 1.0 / det
@@ -254,7 +254,7 @@ def crossing_at(e, samples):
 
 
 @inner
-def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, cutouts, nearest, seen):
+def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, alpha_masks, nearest, seen):
     """Draw a cut-out, or a sliver whose facing is uncertain: either sign will do, 1/z stays within the corners' `bounds`."""
     xa, ya, xb, yb = box
     samples, x0, y0 = canvas
@@ -269,13 +269,13 @@ def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, cutouts, nearest, 
             if not ((e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0) or (e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0)):
                 continue
             inverse = min(max((nx * px + (ny * py + nz)) / det, bounds[0]), bounds[1])
-            if inverse > nearest[y, x] * NEARER and hits_surface(cutouts, cutout, e0, e1, e2):
+            if inverse > nearest[y, x] * NEARER and hits_surface(alpha_masks, cutout, e0, e1, e2):
                 nearest[y, x] = inverse
                 seen[y, x] = t
 
 
 @inner
-def hits_surface(cutouts, cutout, e0, e1, e2):
+def hits_surface(alpha_masks, cutout, e0, e1, e2):
     """Return whether the triangle is surface where its edge functions have these values: everywhere without a cut-out."""
     total = e0 + e1 + e2
-    return cutout < 0 or (total != 0.0 and is_surface(cutouts, cutout, e0 / total, e1 / total, e2 / total))
+    return cutout < 0 or (total != 0.0 and is_surface(alpha_masks, cutout, e0 / total, e1 / total, e2 / total))

@@ -176,7 +176,7 @@ def _distance(a, b):
 
 
 @njit(_nrt=True)
-def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen):
+def draw(q, triangles, span, table, origin, unit, cutout, alpha_masks, nearest, seen):
     """Draw triangles into nearest (1/s, 0 where none) and seen (triangle, -1 where none).
 
     `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; q is in camera axes; `table` is
@@ -203,12 +203,12 @@ def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen
         sliver, bounds = (False, ANY_DEPTH) if endless else limits(q0, q1, q2, det, unit)
         n = (nx / det, ny / det, nz / det)
         if small:
-            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], cutouts, nearest, seen)
+            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], alpha_masks, nearest, seen)
             continue
         for i in range(touched(e0, e1, e2, sliver, levels, boxes, window, leaves)):
             x, y = leaves[i, 0], leaves[i, 1]
             box = (x, y, x + LEAF - 1, y + LEAF - 1)
-            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], cutouts, nearest, seen)
+            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], alpha_masks, nearest, seen)
 
 
 @njit(_nrt=True)
@@ -248,7 +248,7 @@ def touched(e0, e1, e2, sliver, levels, boxes, window, leaves):
 
 
 @inner
-def _draw_box(t, a, b, c, n, sliver, bounds, rays, box, origin, cutout, cutouts, nearest, seen):
+def _draw_box(t, a, b, c, n, sliver, bounds, rays, box, origin, cutout, alpha_masks, nearest, seen):
     """Test each ray of a box of pixels (both ends included), as far as the canvas reaches."""
     height, width = nearest.shape
     x0, y0 = origin
@@ -262,6 +262,6 @@ def _draw_box(t, a, b, c, n, sliver, bounds, rays, box, origin, cutout, cutouts,
             if inside or (sliver and e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0):
                 inverse = min(max(n[0] * dx + (n[1] * dy + n[2] * dz), bounds[0]), bounds[1])
                 i, j = x - x0, y - y0
-                if inverse > nearest[j, i] * NEARER and hits_surface(cutouts, cutout, e0, e1, e2):
+                if inverse > nearest[j, i] * NEARER and hits_surface(alpha_masks, cutout, e0, e1, e2):
                     nearest[j, i] = inverse
                     seen[j, i] = t

@@ -337,7 +337,7 @@ def _draw(
     nearest, seen = shown or (np.zeros((y1 - y0, x1 - x0)), np.full((y1 - y0, x1 - x0), -1, np.int32))
     first, last, base, stop = part
     span = (first, last, base)
-    cut = (seen_from(geometry, q, base).triangle_cutout, geometry.cutouts.arrays)
+    cut = (seen_from(geometry, q, base).triangle_cutout, geometry.alpha_masks.arrays)
     if camera.distortion is not None:
         canvas = _canvas(camera, window)
         t = _ray_table(camera.intrinsics.model_dump_json(), samples, canvas)

@@ -85,5 +85,5 @@ def _is_surface(view: View, triangles: NDArray[np.int64], weights: Float) -> NDA
     from viewsphere.truth.surface_points import kernels_attached as kernels
 
     out = np.empty(len(triangles), np.bool_)
-    kernels.on_surface(triangles, weights, view.geometry.triangle_cutout, view.geometry.cutouts.arrays, out)
+    kernels.on_surface(triangles, weights, view.geometry.triangle_cutout, view.geometry.alpha_masks.arrays, out)
     return out

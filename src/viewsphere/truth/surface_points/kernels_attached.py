@@ -40,11 +40,11 @@ def stick(corners, chosen, barycentrics, out):
 
 
 @njit
-def on_surface(chosen, barycentrics, cutout, cutouts, out):
+def on_surface(chosen, barycentrics, cutout, alpha_masks, out):
     """Fill out (N,) with whether these points of the `chosen` triangles (N,) are surface; see `kernels_draw.hits_surface`."""
     for i in range(chosen.shape[0]):
         row, b = cutout[chosen[i]], barycentrics[i]
-        out[i] = row != NEVER and hits_surface(cutouts, row, b[0], b[1], b[2])
+        out[i] = row != NEVER and hits_surface(alpha_masks, row, b[0], b[1], b[2])
 
 
 @njit

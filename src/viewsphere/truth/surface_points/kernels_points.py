@@ -101,7 +101,7 @@ def sort(xy, near, gap, own, cell, covered, ground, clear, start, order, points,
 
 
 @njit
-def meet(q, box, triangles, ground, cutout, cutouts, size, start, points, nearest, met, number, far):
+def meet(q, box, triangles, ground, cutout, alpha_masks, size, start, points, nearest, met, number, far):
     """Write the first triangle that each sorted point meets into `met`, and its 1/z into `nearest`.
 
     A triangle is met if it is nearer than 1/z = `nearest` by more than a factor NEARER, and is not the point's own: `number`;
@@ -135,7 +135,7 @@ def meet(q, box, triangles, ground, cutout, cutouts, size, start, points, neares
         w0, w1, w2 = q0[2], q1[2], q2[2]
         if cutout[ut] >= 0 or (not crossing and abs(det) < SLIVER * (w0 * w1 * w2)):
             bounds = (0.0, np.inf) if crossing else (1.0 / max(w0, w1, w2), 1.0 / min(w0, w1, w2))
-            _meet_checked(t, own, q0, q1, q2, area, width, bounds, cutout[ut], cutouts, start, points, nearest, met, number)
+            _meet_checked(t, own, q0, q1, q2, area, width, bounds, cutout[ut], alpha_masks, start, points, nearest, met, number)
             continue
         e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
         inverse = 1.0 / det
@@ -170,7 +170,7 @@ def _run(e0, e1, e2, y, xa, xb, width, start):
 
 
 @inner
-def _meet_checked(t, own, q0, q1, q2, area, width, bounds, cutout, cutouts, start, points, nearest, met, number):
+def _meet_checked(t, own, q0, q1, q2, area, width, bounds, cutout, alpha_masks, start, points, nearest, met, number):
     """`meet` for a cut-out, or a sliver whose facing is uncertain: either sign will do, 1/z stays within `bounds`."""
     nx, ny, nz, det = plane(q0, q1, q2)
     a, b, c = edge(q1, q2), edge(q2, q0), edge(q0, q1)
@@ -182,7 +182,7 @@ def _meet_checked(t, own, q0, q1, q2, area, width, bounds, cutout, cutouts, star
             if not ((e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0) or (e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0)):
                 continue
             inverse = min(max((nx * px + (ny * py + nz)) / det, bounds[0]), bounds[1])
-            if inverse > nearest[up] * NEARER and number[up] != own and hits_surface(cutouts, cutout, e0, e1, e2):
+            if inverse > nearest[up] * NEARER and number[up] != own and hits_surface(alpha_masks, cutout, e0, e1, e2):
                 nearest[up] = inverse
                 met[up] = t
 

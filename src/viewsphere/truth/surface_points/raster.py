@@ -155,7 +155,7 @@ def _meet(
     from viewsphere.truth.surface_points import kernels_points as kernels
 
     geometry, (width, height) = view.geometry, size
-    ground, cut = np.int32(geometry.triangle_start[-1]), (view.shown.triangle_cutout, geometry.cutouts.arrays)
+    ground, cut = np.int32(geometry.triangle_start[-1]), (view.shown.triangle_cutout, geometry.alpha_masks.arrays)
     clear = ground if ground < len(geometry.triangles) else np.int32(-1)
     start, far, covered = np.empty(width * height + 2, np.int32), np.empty((height, width)), np.empty(width * height, np.bool_)
     order, number = np.empty(len(near), np.int32), np.empty(len(near) + FOUR, np.int32)

@@ -25,7 +25,7 @@ from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
 from viewsphere.assets.readers.blender.nodes import Painter, Picture, images_of
 from viewsphere.assets.readers.shared.named_points import NamedPoint, named_points
 from viewsphere.assets.readers.shared.transform import moved
-from viewsphere.assets.scene_annotations import Mark, Marker, Point, mark_of
+from viewsphere.assets.scene_annotations import Annotation, Marker, Point, annotation_of
 from viewsphere.assets.skin import strongest
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
@@ -225,7 +225,7 @@ def _points(folder: ModelFolder, told: Sequence[Mapping[str, Any]]) -> Keypoints
     return named_points(folder, named)
 
 
-def _marks(told: Sequence[Mapping[str, Any]]) -> tuple[Mark, ...]:
+def _marks(told: Sequence[Mapping[str, Any]]) -> tuple[Annotation, ...]:
     """The marks that the file's objects are, in the axes of its mesh."""
 
     def place(point: Sequence[float]) -> Point:
@@ -244,7 +244,7 @@ def _marks(told: Sequence[Mapping[str, Any]]) -> tuple[Mark, ...]:
         )
         for one in told
     )
-    return tuple(mark for mark in map(mark_of, markers) if mark is not None)
+    return tuple(mark for mark in map(annotation_of, markers) if mark is not None)
 
 
 def _piece(told: Mapping[str, Any], material: int) -> Primitive:

@@ -10,19 +10,19 @@ import numpy as np
 from viewsphere.assets.primitive import Float
 from viewsphere.assets.readers.gltf.document import Document
 from viewsphere.assets.readers.gltf.field import Field
-from viewsphere.assets.scene_annotations import LANE, PROPERTY, Edge, Mark, Marker, Point, kind_of, mark_of
+from viewsphere.assets.scene_annotations import LANE, PROPERTY, Annotation, Edge, Marker, Point, annotation_of, kind_of
 from viewsphere.geometry.rotation import transform
 
 LINES, LOOP, LINE_STRIP = 1, 2, 3
 FACES = (4, 5, 6)
 
 
-def read_marks(document: Document, worlds: Mapping[int, Float], parts: Mapping[int, str]) -> tuple[Mark, ...]:
+def read_marks(document: Document, worlds: Mapping[int, Float], parts: Mapping[int, str]) -> tuple[Annotation, ...]:
     """The marks of nodes in the scene (their matrices and the names of their parts by their numbers), in its axes."""
     nodes = document.root.items("nodes")
     found = ((i, nodes[i], _said(nodes[i])) for i in worlds)
     named = ((i, node, said) for i, node, said in found if kind_of(node.text("name"), said.get(PROPERTY)))
-    marks = (mark_of(_marker(document, i, node, said, worlds, parts)) for i, node, said in named)
+    marks = (annotation_of(_marker(document, i, node, said, worlds, parts)) for i, node, said in named)
     return tuple(mark for mark in marks if mark is not None)
 
 

@@ -93,7 +93,7 @@ def with_corners_before(q, triangles, runs, wanted, limit, near, others):
 
 @njit
 def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing around
-    order, q, triangles, cutout, cutouts, room, offsets, triangle, depth, grid, limit, pixels, starts, count, nearest, seen
+    order, q, triangles, cutout, alpha_masks, room, offsets, triangle, depth, grid, limit, pixels, starts, count, nearest, seen
 ):
     """Draw these triangles at the four samples (`offsets` (2, 4)) of the `count` numbered pixels.
 
@@ -168,7 +168,7 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
                 x, v = float(np.int32(column)), float(np.int32(row))
                 which = nearer((e0, e1, e2), (nx, ny, nz), (low, high), x, v, offsets, nearest, u, inverse)
                 if which != 0 and cutout[t] >= 0:
-                    which &= _hits((e0, e1, e2), x, v, offsets, cutouts, cutout[t])
+                    which &= _hits((e0, e1, e2), x, v, offsets, alpha_masks, cutout[t])
                 if which == 0:
                     continue
                 if k < 0:
@@ -184,14 +184,14 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
 
 
 @inner
-def _hits(edges, x, y, offsets, cutouts, cutout):
+def _hits(edges, x, y, offsets, alpha_masks, cutout):
     """At which samples of the pixel at (x, y) a triangle with a cut-out is surface: one bit for each sample."""
     e0, e1, e2 = edges
     found = 0
     for i in range(U(4)):
         px, py = x + offsets[U(0), i], y + offsets[U(1), i]
         f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
-        found |= hits_surface(cutouts, cutout, e0[0] * px + f0, e1[0] * px + f1, e2[0] * px + f2) << i
+        found |= hits_surface(alpha_masks, cutout, e0[0] * px + f0, e1[0] * px + f1, e2[0] * px + f2) << i
     return found
 
 

@@ -104,7 +104,7 @@ def first(grid, y, x):
 
 
 @njit(_nrt=True)
-def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragments):
+def draw(q, order, triangles, cutout, alpha_masks, see_through, points, solid, fragments):
     """Draw the triangles in `order` through a pinhole.
 
     `points` is (grid, pixels, offsets, (lowest, highest offset)), `solid` (nearest, seen, farthest, tiles), `fragments`
@@ -148,15 +148,15 @@ def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragm
         surface = (t, cutout[ut], see_through[ut], (nx, ny, nz, det), bounds)
         box, edges = (xa, ya, xb, yb), (e0, e1, e2)
         if not narrow:
-            _draw_wide(surface, edges, checked, box, most, found, points, cutouts, triangles, solid, fragments)
+            _draw_wide(surface, edges, checked, box, most, found, points, alpha_masks, triangles, solid, fragments)
         elif checked:
-            _draw_checked(surface, edges, found, count, points, cutouts, triangles, solid, fragments)
+            _draw_checked(surface, edges, found, count, points, alpha_masks, triangles, solid, fragments)
         else:
             _draw_solid(surface, edges, found, count, points, solid)
 
 
 @inner
-def _draw_wide(surface, edges, checked, box, most, found, points, cutouts, triangles, solid, fragments):
+def _draw_wide(surface, edges, checked, box, most, found, points, alpha_masks, triangles, solid, fragments):
     """Draw a triangle tile by tile, or row by row if it is very large."""
     xa, ya, xb, yb = box
     farthest, blocks = solid[2], solid[3][0]
@@ -171,7 +171,7 @@ def _draw_wide(surface, edges, checked, box, most, found, points, cutouts, trian
         if count == 0:
             continue
         if checked:
-            _draw_checked(surface, edges, found, count, points, cutouts, triangles, solid, fragments)
+            _draw_checked(surface, edges, found, count, points, alpha_masks, triangles, solid, fragments)
         else:
             _draw_solid(surface, edges, found, count, points, solid)
 
@@ -306,7 +306,7 @@ def _is_before(inverse, t, old, seen):
 
 
 @inner
-def _draw_checked(surface, edges, found, count, points, cutouts, triangles, solid, fragments):
+def _draw_checked(surface, edges, found, count, points, alpha_masks, triangles, solid, fragments):
     """Draw a cut-out, a sliver or a see-through triangle at these pixels."""
     grid, _, offsets, _ = points
     nearest, _, farthest, _ = solid
@@ -316,13 +316,13 @@ def _draw_checked(surface, edges, found, count, points, cutouts, triangles, soli
         least = CLOSED
         for i in range(nearest.shape[1]):
             ray = (column + offsets[0, i], row + offsets[1, i], 1.0)
-            _cast(surface, edges, ray, (U(k), U(i)), cutouts, triangles, solid, fragments)
+            _cast(surface, edges, ray, (U(k), U(i)), alpha_masks, triangles, solid, fragments)
             least = min(least, level(nearest[U(k), U(i)]))
         farthest[row, column] = max(farthest[row, column], least)
 
 
 @inner
-def _cast(surface, edges, ray, p, cutouts, triangles, solid, fragments):
+def _cast(surface, edges, ray, p, alpha_masks, triangles, solid, fragments):
     """Do for one point's ray what truth does for cut-outs and slivers; a see-through surface is listed."""
     t, cutout, is_see_through, (nx, ny, nz, det), bounds = surface
     nearest, seen = solid[0], solid[1]
@@ -333,9 +333,9 @@ def _cast(surface, edges, ray, p, cutouts, triangles, solid, fragments):
         return
     inverse = min(max((nx * x + (ny * y + nz * z)) / det, bounds[0]), bounds[1])
     if is_see_through:
-        if inverse > 0.0 and inverse * (1.0 + TIE) >= nearest[p] and hits_surface(cutouts, cutout, e0, e1, e2):
+        if inverse > 0.0 and inverse * (1.0 + TIE) >= nearest[p] and hits_surface(alpha_masks, cutout, e0, e1, e2):
             _insert(t, inverse, p, triangles, fragments)
-    elif _is_before(inverse, t, nearest[p], seen[p]) and hits_surface(cutouts, cutout, e0, e1, e2):
+    elif _is_before(inverse, t, nearest[p], seen[p]) and hits_surface(alpha_masks, cutout, e0, e1, e2):
         nearest[p] = inverse
         seen[p] = t
 
@@ -377,7 +377,7 @@ def _share_edge(q, triangles, s, t):
 
 
 @njit(_nrt=True)
-def draw_rays(q, order, triangles, cutout, cutouts, see_through, unit, table, points, solid, fragments):
+def draw_rays(q, order, triangles, cutout, alpha_masks, see_through, unit, table, points, solid, fragments):
     """As `draw`, along rays: `table` is (rays, levels, boxes, cells) of `kernels_rays`, of S x S rays a pixel.
 
     `points` is (grid, pixels, S); q is in camera axes, and `unit` says that the rays have length 1 rather than z = 1.
@@ -407,7 +407,7 @@ def draw_rays(q, order, triangles, cutout, cutouts, see_through, unit, table, po
             if not small:
                 x, y = np.int64(leaves[i, 0]), np.int64(leaves[i, 1])
                 box = (x, y, x + LEAF - 1, y + LEAF - 1)
-            _cast_box(surface, (e0, e1, e2), box, rays, cutouts, triangles, points, solid, fragments)
+            _cast_box(surface, (e0, e1, e2), box, rays, alpha_masks, triangles, points, solid, fragments)
 
 
 @inner
@@ -422,7 +422,7 @@ def _is_empty(points, box):
 
 
 @inner
-def _cast_box(surface, edges, box, rays, cutouts, triangles, points, solid, fragments):
+def _cast_box(surface, edges, box, rays, alpha_masks, triangles, points, solid, fragments):
     """Draw a triangle at the chosen pixels of a box of rays (both ends included)."""
     grid, pixels, side = points
     height, width = grid.shape
@@ -433,5 +433,5 @@ def _cast_box(surface, edges, box, rays, cutouts, triangles, points, solid, frag
             x = pixels[k] - y * width
             for i in range(side * side):
                 ray = rays[y * side + i // side, x * side + i % side]
-                _cast(surface, edges, (ray[0], ray[1], ray[2]), (U(k), U(i)), cutouts, triangles, solid, fragments)
+                _cast(surface, edges, (ray[0], ray[1], ray[2]), (U(k), U(i)), alpha_masks, triangles, solid, fragments)
             k += 1

@@ -266,7 +266,7 @@ class _Points:
         """Draw these triangles."""
         count, lens = self.nearest.shape[1], self.camera.distortion
         fragments = self.inverses, self.listed, self.counts, q
-        surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays, see_through
+        surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.alpha_masks.arrays, see_through
         if lens is not None:
             side = 1 if count == 1 else 2
             table = lens_table(self.camera) if side == 1 else _sample_table(self.camera.intrinsics.model_dump_json())
@@ -320,7 +320,7 @@ def _pinhole_edges(
     grid, limit = np.full((height, width), -1, np.int32), shown[1] * np.float32(1 + kernels_edges.SLACK)
     bound, nearest, seen = np.empty(len(marked), np.float32), np.empty((most, 4), np.float32), np.empty((most, 4), np.int32)
     kernels_edges.begin(pixels, len(marked), *shown, grid, limit, starts, bound, nearest, seen, wanted)
-    surfaces = q, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays
+    surfaces = q, geometry.triangles, geometry.triangle_cutout, geometry.alpha_masks.arrays
     canvas = _room(width), _ROTATED, *shown, grid, limit, pixels, starts
     count = kernels_edges.draw(_within(runs[1], are_wanted), *surfaces, *canvas, len(bound), nearest, seen)
     around = limit.copy()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.engines._arranged import Arranged
-from viewsphere.engines.raster.indirect.bounces import Hall
+from viewsphere.engines.raster.indirect.bounces import BounceScene
 from viewsphere.engines.raster.materials.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.materials.surface import Lengths, Rows
 from viewsphere.engines.raster.records import Float32, Int32
@@ -50,7 +50,7 @@ class _Throwing:
 
 
 @dataclass(frozen=True, eq=False)
-class Halls:
+class BounceScenes:
     """Finds the things that throw light at one another. The last ones are kept: to find them takes a look at all triangles."""
 
     _last: list[_Throwing] = field(default_factory=list[_Throwing])
@@ -65,7 +65,7 @@ class Halls:
         lengths: Lengths,
         has_ground: bool,
         bounces: Literal["auto", "on", "fine", "off"],
-    ) -> Hall | None:
+    ) -> BounceScene | None:
         """The scenery that stands still, which lights whatever else is there; in a picture without scenery all targets. None
         where light is not to bounce: it shall not, or only indoors. ground: equal for grounds made of the same. All calls have
         the same `bounces`.
@@ -81,7 +81,7 @@ class Halls:
         has_map = ground_z is not None and not arranged.has_scenery
         limits = own.which, own.low, own.high
         surfaces = casters.surfaces._replace(normals=arranged.geometry.triangle_normals_of(_still(arranged)))
-        return Hall(key, surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map, bounces == "fine")
+        return BounceScene(key, surfaces, casters.textures, *limits, floor, lengths.unit, ground_z, has_map, bounces == "fine")
 
     def _throwing(self, arranged: Arranged, rows: Rows, only_indoors: bool) -> _Throwing:
         still, surfaces, lengths = _still(arranged), rows.surfaces, rows.lengths

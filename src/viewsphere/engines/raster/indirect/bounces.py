@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from viewsphere.engines.raster.indirect import kernels_probes as kernels
 from viewsphere.engines.raster.indirect.directions import TURNS, dome
-from viewsphere.engines.raster.indirect.emissive_triangles import Lanterns, lanterns_of
-from viewsphere.engines.raster.indirect.final_gather import Gathering, Look, Round, Spots, look
+from viewsphere.engines.raster.indirect.emissive_triangles import EmissiveTriangles, emissive_triangles_of
+from viewsphere.engines.raster.indirect.final_gather import FinalGather, Look, Round, Spots, look
 from viewsphere.engines.raster.indirect.irradiance_volumes import (
     LAST,
     Grid,
@@ -93,7 +93,7 @@ irradiance keeps (1, 2/3, 1/4).
 
 
 @dataclass(frozen=True)
-class Hall:
+class BounceScene:
     """Things that throw light at one another, between the corners low and high (3,) in the stage's units, `unit` metres.
 
     key: equal where all of it is, but for light; which (T,): their triangles; ground_z: the ground's height, None for none;
@@ -115,11 +115,11 @@ class Hall:
 
     @cached_property
     def digest(self) -> str:
-        """The digest of the hall's content, computed once: it reads all meshes and their pictures."""
+        """The digest of the bounce scene's content, computed once: it reads all meshes and their pictures."""
         return digest_of(self._content())
 
     def _content(self) -> Iterator[Any]:
-        """The content of the hall, without numbers that depend on other things of the stage."""
+        """The content of the bounce scene, without numbers that depend on other things of the stage."""
         (things, meshes), *others = cast("tuple[Any, ...]", self.key)
         yield from (thing.model_dump_json(exclude={"id"}) for thing in things)
         for mesh in meshes:
@@ -129,7 +129,7 @@ class Hall:
 
     @cached_property
     def owns(self) -> NDArray[np.bool_]:
-        """A mask of the surfaces' triangles, (T,), true for the hall's own."""
+        """A mask of the surfaces' triangles, (T,), true for the bounce scene's own."""
         own = np.zeros(len(self.surfaces.material), np.bool_)
         own[self.which] = True
         return own
@@ -158,7 +158,7 @@ class _Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class _Lighting:
-    hall: Hall
+    bounce_scene: BounceScene
     lamps: tuple[bytes, ...]
     sky: tuple[bytes, ...]
     surrounding: Surrounding = field(compare=False)
@@ -167,7 +167,7 @@ class _Lighting:
     @property
     def content(self) -> tuple[Any, ...]:
         """The content of the lighting for a digest."""
-        return (self.hall.digest, *self.lamps, *self.surrounding)
+        return (self.bounce_scene.digest, *self.lamps, *self.surrounding)
 
 
 LIGHT = (Bounces, Lightmap, PatchLight)
@@ -175,9 +175,9 @@ SEEN = (*LIGHT, _Seen, Tree, Volume, Grid, Rays, Patches, Table, Look, Charts, S
 """Types of which `Bounces` and `_Seen` are made."""
 
 
-def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounces:
-    """The light that a hall's things throw at one another. The last hall's rays are kept, and the last light."""
-    if not len(hall.which) or not (hall.high - hall.low).max() > 0:
+def bake_bounces(bounce_scene: BounceScene, surrounding: Surrounding, lights: Lights) -> Bounces:
+    """Return the light between the things of a bounce scene. The last scene's rays and light are kept."""
+    if not len(bounce_scene.which) or not (bounce_scene.high - bounce_scene.low).max() > 0:
         return NO_BOUNCES
     lights = without_maps(lights)
     # What lamps give the ground near the targets comes from the ground itself.
@@ -186,12 +186,12 @@ def bake_bounces(hall: Hall, surrounding: Surrounding, lights: Lights) -> Bounce
     surrounding = surrounding._replace(light=light)
     lamps = tuple(values.tobytes() for values in lights if isinstance(values, np.ndarray))
     sky = tuple(values.tobytes() for values in (surrounding.texels, surrounding.light, surrounding.up))
-    lighting = _Lighting(hall, lamps, sky, surrounding, lights)
-    bounces = _baked(lighting) if hall.key is None else _bake(lighting)
+    lighting = _Lighting(bounce_scene, lamps, sky, surrounding, lights)
+    bounces = _baked(lighting) if bounce_scene.key is None else _bake(lighting)
     if not len(bounces.lightmap.chart):
         return bounces
-    chart = np.full(len(hall.surfaces.triangles), -1, np.int32)
-    chart[hall.which] = bounces.lightmap.chart
+    chart = np.full(len(bounce_scene.surfaces.triangles), -1, np.int32)
+    chart[bounce_scene.which] = bounces.lightmap.chart
     return bounces._replace(lightmap=bounces.lightmap._replace(chart=chart))
 
 
@@ -201,37 +201,46 @@ def without_maps(lights: Lights) -> Lights:
 
 
 @lru_cache(maxsize=1)
-def tree_of_hall(hall: Hall) -> Tree:
-    """The tree of a hall's triangles; it is there already where the hall is the last one whose light was baked."""
-    return kept_light(("tree", hall.digest), lambda: _tree_of(hall), (Tree,))
+def tree_of_scene(bounce_scene: BounceScene) -> Tree:
+    """Return the tree of a bounce scene's triangles, from memory after the scene's light was baked."""
+    return kept_light(("tree", bounce_scene.digest), lambda: _tree_of(bounce_scene), (Tree,))
 
 
-def _tree_of(hall: Hall) -> Tree:
-    return tree_of(hall.surfaces.vertices[hall.surfaces.triangles[hall.which], 11:14])
+def _tree_of(bounce_scene: BounceScene) -> Tree:
+    return tree_of(bounce_scene.surfaces.vertices[bounce_scene.surfaces.triangles[bounce_scene.which], 11:14])
 
 
 @lru_cache(maxsize=1)
 def _bake(lighting: _Lighting) -> Bounces:
-    """The light of a hall, from the cache where it is there."""
+    """The light of a bounce scene, from the cache where it is there."""
     return kept_light(("bounces", *lighting.content), lambda: _baked(lighting), LIGHT)
 
 
 def _baked(lighting: _Lighting) -> Bounces:
-    hall, surrounding = lighting.hall, lighting.surrounding
-    seen = _looked(hall, _tree_of(hall)) if hall.key is None else _look(hall)
+    bounce_scene, surrounding = lighting.bounce_scene, lighting.surrounding
+    seen = _looked(bounce_scene, _tree_of(bounce_scene)) if bounce_scene.key is None else _look(bounce_scene)
     bounces, patches = seen.bounces, seen.patches
     light, views = np.zeros_like(bounces.light), np.zeros((len(bounces.light), NODES, 4), np.float32)
     bounces = bounces._replace(light=light, views=views.reshape(-1, 4), floor=np.zeros_like(bounces.floor))
     off = SHADOWS / seen.volumes[0].grid.cells
-    lit = patches.lit(hall.which, hall.surfaces, hall.textures, hall.floor, surrounding.albedo, seen.tree, lighting.lights, off)
+    lit = patches.lit(
+        bounce_scene.which,
+        bounce_scene.surfaces,
+        bounce_scene.textures,
+        bounce_scene.floor,
+        surrounding.albedo,
+        seen.tree,
+        lighting.lights,
+        off,
+    )
     directions = seen.volumes[0].rays.directions
     sky, weights = sky_along(surrounding, directions), irradiance_weights(directions)
-    lanterns = lanterns_of(hall.which, hall.surfaces, patches, lit.emitted, TURNS)
-    shining, near = _shining(seen, lanterns, lit.emitted, weights, off)
-    own = lit.emitted * (lanterns.froms == 0)[:, None] + lit.reflectance * lit.arrived / np.float32(math.pi)
+    emissive = emissive_triangles_of(bounce_scene.which, bounce_scene.surfaces, patches, lit.emitted, TURNS)
+    shining, near = _shining(seen, emissive, lit.emitted, weights, off)
+    own = lit.emitted * (emissive.froms == 0)[:, None] + lit.reflectance * lit.arrived / np.float32(math.pi)
     places, normals, sent, added = patches.places, patches.normals, own, (np.zeros_like(own), np.zeros_like(own), own)
     glow, inside = np.empty_like(own), np.empty(len(own), np.float32)
-    gathering = _gathering(seen, surrounding, lanterns, lit.emitted, off)
+    gathering = _gathering(seen, surrounding, emissive, lit.emitted, off)
     if gathering is not None:
         bounces = bounces._replace(lightmap=gathering.lightmap)
     facing = (1 + normals[:, 2:]) / 2
@@ -268,8 +277,8 @@ def _baked(lighting: _Lighting) -> Bounces:
     views[buried] = 0
     _settle(seen, light, views.reshape(len(views), -1))
     if seen.below is not None:
-        bounces.floor[:] = _on_ground(seen, seen.below, sent, lanterns, lit.emitted, off).reshape(bounces.floor.shape)
-    light = np.where((lanterns.froms == 0)[:, None], sent, np.float32(-1))
+        bounces.floor[:] = _on_ground(seen, seen.below, sent, emissive, lit.emitted, off).reshape(bounces.floor.shape)
+    light = np.where((emissive.froms == 0)[:, None], sent, np.float32(-1))
     known = patches.table.keys, patches.table.patch, light
     return bounces._replace(sent=PatchLight(*known, bounces.sent.frame, bounces.sent.materials))
 
@@ -293,71 +302,77 @@ def _settle(seen: _Seen, light: Float32, views: Float32) -> None:
         join(inner, outer, ((lights[0], lights[1]), (sights[0], sights[1])))
 
 
-def _gathering(seen: _Seen, surrounding: Surrounding, lanterns: Lanterns, emitted: Float32, off: float) -> Gathering | None:
+def _gathering(
+    seen: _Seen, surrounding: Surrounding, emissive: EmissiveTriangles, emitted: Float32, off: float
+) -> FinalGather | None:
     """Return the gathering of light on flat surfaces and beside them, None if there are no such surfaces."""
     if seen.look is None or seen.around is None:
         return None
-    return Gathering.of(seen.look, seen.around, seen.patches, surrounding, seen.tree, lanterns, TURNS, emitted, off)
+    return FinalGather.of(seen.look, seen.around, seen.patches, surrounding, seen.tree, emissive, TURNS, emitted, off)
 
 
 def _on_ground(
-    seen: _Seen, below: Rays, sent: Float32, lanterns: Lanterns, emitted: Float32, off: float
+    seen: _Seen, below: Rays, sent: Float32, emissive: EmissiveTriangles, emitted: Float32, off: float
 ) -> NDArray[np.float32]:
     """The ground's map, of MAP * MAP rows: see `Bounces.floor`."""
     floor, ids = np.empty((MAP * MAP, 4), np.float32), seen.patches.ids[len(seen.volumes)]
     kernels.send_down(ids, sent, floor)
     up = np.tile(np.array([0, 0, 1], np.float32), (len(floor), 1))
-    near = ids, below.far, lanterns.froms, emitted, np.float32(off)
-    shine_at(seen.tree, below.origins, up, TURNS, np.float32(1), lanterns.points, *near, floor)
+    near = ids, below.far, emissive.froms, emitted, np.float32(off)
+    shine_at(seen.tree, below.origins, up, TURNS, np.float32(1), emissive.points, *near, floor)
     return floor * _window(MAP).reshape(-1, 1).astype(np.float32)
 
 
-def _shining(seen: _Seen, lanterns: Lanterns, emitted: Float32, weights: Float32, off: float) -> tuple[Float32, Float32]:
+def _shining(
+    seen: _Seen, emissive: EmissiveTriangles, emitted: Float32, weights: Float32, off: float
+) -> tuple[Float32, Float32]:
     """Return the light of emitters at the probes: irradiance, as `Bounces.light`, and sums of the light that rays see."""
     light = np.zeros_like(seen.bounces.light)
     views = np.zeros((len(light), NODES, 4), np.float32)
-    if not len(lanterns.points):
+    if not len(emissive.points):
         return light, views
     for (volume, ids, own_light), (_, _, own_views) in zip(seen.parts(light), seen.parts(views), strict=True):
         rays, both = volume.rays, (own_light, own_views)
-        points = lanterns.points, TERMS, np.float32(off), np.float32(4 * math.pi / rays.directions.shape[1])
+        points = emissive.points, TERMS, np.float32(off), np.float32(4 * math.pi / rays.directions.shape[1])
         shine_at_probes(seen.tree, rays.origins, rays.turn, volume.own, TURNS, *points, FOLD, *both)
-        shine_near(ids, rays.far, rays.turn, volume.own, weights, rays.directions, lanterns.froms, emitted, FOLD, *both)
+        shine_near(ids, rays.far, rays.turn, volume.own, weights, rays.directions, emissive.froms, emitted, FOLD, *both)
     return light, views
 
 
 @lru_cache(maxsize=1)
-def _look(hall: Hall) -> _Seen:
+def _look(bounce_scene: BounceScene) -> _Seen:
     """Return the results that depend on no light, from the cache where it has them."""
-    return kept_light(("seen", hall.digest), lambda: _looked(hall, tree_of_hall(hall)), SEEN)
+    return kept_light(("seen", bounce_scene.digest), lambda: _looked(bounce_scene, tree_of_scene(bounce_scene)), SEEN)
 
 
-def _looked(hall: Hall, tree: Tree) -> _Seen:
+def _looked(bounce_scene: BounceScene, tree: Tree) -> _Seen:
     """Cast all rays."""
-    corners = hall.surfaces.vertices[hall.surfaces.triangles[hall.which], 11:14]
-    normals = hall.surfaces.normals[hall.which]
-    grids = grids_of(hall.low, hall.high, hall.unit)
-    has_charts = len(grids) == 1 and has_planes(corners, hall.unit)
+    corners = bounce_scene.surfaces.vertices[bounce_scene.surfaces.triangles[bounce_scene.which], 11:14]
+    normals = bounce_scene.surfaces.normals[bounce_scene.which]
+    grids = grids_of(bounce_scene.low, bounce_scene.high, bounce_scene.unit)
+    has_charts = len(grids) == 1 and has_planes(corners, bounce_scene.unit)
     directions = rays_of_probes(grids, has_charts)
     volumes = tuple(volume_of(grid, tree, normals, directions, grid is grids[0]) for grid in grids)
     bundles, below, floor, floor_frame = [volume.rays for volume in volumes], None, NO_BOUNCES.floor, NO_BOUNCES.floor_frame
-    if hall.has_map and hall.ground_z is not None:
-        places, floor_frame = _map(hall, hall.ground_z)
+    if bounce_scene.has_map and bounce_scene.ground_z is not None:
+        places, floor_frame = _map(bounce_scene, bounce_scene.ground_z)
         floor, up, same = np.zeros((MAP, MAP, 4), np.float32), dome(MAP_RAYS)[None], np.zeros(len(places), np.int32)
         met, far = tracing.cast(tree, places, up, same, np.inf)
         below = Rays(places, up, same, met, far)
         bundles.append(below)
-    made = hall.surfaces.vertices, hall.surfaces.triangles[hall.which]
-    looked = look(tree, *made, normals, hall.unit, volumes[0].is_inside_out, hall.is_fine) if has_charts else None
+    made = bounce_scene.surfaces.vertices, bounce_scene.surfaces.triangles[bounce_scene.which]
+    looked = (
+        look(tree, *made, normals, bounce_scene.unit, volumes[0].is_inside_out, bounce_scene.is_fine) if has_charts else None
+    )
     if looked is not None:
         bundles.extend(looked.rays)
-    inner, materials = grids[0], hall.surfaces.material[hall.which]
+    inner, materials = grids[0], bounce_scene.surfaces.material[bounce_scene.which]
     made_of = (
         normals,
         materials,
         np.array([*inner.corner, *inner.last], np.float32),
         inner.cells * PATCHES,
-        _ground(hall),
+        _ground(bounce_scene),
     )
     patches, around = patches_of(bundles, *made_of), None
     if looked is not None:
@@ -382,20 +397,20 @@ def _frame(grids: tuple[Grid, ...]) -> Float32:
     )
 
 
-def _ground(hall: Hall) -> Float32:
+def _ground(bounce_scene: BounceScene) -> Float32:
     """The ground's height, the box in which it has patches, and whether there is one, for `kernels_probes.patch`."""
-    if hall.ground_z is None:
+    if bounce_scene.ground_z is None:
         return np.zeros(6, np.float32)
-    beyond = 2 * float(hall.high[2] - hall.ground_z)
-    (left, front), (right, back) = hall.low[:2] - beyond, hall.high[:2] + beyond
-    return np.array([hall.ground_z, left, right, front, back, 1], np.float32)
+    beyond = 2 * float(bounce_scene.high[2] - bounce_scene.ground_z)
+    (left, front), (right, back) = bounce_scene.low[:2] - beyond, bounce_scene.high[:2] + beyond
+    return np.array([bounce_scene.ground_z, left, right, front, back, 1], np.float32)
 
 
-def _map(hall: Hall, z: float) -> tuple[Float32, Float32]:
+def _map(bounce_scene: BounceScene, z: float) -> tuple[Float32, Float32]:
     """The places of the ground's map, (MAP * MAP, 3), and its `Bounces.floor_frame`."""
-    size = hall.high - hall.low
-    half = float(max(size[:2].max() / 2, 1e-3) + BEYOND * (hall.high[2] - z))
-    left, front = ((hall.low + hall.high) / 2 - half)[:2].tolist()
+    size = bounce_scene.high - bounce_scene.low
+    half = float(max(size[:2].max() / 2, 1e-3) + BEYOND * (bounce_scene.high[2] - z))
+    left, front = ((bounce_scene.low + bounce_scene.high) / 2 - half)[:2].tolist()
     cells = MAP / (2 * half)
     x, y = np.meshgrid(left + (np.arange(MAP) + 0.5) / cells, front + (np.arange(MAP) + 0.5) / cells)
     places = np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3)

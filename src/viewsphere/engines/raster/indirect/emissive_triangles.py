@@ -12,23 +12,25 @@ from viewsphere.engines.raster.materials.kernels_material import L_EB, L_ER, L_U
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces
 
 POINTS = 256
-"""Of all lanterns, of which each turn of the probes has its share."""
+"""Of all emissive triangles, of which each turn of the probes has its share."""
 
 LARGEST = 0.1
 """Solid angle of the part that a point stands for, steradians, up to which the point counts."""
 
 
-class Lanterns(NamedTuple):
+class EmissiveTriangles(NamedTuple):
     """points (J, POINT_COLUMNS): columns named in `kernels_emissive`, none if nothing shines; froms (M,): of each patch, the
-    square of the distance from which on points stand for it, 0 if it is no lantern.
+    square of the distance from which on points stand for it, 0 if the triangle is not emissive.
     """
 
     points: Float32
     froms: Float32
 
 
-def lanterns_of(which: Int32, surfaces: Surfaces, patches: Patches, emitted: Float32, turns: int) -> Lanterns:
-    """The lanterns among triangles `which` (T,) of these surfaces, whose patches send `emitted` (M, 3) by themselves."""
+def emissive_triangles_of(
+    which: Int32, surfaces: Surfaces, patches: Patches, emitted: Float32, turns: int
+) -> EmissiveTriangles:
+    """Return the emissive ones of the triangles `which` (T,). Their patches emit `emitted` (M, 3)."""
     looks = surfaces.looks
     glow = looks[:, L_ER : L_EB + 1].astype(np.float64) * (looks[:, L_UNLIT : L_UNLIT + 1] == 0)
     material = np.where(patches.triangles >= 0, surfaces.material[which[patches.triangles]], len(looks) - 1)
@@ -37,7 +39,7 @@ def lanterns_of(which: Int32, surfaces: Surfaces, patches: Patches, emitted: Flo
     brightness = glow.sum(axis=1)
     shining = which[brightness[surfaces.material[which]] > 0]
     if not len(shining):
-        return Lanterns(np.zeros((0, kernels.POINT_COLUMNS), np.float32), np.zeros(patches.count, np.float32))
+        return EmissiveTriangles(np.zeros((0, kernels.POINT_COLUMNS), np.float32), np.zeros(patches.count, np.float32))
     a, b, c = surfaces.vertices[surfaces.triangles[shining].T.astype(np.int64), 11:14].astype(np.float64)
     area = np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)) / 2
     power = np.cumsum(area * brightness[surfaces.material[shining]])
@@ -55,4 +57,4 @@ def lanterns_of(which: Int32, surfaces: Surfaces, patches: Patches, emitted: Flo
         stands_for[:, None] / LARGEST,
     ]
     froms = np.where(brightness[material] > 0, share / np.maximum(brightness[material], 1e-30) / LARGEST, 0)
-    return Lanterns(np.concatenate(points, axis=1).astype(np.float32), froms.astype(np.float32))
+    return EmissiveTriangles(np.concatenate(points, axis=1).astype(np.float32), froms.astype(np.float32))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.raster.indirect.emissive_triangles import Lanterns
+from viewsphere.engines.raster.indirect.emissive_triangles import EmissiveTriangles
 from viewsphere.engines.raster.indirect.kernels_probes import SKY, send_around
 from viewsphere.engines.raster.indirect.patch_rays import PatchRays
 from viewsphere.engines.raster.indirect.radiosity_patches import Patches, Rays
@@ -57,17 +57,25 @@ class Spots(NamedTuple):
         return cls(Rays(origins, *ways, met, far), *frame, counted)
 
     def from_afar(
-        self, ids: Int32, surrounding: Surrounding, tree: Tree, lanterns: Lanterns, turns: int, emitted: Float32, off: float
+        self,
+        ids: Int32,
+        surrounding: Surrounding,
+        tree: Tree,
+        emissive: EmissiveTriangles,
+        turns: int,
+        emitted: Float32,
+        off: float,
     ) -> Float32:
-        """Return the light of the sky, the distant ground and lanterns, (N, COLUMNS). Lanterns send `emitted` (M, 3).
+        """Return the light of the sky, the distant ground and emissive triangles, (N, COLUMNS). Emissive triangles send
+        `emitted` (M, 3).
 
         ids (K, N): the patches that the rays hit.
         """
         rays, light = self.rays, np.zeros((len(self.counted), kernels.COLUMNS), np.float32)
         kernels.see(ids, rays.turn, self.local, _sky(surrounding, rays, ids), surrounding.below, light)
-        if len(lanterns.points):
-            places = rays.origins, rays.turn, self.axes, turns, lanterns.points
-            near = ids, rays.far, self.local, lanterns.froms, emitted
+        if len(emissive.points):
+            places = rays.origins, rays.turn, self.axes, turns, emissive.points
+            near = ids, rays.far, self.local, emissive.froms, emitted
             kernels.shine_on(tree, *places, *near, np.float32(off), light)
         return light
 
@@ -147,9 +155,9 @@ def look(
     )
 
 
-class Gathering(NamedTuple):
+class FinalGather(NamedTuple):
     """ids: of the rays of nodes, of sites, and of patches, the patches that they hit; afar: what comes to them from the sky,
-    the ground far away, and lanterns.
+    the ground far away, and emissive triangles.
     """
 
     look: Look
@@ -166,14 +174,14 @@ class Gathering(NamedTuple):
         patches: Patches,
         surrounding: Surrounding,
         tree: Tree,
-        lanterns: Lanterns,
+        emissive: EmissiveTriangles,
         turns: int,
         emitted: Float32,
         off: float,
-    ) -> Gathering:
+    ) -> FinalGather:
         """Of patches that send `emitted` (M, 3) by themselves; the last bundles of their rays are those of look and around."""
         spots = [look.nodes, *([look.round.spots] if look.round else [])]
-        ids, given = patches.ids[-len(spots) - 1 :], (surrounding, tree, lanterns, turns, emitted, off)
+        ids, given = patches.ids[-len(spots) - 1 :], (surrounding, tree, emissive, turns, emitted, off)
         afar = [own.from_afar(which, *given) for own, which in zip(spots, ids[:-1], strict=True)]
         nodes, chart = np.zeros_like(afar[0]), look.charts.chart
         lightmap = NO_LIGHTMAP._replace(nodes=nodes, charts=look.charts.charts, chart=chart)

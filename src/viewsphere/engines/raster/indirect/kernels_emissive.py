@@ -16,14 +16,14 @@ from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
-# Columns of a lantern's points: where it is, its normal, radiance times the area it stands for, the square of the distance from
-# which on it counts.
+# Columns of an emissive triangle's points: where it is, its normal, radiance times the area it stands for, the square of the
+# distance from which on it counts.
 POINT_X, NORMAL_X, POWER_R, FROM, POINT_COLUMNS = 0, 3, 6, 9, 10
 
 
 @inner
 def shine_from(tree, point, p, off, stack):
-    """The direction to a point of a lantern, and the factor of its power; 0 where it is hidden or near."""
+    """The direction to a point of an emissive triangle, and the factor of its power; 0 where it is hidden or near."""
     d = point[POINT_X] - p[0], point[POINT_X + 1] - p[1], point[POINT_X + 2] - p[2]
     squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
     along = d[0] * point[NORMAL_X] + d[1] * point[NORMAL_X + 1] + d[2] * point[NORMAL_X + 2]
@@ -67,9 +67,9 @@ def shine_at_probes(tree, places, turn, own, turns, points, squares, off, per, f
 
 @njit
 def shine_near(ids, far, turn, own, weights, directions, froms, emitted, fold, light, views):
-    """Add to light (N, 28) and views (N, NODES, 4) what arrives along rays that hit lanterns close by. froms (M,): the square
-    of the distance from which on points stand for a patch, 0 for patches that are no lanterns; emitted (M, 3); the others as in
-    `kernels_probes.send` and `kernels_views`.
+    """Add to light (N, 28) and views (N, NODES, 4) what arrives along rays that hit emissive triangles close by. froms (M,):
+    the square of the distance from which on points stand for a patch, 0 for patches that are not emissive; emitted (M, 3); the
+    others as in `kernels_probes.send` and `kernels_views`.
     """
     for k in range(ids.shape[0]):
         for i in range(ids.shape[1]):
@@ -86,8 +86,8 @@ def shine_near(ids, far, turn, own, weights, directions, froms, emitted, fold, l
 
 @njit(_nrt=True)
 def shine_at(tree, places, normals, step, share, points, ids, far, froms, emitted, off, light):
-    """Add to light (N, 3 or more) the radiance of white matt surfaces at places (N, 3) that lanterns light: by every `step`-th
-    point, which counts `share`, and by cosine-weighted rays (K, N).
+    """Add to light (N, 3 or more) the radiance of white matt surfaces at places (N, 3) that emissive triangles light: by every
+    `step`-th point, which counts `share`, and by cosine-weighted rays (K, N).
     """
     stack = np.empty((DEEP, 2), np.float32)
     per = f4(1) / f4(ids.shape[0])

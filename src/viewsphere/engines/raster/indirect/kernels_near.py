@@ -19,7 +19,7 @@ def gather(met, far, origins, ways, which, normals, sent, slots, near):
 
     met, far (K, N), origins (N, 3): see `kernels_trace.cast`; ways (N, K, 3); which (T,): which of the triangles with these
     normals are met; sent: see `PatchLight`. A ray that meets no known patch,
-    or a lantern, counts as one that meets nothing.
+    or an emissive triangle, counts as one that meets nothing.
     """
     per, cells = f4(1) / f4(met.shape[0]), sent.frame[6]
     for i in range(U(met.shape[1])):

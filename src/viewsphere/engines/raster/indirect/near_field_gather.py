@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewsphere.engines.raster.indirect import kernels_near as kernels
-from viewsphere.engines.raster.indirect.bounces import Hall
+from viewsphere.engines.raster.indirect.bounces import BounceScene
 from viewsphere.engines.raster.indirect.directions import domes
 from viewsphere.engines.raster.indirect.patch_rays import axes_along
 from viewsphere.engines.raster.records import NO_NEAR, Bounces, Float32, Int32, PictureRays
@@ -30,13 +30,13 @@ SOME = 1 << 14
 
 
 def with_near(
-    bounces: Bounces, hall: Hall, tree: Tree, view: PictureRays, slots: Int32, triangle: Int32, depth: Float32
+    bounces: Bounces, bounce_scene: BounceScene, tree: Tree, view: PictureRays, slots: Int32, triangle: Int32, depth: Float32
 ) -> Bounces:
-    """The same with `Bounces.near` of the samples `slots` (N,) that show the hall's triangles and have no lightmap.
+    """The same with `Bounces.near` of the samples `slots` (N,) that show the bounce scene's triangles and have no lightmap.
 
     triangle, depth (S,): what samples show, see `kernels_paint.shade`.
     """
-    slots = slots[hall.owns[triangle[slots]]]
+    slots = slots[bounce_scene.owns[triangle[slots]]]
     if len(bounces.lightmap.chart):
         slots = slots[bounces.lightmap.chart[triangle[slots]] == -1]
     if not len(slots):
@@ -47,13 +47,13 @@ def with_near(
     for start in range(0, len(slots), SOME):
         own = slots[start : start + SOME]
         places, rays = _seen_at(view, own, depth)
-        normals = hall.surfaces.normals[triangle[own]]
+        normals = bounce_scene.surfaces.normals[triangle[own]]
         normals = np.where((normals * rays).sum(axis=1, keepdims=True) < 0, normals, -normals)
         ways = np.matmul(turned[_turn(view, own)], axes_along(normals))
-        origins = (places + normals * np.float32(OFF / hall.unit)).astype(np.float32)
+        origins = (places + normals * np.float32(OFF / bounce_scene.unit)).astype(np.float32)
         each = np.arange(len(own), dtype=np.int32)
         met, far = cast(tree, origins, ways, each, REACH / float(bounces.frame[0, 3]))
-        kernels.gather(met, far, origins, ways, hall.which, hall.surfaces.normals, bounces.sent, own, near)
+        kernels.gather(met, far, origins, ways, bounce_scene.which, bounce_scene.surfaces.normals, bounces.sent, own, near)
     return bounces._replace(near=near)
 
 

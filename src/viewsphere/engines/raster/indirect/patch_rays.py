@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster.indirect import kernels_probes as kernels
-from viewsphere.engines.raster.indirect.emissive_triangles import Lanterns
+from viewsphere.engines.raster.indirect.emissive_triangles import EmissiveTriangles
 from viewsphere.engines.raster.indirect.kernels_emissive import shine_at
 from viewsphere.engines.raster.indirect.radiosity_patches import Patches, Rays
 from viewsphere.engines.raster.records import Float32, Int32
@@ -34,20 +34,27 @@ class PatchRays(NamedTuple):
     rays: Rays
 
     def from_afar(
-        self, ids: Int32, surrounding: Surrounding, tree: Tree, lanterns: Lanterns, turns: int, emitted: Float32, off: float
+        self,
+        ids: Int32,
+        surrounding: Surrounding,
+        tree: Tree,
+        emissive: EmissiveTriangles,
+        turns: int,
+        emitted: Float32,
+        off: float,
     ) -> Float32:
-        """Return the light of the sky, the distant ground and lanterns at these origins, (N, 3).
+        """Return the light of the sky, the distant ground and emissive triangles at these origins, (N, 3).
 
-        The light is radiance of white matt surfaces. The rays of the origins hit patches `ids` (K, N). Lanterns send
+        The light is radiance of white matt surfaces. The rays of the origins hit patches `ids` (K, N). Emissive triangles send
         `emitted` (M, 3).
         """
         light = np.zeros((len(self.which), 3), np.float32)
         for start in range(0, len(light), SOME):
             sky = sky_along(surrounding, self.rays.directions[start : start + SOME])
             kernels.see_around(ids, start, sky, surrounding.below, light)
-        if len(lanterns.points):
-            points = turns * kernels.HITS, np.float32(kernels.HITS), lanterns.points
-            near = ids, self.rays.far, lanterns.froms, emitted
+        if len(emissive.points):
+            points = turns * kernels.HITS, np.float32(kernels.HITS), emissive.points
+            near = ids, self.rays.far, emissive.froms, emitted
             shine_at(tree, self.rays.origins, self.normals, *points, *near, np.float32(off), light)
         return light
 

@@ -196,8 +196,8 @@ def _add(node, x, y, z, r, g, b):
 
 @njit(_nrt=True)
 def shine_on(tree, places, turn, axes, turns, points, ids, far, local, froms, emitted, off, nodes):
-    """Add to nodes (N, COLUMNS) what arrives from lanterns (see `kernels_emissive`): from every `turns`-th point, and along
-    rays that hit lanterns close by. axes (W, 3, 3): rows are both axes and the normal; the others as in `see`.
+    """Add to nodes (N, COLUMNS) what arrives from emissive triangles (see `kernels_emissive`): from every `turns`-th point, and
+    along rays that hit emissive triangles close by. axes (W, 3, 3): rows are both axes and the normal; the others as in `see`.
     """
     stack = np.empty((DEEP, 2), np.float32)
     per = f4(1) / f4(ids.shape[0])

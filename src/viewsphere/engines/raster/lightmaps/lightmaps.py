@@ -57,9 +57,9 @@ class Chart:
 class Charts:
     """The part of the lightmaps that depends on no light.
 
-    charts, chart: see `Lightmap`, of the hall's own triangles; origins (N, 3), turn (N,): of the nodes' rays in directions
-    (W, K, 3), which are `local` (R, K, 3) in axes (W, 3, 3) of the charts; reached (N,): whether the node is near the chart's
-    triangles, so that some point reads it.
+    charts, chart: see `Lightmap`, of the bounce scene's own triangles; origins (N, 3), turn (N,): of the nodes' rays in
+    directions (W, K, 3), which are `local` (R, K, 3) in axes (W, 3, 3) of the charts; reached (N,): whether the node is near
+    the chart's triangles, so that some point reads it.
     """
 
     charts: Float32

@@ -79,8 +79,8 @@ class Sites:
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Triangles whose light is known at points. facets (F, 5), knots (I,): see `Lightmap`; which (F,): of the hall's triangles;
-    places, normals (P, 3): of the points; open (P,): see `openness`.
+    """Triangles whose light is known at points. facets (F, 5), knots (I,): see `Lightmap`; which (F,): of the bounce scene's
+    triangles; places, normals (P, 3): of the points; open (P,): see `openness`.
     """
 
     facets: Float32
@@ -213,7 +213,7 @@ def _facets(
 
 
 def numbered(chart: Int32, facets: Facets) -> Int32:
-    """The charts of a hall's triangles, with the numbers of facets where there are any: see `Lightmap`."""
+    """The charts of a bounce scene's triangles, with the numbers of facets where there are any: see `Lightmap`."""
     chart = chart.copy()
     chart[facets.which] = NONE - 1 - np.arange(len(facets.which), dtype=np.int32)
     return chart

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster.indirect import kernels_probes
-from viewsphere.engines.raster.indirect.bounces import Hall, without_maps
+from viewsphere.engines.raster.indirect.bounces import BounceScene, without_maps
 from viewsphere.engines.raster.indirect.radiosity_patches import ANY_VIEW
 from viewsphere.engines.raster.materials.kernels_material import L_ROUGH, L_ROUGH_TEXEL
 from viewsphere.engines.raster.records import Float32, Int32, PictureRays
@@ -55,9 +55,9 @@ def mirror_in_panes(
     """Put what rays see in place of what smooth surfaces are taken to mirror in `radiance` (H * W, 4), if light bounces, but in
     the pixels `left_out` (n,).
     """
-    if baked.hall is None or baked.tree is None:
+    if baked.bounce_scene is None or baked.tree is None:
         return
-    panes = _panes(baked, baked.hall, visibility, left_out)
+    panes = _panes(baked, baked.bounce_scene, visibility, left_out)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     view, light = view_of(baked, camera), (baked.surrounding, baked.occlusion, baked.bounces)
     borders = (FINE_SHARP, FINE_BLURRED) if baked.is_fine else (SHARP, BLURRED)
@@ -68,12 +68,12 @@ def mirror_in_panes(
         width = (view.pixel * view.scale / depth[at]).astype(np.float32)
         if baked.is_fine:
             toward, normals = _facing(view, gloss)
-            shown, is_known = _seen_in_lobes(baked, baked.hall, baked.tree, view, (toward, normals), gloss, at, width)
+            shown, is_known = _seen_in_lobes(baked, baked.bounce_scene, baked.tree, view, (toward, normals), gloss, at, width)
             made_of = baked.surfaces.material[triangle[at]]
             shown = kernels_mirror.shared(at, normals, made_of, gloss, shown, is_known, camera.width)
         else:
             sights = gloss[:, 7:10].copy(), gloss[:, 10:13].copy(), width
-            shown, is_known = _seen(baked, baked.hall, baked.tree, sights, float(view.pixel))
+            shown, is_known = _seen(baked, baked.bounce_scene, baked.tree, sights, float(view.pixel))
         at, gloss, shown = at[is_known].astype(np.intp), gloss[is_known], shown[is_known]
         nearness = np.zeros(len(at), np.float32)
         kernels_mirror.polish(at, gloss, shown, shown, nearness, depth, *map(np.float32, borders), radiance)
@@ -89,7 +89,7 @@ def _facing(view: PictureRays, gloss: Float32) -> tuple[Float32, Float32]:
 
 def _seen_in_lobes(
     baked: Baked,
-    hall: Hall,
+    bounce_scene: BounceScene,
     tree: Tree,
     view: PictureRays,
     facing: tuple[Float32, Float32],
@@ -109,7 +109,7 @@ def _seen_in_lobes(
         own = slice(start, start + SOME // LOBE_RAYS)
         ways, weights = lobe_rays(toward[own], normals[own], gloss[own, 6], at[own], int(view.columns), LOBE_RAYS)
         sights = np.tile(gloss[own, 7:10], (LOBE_RAYS, 1)), ways.reshape(-1, 3), np.tile(width[own], LOBE_RAYS)
-        seen, is_known = _seen(baked, hall, tree, sights, float(view.pixel))
+        seen, is_known = _seen(baked, bounce_scene, tree, sights, float(view.pixel))
         total = weights.sum(axis=0)
         each = np.where(is_known.reshape(*weights.shape, 1), seen.reshape(*weights.shape, 3), taken[own])
         shown[own] = (weights[..., None] * each).sum(axis=0) / np.maximum(total, np.float32(1e-6))[:, None]
@@ -117,8 +117,8 @@ def _seen_in_lobes(
     return shown, known
 
 
-def _panes(baked: Baked, hall: Hall, visibility: Visibility, left_out: NDArray[np.intp]) -> Int32:
-    """Pixels (n,) that show a smooth surface of the hall, and are not left out."""
+def _panes(baked: Baked, bounce_scene: BounceScene, visibility: Visibility, left_out: NDArray[np.intp]) -> Int32:
+    """Pixels (n,) that show a smooth surface of the bounce scene, and are not left out."""
     looks, shown = baked.surfaces.looks, visibility.triangle.reshape(-1)
     is_smooth = looks[:, L_ROUGH] + looks[:, L_ROUGH_TEXEL] < (FINE_BLURRED if baked.is_fine else BLURRED)
     is_pane = (shown >= 0) & is_smooth[baked.surfaces.material[shown]] & (baked.kind[shown] == kernels_paint.SOLID)
@@ -126,17 +126,17 @@ def _panes(baked: Baked, hall: Hall, visibility: Visibility, left_out: NDArray[n
     at = np.flatnonzero(is_pane)
     if not len(at):
         return at.astype(np.int32)
-    return at[hall.owns[shown[at]]].astype(np.int32)
+    return at[bounce_scene.owns[shown[at]]].astype(np.int32)
 
 
 def _seen(
-    baked: Baked, hall: Hall, tree: Tree, sights: tuple[Float32, Float32, Float32], pixel: float
+    baked: Baked, bounce_scene: BounceScene, tree: Tree, sights: tuple[Float32, Float32, Float32], pixel: float
 ) -> tuple[Float32, NDArray[np.bool_]]:
     """Radiance (n, 3) of what is seen along rays, and where it is known (n,). sights: where rays begin (n, 3), their
     directions of length 1 (n, 3), and the width of a pixel there (n,), which grows by `pixel` a length.
     """
     origins, ways, width = sights
-    off, ground = np.float32(OFF / hall.unit), hall.ground_z is not None
+    off, ground = np.float32(OFF / bounce_scene.unit), bounce_scene.ground_z is not None
     origins, light = (origins + off * ways).astype(np.float32), np.zeros_like(origins)
     left, at = np.ones(len(origins), np.float32), np.arange(len(origins))
     is_known = np.ones(len(origins), np.bool_)
@@ -151,7 +151,7 @@ def _seen(
         at, far, met = at[met >= 0], far[met >= 0], met[met >= 0]
         origins[at] += far[:, None] * ways[at]
         width[at] += far * np.float32(pixel)
-        shaded, opacity = _shaded(baked, hall, tree, off, (hall.which[met], origins[at], ways[at], width[at]))
+        shaded, opacity = _shaded(baked, bounce_scene, tree, off, (bounce_scene.which[met], origins[at], ways[at], width[at]))
         opacity = np.ones_like(opacity) if layer == LAYERS - 1 else opacity
         light[at] += (left[at] * opacity)[:, None] * shaded
         left[at] *= 1 - opacity
@@ -163,17 +163,17 @@ def _seen(
 
 
 def _shaded(
-    baked: Baked, hall: Hall, tree: Tree, off: np.float32, hits: tuple[Int32, Float32, Float32, Float32]
+    baked: Baked, bounce_scene: BounceScene, tree: Tree, off: np.float32, hits: tuple[Int32, Float32, Float32, Float32]
 ) -> tuple[Float32, Float32]:
     """Radiance (n, 3) of what rays hit, as if it scattered all light, and its opacity (n,). hits: triangles (n,), places and
     the rays' directions (n, 3), and a pixel's width (n,).
     """
     triangle, places, ways, _ = hits
     answers, arrived, glow = (np.empty((len(places), columns), np.float32) for columns in (7, 3, 3))
-    made = ANY_VIEW, hall.surfaces, hall.textures, hall.floor, baked.surrounding.albedo
+    made = ANY_VIEW, bounce_scene.surfaces, bounce_scene.textures, bounce_scene.floor, baked.surrounding.albedo
     lights = without_maps(baked.lights)
     kernels_probes.shade_hits(*made, tree, lights, off, *hits, False, False, answers, arrived)
-    normals, inside = hall.surfaces.normals[triangle], np.empty(len(places), np.float32)
+    normals, inside = bounce_scene.surfaces.normals[triangle], np.empty(len(places), np.float32)
     facing = np.where((normals * ways).sum(axis=1, keepdims=True) < 0, normals, -normals).astype(np.float32)
     kernels_probes.look_up(baked.bounces, places, facing, triangle, glow, inside)
     up = (1 + facing[:, 2:]) / 2

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewsphere.engines.raster.antialiasing import kernels_chosen
 from viewsphere.engines.raster.antialiasing.samples import Layer, Marks, Samples, differs_behind, edge_samples, layers
-from viewsphere.engines.raster.indirect.bounces import Hall
+from viewsphere.engines.raster.indirect.bounces import BounceScene
 from viewsphere.engines.raster.indirect.near_field_gather import with_near
 from viewsphere.engines.raster.materials.kernels_material import L_BENDS
 from viewsphere.engines.raster.materials.surface import Rows
@@ -40,9 +40,9 @@ class Baked:
     floor (13,): the ground's texture repeats per length, its texture coordinates at the origin, its material, 1 if the ground
     only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over half their size; its
     slabs in a repeat, 0 for none. kind (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where
-    neighbouring triangles look alike; see_through (T + 1,). blended: `with_blended_colors`. hall: the surfaces that throw the
-    light of `bounces`, None if no light bounces; tree: of the hall's triangles; is_fine: whether rays from each sample find
-    near surfaces, and the reflections in rough mirrors.
+    neighbouring triangles look alike; see_through (T + 1,). blended: `with_blended_colors`. bounce_scene: the surfaces that
+    throw the light of `bounces`, None if no light bounces; tree: of the bounce scene's triangles; is_fine: whether rays from
+    each sample find near surfaces, and the reflections in rough mirrors.
     """
 
     geometry: Geometry
@@ -61,7 +61,7 @@ class Baked:
     see_through: NDArray[np.bool_]
     blended: Geometry
     glass: Glass
-    hall: Hall | None
+    bounce_scene: BounceScene | None
     tree: Tree | None
     is_fine: bool
 
@@ -262,8 +262,8 @@ def _shade_some(
         kernels_paint.catch(view, baked.floor, *light, *seen, radiance)
         return
     bounces = baked.bounces
-    if baked.is_fine and baked.hall is not None and baked.tree is not None and not is_ground:
-        bounces = with_near(bounces, baked.hall, baked.tree, view, *seen)
+    if baked.is_fine and baked.bounce_scene is not None and baked.tree is not None and not is_ground:
+        bounces = with_near(bounces, baked.bounce_scene, baked.tree, view, *seen)
     given = view, baked.surfaces, baked.textures, baked.floor, *light, bounces, is_ground, *seen, glass
     kernels_paint.shade(*given, radiance)
     if len(split):
