@@ -14,8 +14,8 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import linear
 from viewsphere.engines._arranged import Arranged
 from viewsphere.engines._lamps import lamplight
-from viewsphere.engines.raster.indirect.bounce_scene import Halls
-from viewsphere.engines.raster.indirect.bounces import bake_bounces, tree_of_hall
+from viewsphere.engines.raster.indirect.bounce_scene import BounceScenes
+from viewsphere.engines.raster.indirect.bounces import bake_bounces, tree_of_scene
 from viewsphere.engines.raster.materials.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
 from viewsphere.engines.raster.materials.surface import Lengths, Materials, Rows, made_of, pack_materials
 from viewsphere.engines.raster.options import Options
@@ -62,7 +62,7 @@ class Packed:
             return pack(arranged, ground, lengths, materials)
         self.rows.move(geometry, arranged.meshes, arranged.changed_since(self.arranged))
         is_blended = self.blended is not self.arranged.geometry
-        blended = {"cutouts": self.blended.cutouts, "triangle_cutout": self.blended.triangle_cutout}
+        blended = {"alpha_masks": self.blended.alpha_masks, "triangle_cutout": self.blended.triangle_cutout}
         return replace(
             self,
             arranged=arranged,
@@ -115,10 +115,10 @@ def sequence_lengths(meshes: Sequence[Mesh]) -> Lengths:
     return Lengths((0.0, 0.0, 0.0), 2.0 ** math.ceil(math.log2(unit)))
 
 
-def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, halls: Halls) -> Baked:
+def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, bounce_scenes: BounceScenes) -> Baked:
     """Return the data from which the engine paints pictures of arranged things.
 
-    `shades` keeps the occlusion by targets of a sequence, `halls` the surfaces that throw light.
+    `shades` keeps the occlusion by targets of a sequence, `bounce_scenes` the surfaces that throw light.
     """
     geometry, surfaces, lengths = packed.arranged.geometry, packed.surfaces, packed.lengths
     has_ground = scene.ground is not None
@@ -135,9 +135,9 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
         occlusion = shades.bake(packed.arranged, casters, lengths.unit, has_ground, options.ambient_occlusion)
     else:
         occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion, arranged.targets == 1)
-    hall = halls.of(packed.arranged, packed.rows, casters, floor, ground, lengths, has_ground, options.bounces)
-    bounces = NO_BOUNCES if hall is None else bake_bounces(hall, surrounding, lights)
-    if hall is not None and hall.has_map:
+    bounce_scene = bounce_scenes.of(packed.arranged, packed.rows, casters, floor, ground, lengths, has_ground, options.bounces)
+    bounces = NO_BOUNCES if bounce_scene is None else bake_bounces(bounce_scene, surrounding, lights)
+    if bounce_scene is not None and bounce_scene.has_map:
         occlusion = of_ground_alone(occlusion)
     return Baked(
         geometry=geometry,
@@ -156,9 +156,9 @@ def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades, h
         bounces=bounces,
         blended=packed.blended,
         glass=glass_of(packed.rows),
-        hall=hall if bounces.grid[0] else None,
+        bounce_scene=bounce_scene if bounces.grid[0] else None,
         is_fine=options.bounces == "fine",
-        tree=tree_of_hall(hall) if hall is not None and bounces.grid[0] else None,
+        tree=tree_of_scene(bounce_scene) if bounce_scene is not None and bounces.grid[0] else None,
     )
 
 
