@@ -21,7 +21,6 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.planning.samplers.shared.random import scene_laid
-from viewsphere.zoo import build_zoo_model
 
 MODELS = [
     {"source": "zoo:hair_drier", "count": 6},
@@ -41,7 +40,7 @@ LAYOUTS: dict[str, dict[str, Any]] = {
 @lru_cache
 def box_of(spec: ModelSpec, step: TimeStep | None = None) -> Any:
     """The box of a model."""
-    return box_vertices(*load_normalised(spec, build_zoo_model).bounds)
+    return box_vertices(*load_normalised(spec).bounds)
 
 
 def main() -> None:

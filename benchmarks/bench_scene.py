@@ -15,7 +15,7 @@ import numpy as np
 from viewsphere import Recipe
 from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Image, Mesh, Texture
-from viewsphere.zoo import build
+from viewsphere_zoo import build
 
 TRIANGLES = 75_000
 TEXELS = 1024

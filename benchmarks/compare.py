@@ -43,10 +43,10 @@ from viewsphere.rendering.ground.material import SLABS, ground_material
 from viewsphere.rendering.ground.slab_picture import laid_with_slabs
 from viewsphere.rendering.view import develop
 from viewsphere.truth.raster.visibility import rasterize
-from viewsphere.zoo import build
-from viewsphere.zoo.household.vessels import vessel
-from viewsphere.zoo.shapes.assembly import Piece, assemble
-from viewsphere.zoo.shapes.solids import join, lathe
+from viewsphere_zoo import build
+from viewsphere_zoo.household.vessels import vessel
+from viewsphere_zoo.shapes.assembly import Piece, assemble
+from viewsphere_zoo.shapes.solids import join, lathe
 
 WIDTH, HEIGHT = 480, 360
 MEASURES = {"flip_evaluator": "flip-evaluator", "skimage": "scikit-image"}

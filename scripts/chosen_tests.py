@@ -38,16 +38,18 @@ ROOT = Path(__file__).parent.parent
 MAIN = "origin/main"
 READ = ("docs", "recipes", "examples", "benchmarks", "scripts")
 """Folders of files that tests read or run."""
-NAMING = ("viewsphere.formats.", "viewsphere.labels.", "viewsphere.zoo.")
+ROOTS = {"viewsphere", "viewsphere_zoo"}
+NAMING = ("viewsphere.formats.", "viewsphere.labels.", "viewsphere_zoo.")
 """Packages whose plug-ins name others. All other modules are given the names by recipes and by tests."""
 LISTS = {
     "channel_labels": "viewsphere.labels.",
     "labels": "viewsphere.labels.",
     "formats": "viewsphere.formats.",
-    "families": "viewsphere.zoo.",
-    "places": "viewsphere.zoo.",
-    "things": "viewsphere.zoo.",
-    "zoo": "viewsphere.zoo.",
+    "family_names": "viewsphere_zoo.",
+    "place_names": "viewsphere_zoo.",
+    "model_names": "viewsphere_zoo.",
+    "things": "viewsphere_zoo.",
+    "zoo": "viewsphere_zoo.",
     "loadable": "viewsphere.",
     "plugins": "viewsphere.",
     "names": "viewsphere.",
@@ -55,8 +57,8 @@ LISTS = {
 """Functions and commands that list plug-ins without naming them, with the package that each lists."""
 SCANS = {"rglob", "copytree"}
 """Functions that go through all files of a folder."""
-BY_PATH = re.compile(r"attribute\(|[\"']viewsphere\.")
-PATH, PROGRAM = re.compile(r"viewsphere(?:\.\w+)+"), re.compile(r"\bviewsphere\b(?!\.)")
+BY_PATH = re.compile(r"attribute\(|[\"']viewsphere(?:_zoo)?\.")
+PATH, PROGRAM = re.compile(r"viewsphere(?:_zoo)?(?:\.\w+)+"), re.compile(r"\bviewsphere\b(?!\.)")
 WORD, FILE = re.compile(r"\w+"), re.compile(r"[\w./-]+")
 
 
@@ -125,22 +127,23 @@ class Modules:
     """The modules of viewsphere, and which others each imports or names."""
 
     def __init__(self) -> None:
-        graph = grimp.build_graph("viewsphere", exclude_type_checking_imports=True)
+        graph = grimp.build_graph("viewsphere", "viewsphere_zoo", exclude_type_checking_imports=True)
         self.all = frozenset(graph.modules)
         self.plugins = defaultdict[str, set[str]](set)
         for kind in SEAMS:
             for name, module in shipped(kind).items():
                 self.plugins[name].add(module)
-        homes = {"viewsphere.composing.trajectories", "viewsphere.zoo", "viewsphere.zoo.places"}
+        homes = {"viewsphere.composing.trajectories"}
         for module in self.all:
             package, _, name = module.rpartition(".")
             if package in homes and not name.startswith("_"):
                 self.plugins[name].add(module)
+        self.plugins["zoo"] = {"viewsphere_zoo.source"}
         self.needs = {module: graph.find_modules_directly_imported_by(module) | self._named(module) for module in self.all}
         for loader, meant in self._implied().items():
             self.needs[loader] |= meant
         self.needs["viewsphere"] = {"viewsphere.model.notebook"}  # all else is imported for a name that is used
-        for module in self.all - {"viewsphere"}:
+        for module in self.all - ROOTS:
             self.needs[module].add(module.rpartition(".")[0])  # whose own file runs first
 
     def _implied(self) -> dict[str, set[str]]:
@@ -158,6 +161,7 @@ class Modules:
             "viewsphere.planning.checks.models": defaults,
             "viewsphere.run.shots.stages": defaults,
             "viewsphere.blender.process": worker,
+            "viewsphere.plugins.source": self.plugins["zoo"],
         }
 
     def _named(self, module: str) -> set[str]:
@@ -165,7 +169,11 @@ class Modules:
         if not module.startswith(NAMING) and not BY_PATH.search(self.file(module).read_text(encoding="utf-8")):
             return set()
         strings = text_of(parsed(self.file(module))).strings
-        full = {text if text.startswith("viewsphere.") else f"viewsphere.{text}" for text in strings if "." in text}
+        full = {
+            text if text.startswith(("viewsphere.", "viewsphere_zoo.")) else f"viewsphere.{text}"
+            for text in strings
+            if "." in text
+        }
         named = {self.at(path) for path in full} if module != "viewsphere" else set[str]()  # whose names users import
         if module.startswith(NAMING):
             named = named.union(*(self.plugins.get(text, ()) for text in strings))
@@ -186,7 +194,7 @@ class Modules:
     def used_by(self, text: Text) -> set[str]:
         """The modules that a test's text imports or names itself."""
         paths = {path for string in text.strings for path in PATH.findall(string)}
-        used = {self.at(name) for name in (*text.imports, *paths) if name.partition(".")[0] == "viewsphere"}
+        used = {self.at(name) for name in (*text.imports, *paths) if name.partition(".")[0] in ROOTS}
         programs = {string for string in text.strings if PROGRAM.search(string)}
         if programs or "viewsphere" in text.imports:
             words = {word for string in programs for word in WORD.findall(string)} | text.names

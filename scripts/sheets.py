@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
+import viewsphere_zoo as zoo
 from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.mesh import Mesh
@@ -41,7 +42,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.truth.raster.visibility import rasterize
-from viewsphere.zoo import build, build_zoo_model
+from viewsphere_zoo import build
 
 TILE = (320, 240)
 LENS = Intrinsics(width=TILE[0], height=TILE[1], fx=480, fy=480, cx=TILE[0] / 2, cy=TILE[1] / 2)
@@ -84,7 +85,7 @@ def models(files: Sequence[Path], families: Sequence[str]) -> Iterator[tuple[str
     for file in files:
         spec = SPEC.model_copy(update={"source": str(file.resolve())})
         try:
-            yield file.name, load_normalised(spec, build_zoo_model)
+            yield file.name, load_normalised(spec)
         except ViewsphereError as error:
             print(error)
 
@@ -113,7 +114,7 @@ def main() -> None:
     options.add_argument("--elevation", type=float, default=20, help="degrees above the horizon")
     args = options.parse_intermixed_args()
     rows: list[Image.Image] = []
-    families = args.families or (() if args.models else plugins.families())
+    families = args.families or (() if args.models else zoo.family_names())
     for name, mesh in models(args.models, families):
         size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
         lights = (*scenes(size), *extra_scenes(args.hdri, args.photo))

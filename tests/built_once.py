@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from unittest.mock import patch
 
-from viewsphere import zoo
+import viewsphere_zoo as zoo
 
 QUICK = {"name": "raster", "bounces": "off", "ambient_occlusion": "off", "antialias": 1, "shadow_resolution": 64}
 """An engine for recipes whose light is no matter: what bounces, hollows and shadows are, each bakes for as long as it draws."""

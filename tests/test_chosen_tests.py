@@ -32,7 +32,7 @@ def chosen():
          ["tests/geometry/test_curve.py"]),
         ("src/viewsphere/formats/tum/reading.py", ["tests/formats/test_tum.py"],
          ["tests/formats/test_coco.py", "tests/zoo/test_chair.py"]),
-        ("src/viewsphere/zoo/boat.py", ["tests/zoo/test_boat.py"],
+        ("src/viewsphere_zoo/families/boat.py", ["tests/zoo/test_boat.py"],
          ["tests/formats/test_tum.py"]),
         ("src/viewsphere/labels/position.py", ["tests/labels/test_position.py", "tests/test_check.py"],
          ["tests/geometry/test_box.py"]),
@@ -81,9 +81,9 @@ def test_tests_that_go_through_all_sources_are_chosen_for_each(chosen):
 
 def test_a_module_that_no_test_reaches_chooses_all(chosen, monkeypatch):
     modules, name = chosen.Modules(), "lonely"
-    monkeypatch.setattr(modules, "all", modules.all | {f"viewsphere.zoo.{name}"})
+    monkeypatch.setattr(modules, "all", modules.all | {f"viewsphere_zoo.{name}"})
     with pytest.raises(chosen.CannotTell, match="no test reaches"):
-        chosen.choose(["src/viewsphere/zoo/boat.py", f"src/viewsphere/zoo/{name}.py"])
+        chosen.choose(["src/viewsphere_zoo/families/boat.py", f"src/viewsphere_zoo/{name}.py"])
 
 
 LOADED = """

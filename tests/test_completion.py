@@ -8,13 +8,14 @@ from pathlib import Path
 
 import pytest
 
+import viewsphere_zoo as zoo
 from deadline import DEADLINE
 from quick import quick
 from viewsphere import cli, plugins
 from viewsphere.cli import completion
 
 COMMANDS = ("new", "inspect", "plan", "preview", "render", "export", "check", "report", "view", "merge", "import", "convert")
-ZOO = [f"zoo:{name}" for name in plugins.families()]
+ZOO = [f"zoo:{name}" for name in zoo.family_names()]
 
 
 def viewsphere(*words, **variables):
@@ -51,7 +52,7 @@ def offered(*words, cwd=None):
     [
         (("rend",), ["render"]),
         (("inspect", "z"), ZOO),
-        (("inspect", "zoo", ":", "ca"), [name for name in plugins.families() if name.startswith("ca")]),
+        (("inspect", "zoo", ":", "ca"), [name for name in zoo.family_names() if name.startswith("ca")]),
         (("inspect", "zoo", ":"), [name.removeprefix("zoo:") for name in ZOO]),
         (("inspect", "a.obj", "--up", "+"), ["+x", "+y", "+z"]),
         (("render", "a.yaml", "-f", ""), [*plugins.names("formats")]),

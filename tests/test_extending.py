@@ -1,7 +1,7 @@
 """The worked example of docs/extending.md is real: its code is taken from the page and run."""
 
 import csv
-import importlib
+import inspect
 import json
 import os
 import pickle
@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import viewsphere_zoo as zoo
 from deadline import DEADLINE
 from installed import example, installed, write_package
 from scratch import scratch_cache
@@ -203,20 +204,16 @@ GROUPS = {
     "dots": ("materials", "dots"),
     "tri": ("readers", "Triangles as text"),
     "ring": ("lights", "ring"),
+    "peg": ("families", "Pegs that stand on a foot."),
+    "pegs": ("places", "A pair of pegs on an empty floor."),
 }
 """The plug-ins of the page: their groups, and how their examples begin."""
 
-ZOO = {
-    "viewsphere.zoo": ("peg", "Pegs that stand on a foot."),
-    "viewsphere.zoo.places": ("pegs", "A pair of pegs on an empty floor."),
-}
-"""The page's modules of the zoo, by their packages: their names, and how their examples begin."""
-
 INSTALLED = """
-models: [{source: "zoo:mug", count: 3}, {source: "zoo:box", category: box}]
+models: [{source: "zoo:peg", count: 3}, {source: "zoo:box", category: box}]
 viewpoints: {azimuth: [0, 40], elevation: 20, distance: 2}
 camera: {size: [96, 72], fov_deg: 40}
-scene: {ground: {material: dots}, lights: {kind: ring, position: [0, 0, 1], strength: 4}}
+scene: {ground: {material: dots}, lights: {kind: ring, position: [0, 0, 1], strength: 4}, place: "zoo:pegs"}
 channels: [rgb, instances, borders]
 formats: [csv_boxes, lines]
 splits: {by: frame, train: 1}
@@ -250,26 +247,11 @@ def test_the_page_s_plug_ins_work_in_a_package_that_is_installed(tmp_path):
         assert len(Dataset(tmp_path / name)) > 0
 
 
-@pytest.fixture
-def zoo_modules(monkeypatch, tmp_path):
-    """Puts the page's modules beside those of the zoo, as files; they are forgotten afterwards."""
-    for package, (name, begins) in ZOO.items():
-        folder = tmp_path / package
-        folder.mkdir()
-        (folder / f"{name}.py").write_text(next(code for code in EXAMPLES.values() if code.startswith(f'"""{begins}')))
-        whole = importlib.import_module(package)
-        monkeypatch.setattr(whole, "__path__", [*whole.__path__, str(folder)])
-    scratch_cache(monkeypatch, tmp_path / "cache")
-    yield
-    for package, (name, _) in ZOO.items():
-        sys.modules.pop(f"{package}.{name}", None)
-        vars(sys.modules[package]).pop(name, None)
-
-
 @pytest.mark.slow
-@pytest.mark.usefixtures("zoo_modules")
-def test_a_family_of_the_zoo_is_one_file_and_so_is_a_place():
-    assert "peg" in plugins.families() and "pegs" in plugins.places()
+def test_a_family_of_the_zoo_is_one_file_and_so_is_a_place(install, monkeypatch, tmp_path):
+    scratch_cache(monkeypatch, tmp_path / "cache")
+    for name in ("peg", "pegs"):
+        install(GROUPS[name][0], name, example(GROUPS[name][1]))
     recipe = small_recipe(
         models=[{"source": "zoo:peg", "count": 2}],
         viewpoints={"azimuth": 0, "elevation": 10, "distance": 0.6},
@@ -283,15 +265,16 @@ def test_a_family_of_the_zoo_is_one_file_and_so_is_a_place():
         seen = sample.objects[0]
         assert seen.category == "peg" and 0.08 <= seen.size[1] <= 0.16
         assert (sample.instances == seen.id).sum() > 20
-    model = plugins.family("peg").peg()
-    assert model.parts == ("foot", "stem") and model.vertices[:, 2].min() == 0
+    peg = zoo.family("peg")
+    model = inspect.getmodule(peg.random).peg()
+    assert peg.home == "table" and model.parts == ("foot", "stem") and model.vertices[:, 2].min() == 0
     a, b, c = np.moveaxis(model.vertices[model.triangles].astype(float), 1, 0)
     solid = np.pi * (0.03**2 * 0.012 + 0.01**2 * 0.108)
     assert (a * np.cross(b, c)).sum() / 6 == pytest.approx(solid, rel=0.02)  # outside is outside
 
 
 def test_every_example_of_the_page_is_used():
-    begins = [*(begins for _, begins in GROUPS.values()), *(begins for _, begins in ZOO.values()), "The same table"]
+    begins = [*(begins for _, begins in GROUPS.values()), "The same table"]
     assert all(any(code.startswith(f'"""{one}') for one in begins) for code in EXAMPLES.values())
 
 

@@ -110,7 +110,7 @@ COMMANDS = {
     "expected field=value": "plan r.yaml --set scene.ground",
     "found no <name> in": "plan r.yaml --set 'models=[{source: gone.glb, category: x}]'",
     "gives none in": "plan r.yaml --set 'models=[{source: \"*.glb\", category: x}]'",
-    "only zoo families have one": "plan r.yaml --set 'models=[{source: here/ok.obj}]'",
+    "only models of a source have one": "plan r.yaml --set 'models=[{source: here/ok.obj}]'",
     "shares that add up to 1": "plan r.yaml --set splits.train=0.7",
     "split <name> is empty": "plan r.yaml --set splits.train=0.8 --set splits.val=0.1 --set splits.test=0.1",
     "the ground hides the models": "plan r.yaml --set viewpoints.elevation=-10 --set scene.ground=on",

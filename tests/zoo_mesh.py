@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from viewsphere import zoo
+import viewsphere_zoo as zoo
 from viewsphere.assets.mesh import Mesh
 
 ON_CI = os.environ.get("CI") == "true"

@@ -7,7 +7,6 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from deadline import DEADLINE, until
@@ -203,10 +202,8 @@ def test_without_processes_the_error_says_so(spec, monkeypatch):
 
 @pytest.mark.slow
 def test_zoo_models_stay_here(spec, monkeypatch):
-    mesh = load_normalised(spec)
     monkeypatch.setattr(subprocess, "Popen", None)
-    found = load_normalised(spec.model_copy(update={"source": "zoo:cube"}), lambda _: mesh)
-    np.testing.assert_array_equal(found.vertices, mesh.vertices)
+    assert load_normalised(spec.model_copy(update={"source": "zoo:mug", "seed": 1})).triangles.size
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from fake_blender import ABORTING, LACKING, fake_blender, interpreter, with_modu
 from viewsphere.blender import environment
 from viewsphere.blender.interpreter import VARIABLE, Device, Library, find_blender, missing_libraries, probe
 from viewsphere.errors import MissingExtraError, UserError
-from viewsphere.zoo.people import makehuman
+from viewsphere_zoo.people import makehuman
 
 LDD = """\
 \tlinux-vdso.so.1 (0x00007eff2b926000)

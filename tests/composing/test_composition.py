@@ -1,19 +1,18 @@
 """Places, company and planes in a plan: what is drawn, what it depends on, and what is refused."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from place_files import write_picture, write_place
-from viewsphere import plugins
+from viewsphere.composing.scene import scenery
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
+from viewsphere.model.place import Place, PlacePiece, standing
 from viewsphere.model.shot import Shot
 from viewsphere.planning.distances import Distances
 from viewsphere.planning.plan import check_images, plan
+from viewsphere.plugins.place import PlaceSpec
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.zoo.places import Place, PlacePiece, standing
 
 
 def box_of(spec, step=None):
@@ -47,15 +46,11 @@ def tiny(monkeypatch):
         house = PlacePiece("house", "house", int(rng.integers(1 << 20)), "house", standing(-9, 0, 90))
         return Place((PlacePiece("street", "street", 1, "street", standing(0, 0)), house, *trees), free=(-3, -40, 3, 40))
 
-    real = plugins.place
-    monkeypatch.setattr(
-        plugins, "place", lambda name: SimpleNamespace(tiny_random=tiny_random) if name == "tiny" else real(name)
-    )
-    from viewsphere.composing.scene.scenery import _drawn_place as draw_place
-
-    draw_place.cache_clear()
+    real = scenery.place_of
+    monkeypatch.setattr(scenery, "place_of", lambda name: PlaceSpec(random=tiny_random) if name == "zoo:tiny" else real(name))
+    scenery._drawn_place.cache_clear()
     yield "zoo:tiny"
-    draw_place.cache_clear()
+    scenery._drawn_place.cache_clear()
 
 
 def test_a_recipe_without_any_of_it_has_its_model_alone():

@@ -11,7 +11,6 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.planning.plan import plan
 from viewsphere.run.generate import generate
-from viewsphere.zoo import build_zoo_model
 
 OWN = {"source": "zoo:post_box", "count": 2, "scale": {"length": 0.18}}
 OTHER = {"source": "zoo:open_box", "count": 2, "name": "clutter", "labels": "background"}
@@ -62,7 +61,7 @@ def test_distractors_fall_with_the_others():
     assert all(len(sample.objects) == 2 for sample in vs.render(recipe(*models, **fields)))
     planned = plan(recipe(*models, **fields))
     assert planned.max_objects == 2 and len(planned.distractors) == 2
-    shot = planned.shot(0, lambda spec, step=None: box_vertices(*load_normalised(spec, build_zoo_model).bounds))
+    shot = planned.shot(0, lambda spec, step=None: box_vertices(*load_normalised(spec).bounds))
     assert [thing.id for thing in shot.things] == [1, 2, 0, 0]
     assert all(len(set(thing.motion.poses)) > 1 for thing in shot.things)
 

@@ -22,7 +22,7 @@ from viewsphere.planning.plan import plan
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.run.generate import generate
 from viewsphere.store import Simulated
-from viewsphere.zoo.open_box import boards
+from viewsphere_zoo.families.open_box import boards
 
 
 def options(name, **given):

@@ -19,12 +19,11 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.model.scene import IDENTITY
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.placer import PlacerSpec
-from viewsphere.zoo import build_zoo_model
 
 
 @lru_cache
 def box_of(model, step=None):
-    return box_vertices(*load_normalised(model, build_zoo_model).bounds)
+    return box_vertices(*load_normalised(model).bounds)
 
 
 def ways(shapes, seed=0, **given):
@@ -100,7 +99,7 @@ def test_company_falls_on_the_model_that_it_joins():
     assert len(shot.things[0].motion.poses) == 1 and all(len(thing.motion.poses) > 1 for thing in shot.things[1:3])
     hulls = []
     for thing in shot.things[:3]:
-        points = load_normalised(thing.model, build_zoo_model).vertices.astype(np.float64)
+        points = load_normalised(thing.model).vertices.astype(np.float64)
         pose = np.array(thing.motion.poses[-1])
         hulls.append(points @ pose[:3, :3].T + pose[:3, 3])
     assert max(depth(a, b) for a, b in itertools.combinations(hulls, 2)) < 0.002

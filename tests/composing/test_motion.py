@@ -24,7 +24,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.file import read
 from viewsphere.recipe.motion import MotionEntry
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.zoo.places.neighbourhood import neighbourhood
+from viewsphere_zoo.places.neighbourhood import neighbourhood
 
 BOX = box_vertices((-1.0, -2.0, -0.5), (1.0, 2.0, 0.5))
 PLACED = standing(BOX, 3.0, 4.0, 30.0)

@@ -17,7 +17,7 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.zoo.street import lanes
+from viewsphere_zoo.families.street import lanes
 
 BOX = box_vertices((-1.0, -2.0, 0.0), (1.0, 2.0, 1.5))
 

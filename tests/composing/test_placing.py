@@ -31,7 +31,6 @@ from viewsphere.model.scene import IDENTITY
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.zoo import build_zoo_model
 
 
 def spec(key):
@@ -389,7 +388,7 @@ PLACER = PlacerSpec(place=place)
 
     def box_of(spec, step=None):
         if spec.key not in boxes:
-            boxes[spec.key] = box_vertices(*load_normalised(spec, build_zoo_model).bounds)
+            boxes[spec.key] = box_vertices(*load_normalised(spec).bounds)
         return boxes[spec.key]
 
     things = plan(recipe("leaning")).shot(0, box_of).things

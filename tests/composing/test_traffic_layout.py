@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from viewsphere.errors import RecipeError, UserError
+from viewsphere.model.place import stretches
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.shots.stages import Stages
-from viewsphere.zoo.townscape.street_life import stretches
 
 CAMERA = {"size": [32, 32], "fov_deg": 70}
 

@@ -15,7 +15,6 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import random_rotation, transform
 from viewsphere.planning.plan import plan
-from viewsphere.zoo import build_zoo_model
 
 
 def test_no_two_meet_in_the_air_and_all_are_in_the_volume():
@@ -107,16 +106,14 @@ def test_models_lie_in_a_scene():
     planned = plan(small_recipe(scenes=scenes, scene={"ground": True}, splits={"by": "frame"}))
 
     def box_of(model, step=None):
-        return box_vertices(*load_normalised(model, build_zoo_model).bounds)
+        return box_vertices(*load_normalised(model).bounds)
 
     ups = []
     for row in planned.rows:
         if row.positions[0][0] == 0:
             for thing in planned.shot(row, box_of).things[:2]:
                 ups.append(abs(thing.world_from_object[2][2]))
-                low = transform(np.array(thing.world_from_object), load_normalised(thing.model, build_zoo_model).vertices)[
-                    :, 2
-                ].min()
+                low = transform(np.array(thing.world_from_object), load_normalised(thing.model).vertices)[:, 2].min()
                 assert low == pytest.approx(0, abs=1e-6)
     assert min(ups) < 0.1  # a post box lies on its side more often than it stands
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from test_raster import box, mesh_of
 
+import viewsphere_zoo as zoo
 from shots import still_shot
-from viewsphere import zoo
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from light_stage import LightStage, Samples, ball, cuboid, distances, flat, points, quad
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import zoo
 from viewsphere.engines.raster import kept_light
 from viewsphere.engines.raster.materials.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.shadows import occlusion

@@ -11,9 +11,10 @@ from blurred_scenes import SCENES, load, meshes, sharp
 from light_stage import ball, cuboid, flat, quad
 from test_physics import camera, sky_file, stage_of, toward_sun
 
+import viewsphere_zoo as zoo
 from proven import close, told
 from shots import with_camera
-from viewsphere import Recipe, plan, zoo
+from viewsphere import Recipe, plan
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines import raster
 from viewsphere.engines._passes import shading_of

@@ -142,7 +142,7 @@ def test_white_furnace_of_a_box(even, material):
 @pytest.mark.parametrize("material", [MATERIALS[0], MATERIALS[4], pytest.param(MATERIALS[-2], marks=pytest.mark.slow)])
 def test_white_furnace_of_a_car(even, material):
     """Dents of shading normals that look away from what is seen may darken single pixels; occlusion only ever darkens."""
-    from viewsphere.zoo import build
+    from viewsphere_zoo import build
 
     car = build("car", np.random.default_rng(4))
     light = furnace(even, car, material, 7.0, ambient_occlusion="off")
@@ -295,7 +295,7 @@ def blocked(scene, origins: np.ndarray, toward: np.ndarray) -> np.ndarray:
     ("kind", "azimuth", "elevation"), quick([("car", 70, 35), ("chair", 200, 55), ("bicycle", 300, 25)], ("chair", 200, 55))
 )
 def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevation):
-    from viewsphere.zoo import build
+    from viewsphere_zoo import build
 
     mesh = build(kind, np.random.default_rng(2))
     mesh = flat(mesh.vertices[mesh.triangles], Material(roughness=1.0))  # facets: lit as their rays are

@@ -14,7 +14,7 @@ from viewsphere.engines.raster.shading.kernels_paint import BRIGHT, GLINT, avera
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.truth.raster.visibility import rasterize
-from viewsphere.zoo import build
+from viewsphere_zoo import build
 
 
 def fine(geometry, camera):

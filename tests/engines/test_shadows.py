@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from light_stage import LightStage, ball, cuboid, distances, flat, points, quad
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import zoo
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines.raster.shadows import kernels_shadow as shadow
 from viewsphere.geometry.camera import orbit_center, orbit_rotation

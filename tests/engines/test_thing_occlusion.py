@@ -11,8 +11,8 @@ from light_stage import LightStage, points
 from test_occlusion import camera, open_share, some
 from test_raster import box, mesh_of
 
+import viewsphere_zoo as zoo
 from shots import still_shot
-from viewsphere import zoo
 from viewsphere.engines import raster
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec

@@ -28,7 +28,6 @@ from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Choice, frame_ranges
-from viewsphere.zoo import build_zoo_model
 
 
 @pytest.fixture
@@ -83,7 +82,7 @@ def test_the_models_are_the_stores(asked, small_run, tmp_path):
     export(small_run, ["blend"], output=tmp_path)
     for told in asked.values():
         (spec,) = {p.model for p in told.shot.things}
-        found, made = told.load(spec), load_normalised(spec, build_zoo_model)
+        found, made = told.load(spec), load_normalised(spec)
         corners = [mesh.vertices[mesh.triangles] for mesh in (found, made)]
         assert np.array_equal(*corners)
         assert found.materials == made.materials

@@ -29,7 +29,7 @@ from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scene import EngineEntry
 from viewsphere.rendering.ground.material import ground_albedo, ground_material, only_scatters
-from viewsphere.zoo import build
+from viewsphere_zoo import build
 
 WOOD = ProceduralMaterial(name="wood", seed=4, size=128)
 BRICK = ProceduralMaterial(name="brick", seed=4, size=128)

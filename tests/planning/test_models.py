@@ -6,7 +6,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.planning import models
 from viewsphere.planning.models import categories, count_models, left_out, model_specs
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.zoo import things
+from viewsphere_zoo import things
 
 
 @pytest.fixture
@@ -108,7 +108,8 @@ def test_the_same_model_twice_needs_names(build):
 
 def test_sources_that_give_nothing_are_named(build, tmp_path):
     assert error(build([entry("x.obj")])) == (
-        f"models[0].source: expected a file, folder, pattern or zoo:<family>; found no 'x.obj' in {tmp_path}"
+        "models[0].source: expected a file, folder, pattern or a source's model, such as zoo:car; "
+        f"found no 'x.obj' in {tmp_path}"
     )
     assert error(build([entry("bicycle")])).endswith(f"found no 'bicycle' in {tmp_path}; did you mean 'zoo:bicycle'?")
     assert error(build([{"source": "zoo:car"}, entry("x/*.obj")])).startswith("models[1].source: expected model files (.3mf")

@@ -8,8 +8,9 @@ import pytest
 from viewsphere import Recipe, render
 from viewsphere.composing.viewpoints.camera import inside_box
 from viewsphere.errors import RecipeError
+from viewsphere.plugins.source import rooms_of
 from viewsphere.run.shots.camera_collisions import _steps, check_way
-from viewsphere.zoo import build, rooms_of
+from viewsphere_zoo import build
 
 SEED_OF_A_FLAT = 4
 

@@ -70,7 +70,7 @@ def test_the_command_says_it_in_one_line(tmp_path):
 def test_a_plan_without_an_estimate_touches_no_model():
     recipe = ROOT / "recipes" / "car_poses.yaml"
     code = "import sys; from viewsphere.cli.commands import app; app(['plan', sys.argv[1]], standalone_mode=False)\n"
-    code += "assert not {'numba', 'trimesh', 'viewsphere.run.shots.stages', 'viewsphere.zoo.car'} & sys.modules.keys()"
+    code += "assert not {'numba', 'trimesh', 'viewsphere.run.shots.stages', 'viewsphere_zoo.families.car'} & sys.modules.keys()"
     run = subprocess.run([sys.executable, "-c", code, recipe], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("car_poses: 100 models x 2,736 poses = 273,600 frames")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from viewsphere.assets.cache import load
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.shots import stages
 from viewsphere.run.shots.stages import Stages
@@ -23,8 +24,7 @@ def test_the_real_size_is_the_one_set_or_that_of_the_file_before_scaling():
 
 def test_a_model_at_its_own_scale_is_built_once(monkeypatch):
     built = []
-    build = stages.build_zoo_model
-    monkeypatch.setattr(stages, "build_zoo_model", lambda spec: built.append(spec) or build(spec))
+    monkeypatch.setattr(stages, "load", lambda spec, step=None: built.append(spec) or load(spec, step=step))
     warm, spec = Stages(), DRIER.model_copy(update={"real_size": "file"})
     warm.model(spec)
     warm.real_size(spec)
@@ -34,8 +34,7 @@ def test_a_model_at_its_own_scale_is_built_once(monkeypatch):
 @pytest.mark.slow
 def test_models_used_last_are_kept_as_far_as_there_is_room(monkeypatch):
     built = []
-    build = stages.build_zoo_model
-    monkeypatch.setattr(stages, "build_zoo_model", lambda spec: built.append(spec) or build(spec))
+    monkeypatch.setattr(stages, "load", lambda spec, step=None: built.append(spec) or load(spec, step=step))
     specs = [DRIER.model_copy(update={"key": f"d{i}", "seed": i}) for i in range(12)]
     warm = Stages()
     for spec in (*specs, *specs):

@@ -4,7 +4,7 @@ from small import small_recipe
 from viewsphere.assets.exporting.glb import glb_bytes, material_names
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.generate import generate
-from viewsphere.zoo import build_zoo_model
+from viewsphere_zoo import build_zoo_model
 
 BOXES = [{"source": "zoo:post_box", "category": "box", "count": 2, "scale": {"length": 0.18}}]
 BENCH = {"source": "zoo:bench", "category": "bench", "scale": {"length": 0.18}}

@@ -140,7 +140,7 @@ def test_mistakes_are_told_before_anything_is_rendered(recipe, tmp_path):
         generate(recipe(), tmp_path / "out")
     with pytest.raises(RecipeError, match=r"models\[0\].sidecar: expected a file .* found no 'no.yaml'"):
         generate(recipe(sidecar="no.yaml"), tmp_path / "out")
-    with pytest.raises(RecipeError, match="zoo models cannot have a sidecar"):
+    with pytest.raises(RecipeError, match="models of a source cannot have a sidecar"):
         Recipe.model_validate({**recipe().model_dump(), "models": [{"source": "zoo:car", "sidecar": "a.yaml"}]})
 
 

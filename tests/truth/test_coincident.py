@@ -9,7 +9,7 @@ from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, silh
 from viewsphere.geometry.camera import orbit_rotation
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.truth.raster.visibility import rasterize
-from viewsphere.zoo.fence import LENGTH, Fence, fence
+from viewsphere_zoo.families.fence import LENGTH, Fence, fence
 
 IMAGE = (0, 0, 160, 120)
 

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import zoo
 from viewsphere.assets.exporting.glb import glb_bytes
-from viewsphere.zoo.bicycle import STYLES, Bicycle, bicycle, draw
-from viewsphere.zoo.cycle.chain import PITCH, Pulley, pitch_radius, rollers, sprocket
-from viewsphere.zoo.cycle.layout import Layout
-from viewsphere.zoo.cycle.wheels import Hub, Wheel, spoke_ends
+from viewsphere_zoo.cycle.chain import PITCH, Pulley, pitch_radius, rollers, sprocket
+from viewsphere_zoo.cycle.layout import Layout
+from viewsphere_zoo.cycle.wheels import Hub, Wheel, spoke_ends
+from viewsphere_zoo.families.bicycle import STYLES, Bicycle, bicycle, draw
 from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
 
 MOST = 60_000

@@ -8,12 +8,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import zoo
-from viewsphere.zoo.boat import Boat, MotorBoat, RowingBoat, SailingBoat, boat, draw
-from viewsphere.zoo.shapes.cut import cut
-from viewsphere.zoo.shapes.sheets import bar, moulding, sheet
-from viewsphere.zoo.shapes.solids import Solid, rounded_box
+from viewsphere_zoo.families.boat import Boat, MotorBoat, RowingBoat, SailingBoat, boat, draw
+from viewsphere_zoo.shapes.cut import cut
+from viewsphere_zoo.shapes.sheets import bar, moulding, sheet
+from viewsphere_zoo.shapes.solids import Solid, rounded_box
 from zoo_mesh import assert_sound, drawn, faces, outward_share, part_vertices, seeds
 
 BOATS: tuple[Boat, ...] = (

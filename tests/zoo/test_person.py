@@ -9,9 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+import viewsphere_zoo as zoo
 from quick import quick
 from small import ROOT
-from viewsphere import Recipe, generate, plan, zoo
+from viewsphere import Recipe, generate, plan
 from viewsphere.assets.cache import load, load_normalised
 from viewsphere.assets.exporting.glb import rigged_glb_bytes
 from viewsphere.assets.exporting.rigged import joints_at
@@ -22,11 +23,11 @@ from viewsphere.formats.surreal.body import SMPL
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.store import Dataset
-from viewsphere.zoo.people import makehuman
-from viewsphere.zoo.people.actions import SEAT, SPEEDS, Manner, clips
-from viewsphere.zoo.people.build import Build
-from viewsphere.zoo.people.skeleton import JOINTS, PARENTS, skeleton
-from viewsphere.zoo.person import CLIPS, Person, draw, person
+from viewsphere_zoo.families.person import CLIPS, Person, draw, person
+from viewsphere_zoo.people import makehuman
+from viewsphere_zoo.people.actions import SEAT, SPEEDS, Manner, clips
+from viewsphere_zoo.people.build import Build
+from viewsphere_zoo.people.skeleton import JOINTS, PARENTS, skeleton
 from zoo_mesh import assert_sound, outward_share
 
 BUILDS = (Build(), Build(1.52, 0.0, 0.6, 0.513), Build(1.97, 1.0, -0.8, 0.533))
@@ -183,14 +184,12 @@ def test_who_sits_has_level_thighs_above_the_chair(build):
 def test_its_file_plays_without_blender_and_rests_in_a_pose_that_nobody_is_rigged_in(monkeypatch):
     monkeypatch.setattr("viewsphere.assets.readers.blender.reading.find_blender", None)
     one, spec = made(1), spec_of()
-    mesh, facts = load(spec, zoo.build_zoo_model)
+    mesh, facts = load(spec)
     assert mesh.body_parts == SMPL and [*facts.keypoints.points] == list(SMPL)
     wrists = [np.array(facts.keypoints.points[f"{side}_Wrist"])[0] for side in "LR"]
     assert abs(wrists[0] - wrists[1]) < 0.8 < abs(one.places[20, 0] - one.places[21, 0])
     pose = one.clips["walk"].poses[17]
-    now, facts = load(
-        spec.model_copy(update={"rest": 0, "clip": "walk"}), zoo.build_zoo_model, step=TimeStep(frame=17, seconds=17 / 60)
-    )
+    now, facts = load(spec.model_copy(update={"rest": 0, "clip": "walk"}), step=TimeStep(frame=17, seconds=17 / 60))
     found = np.array([*facts.keypoints.points.values()])
     found = np.stack([found[:, 0], -found[:, 2], found[:, 1]], axis=1)  # the file's up is +y
     np.testing.assert_allclose(found, one.posed(pose), atol=1e-5)
@@ -213,7 +212,7 @@ def test_a_cache_that_cannot_be_written_costs_time_only(monkeypatch, tmp_path):
 
 
 def test_inspect_lists_its_clips():
-    line = describe(spec_of(), zoo.build_zoo_model).animation
+    line = describe(spec_of()).animation
     assert {clip.name for clip in line.clips} == set(CLIPS) and line.fps == 60
     walk = next(clip for clip in line.clips if clip.name == "walk")
     assert (line.first, line.last) == (walk.first, walk.last) and 0.9 < line.seconds(line.last) < 1.3

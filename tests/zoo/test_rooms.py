@@ -7,12 +7,14 @@ import itertools
 import numpy as np
 import pytest
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import plugins, zoo
-from viewsphere.zoo.indoors.furnishing import Furnishing, Stand, extent, overlap
-from viewsphere.zoo.indoors.habits import furnished
-from viewsphere.zoo.indoors.plan import SIDES
-from viewsphere.zoo.places import Place
+from viewsphere import plugins
+from viewsphere.model.place import Place
+from viewsphere.plugins.place import PlaceSpec
+from viewsphere_zoo.indoors.furnishing import Furnishing, Stand, extent, overlap
+from viewsphere_zoo.indoors.habits import furnished
+from viewsphere_zoo.indoors.plan import SIDES
 from zoo_mesh import drawn, seeds
 
 FAMILIES = (
@@ -34,7 +36,7 @@ SEEDS = seeds(10, few=4)
 
 
 def place(name: str, seed: int) -> Place:
-    return getattr(plugins.place(name), f"{name}_random")(np.random.default_rng(seed))
+    return plugins.load(PlaceSpec, name).random(np.random.default_rng(seed))
 
 
 def at(piece) -> np.ndarray:
@@ -48,7 +50,7 @@ def test_a_seed_gives_one_layout_and_others_give_others(name: str) -> None:
     assert len(set(layouts)) == len(layouts)
     for one in layouts:
         assert len({p.name for p in one.pieces}) == len(one.pieces) > 4
-        assert {p.family for p in one.pieces} <= set(zoo.families())
+        assert {p.family for p in one.pieces} <= set(zoo.family_names())
         for p in one.pieces:
             m = at(p)
             np.testing.assert_allclose(m[:3, :3] @ m[:3, :3].T, np.eye(3), atol=1e-12)
@@ -69,7 +71,7 @@ def test_a_layout_builds_no_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def rooms(seed: int) -> list[Furnishing]:
     rng = np.random.default_rng(seed)
-    interior = plugins.family("interior").draw(np.random.default_rng(seed))
+    interior = zoo.family("interior").draw(np.random.default_rng(seed))
     return [furnished(room, rng) for room in interior.rooms]
 
 
@@ -114,7 +116,7 @@ def test_surfaces_are_level_faces_of_furniture(name: str) -> None:
     made = place(name, 1)
     found = {surface.name: surface for surface in made.surfaces}
     assert len(found) == len(made.surfaces) > 0 and {"table", "shelf", "cabinet"} & found.keys()
-    big = [p for p in made.pieces[1:] if hasattr(plugins.family(p.family), "surfaces")]
+    big = [p for p in made.pieces[1:] if zoo.family(p.family).surfaces]
     casters = [
         (at(p), RayMeshIntersector(Trimesh(m.vertices, m.triangles, process=False)))
         for p in big
@@ -183,7 +185,7 @@ def test_the_table_top_is_the_floor_and_empty() -> None:
 @pytest.mark.parametrize("family", quick(FAMILIES, *FAMILIES[2::4]))
 def test_measures_by_parameters_are_those_of_meshes(family: str) -> None:
     for seed in range(4):
-        p = plugins.family(family).draw(np.random.default_rng(seed))
+        p = zoo.family(family).draw(np.random.default_rng(seed))
         if (
             (family == "chair" and type(p).__name__ not in ("Dining", "Windsor", "Shell", "Office", "Armchair"))
             or (family == "lamp" and p.style not in ("column", "tripod", "table"))

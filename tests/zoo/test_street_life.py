@@ -8,10 +8,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from viewsphere import plugins, zoo
+import viewsphere_zoo as zoo
+from viewsphere import plugins
 from viewsphere.assets.exporting.rigged import RiggedModel
-from viewsphere.zoo.places import Lane, Place, PlacePiece, Traffic
-from viewsphere.zoo.townscape import street_life
+from viewsphere.model.place import Lane, Place, PlacePiece, Traffic
+from viewsphere.plugins.place import PlaceSpec
+from viewsphere_zoo.townscape import street_life
 from zoo_mesh import seeds
 
 SEEDS = seeds(8, few=2)
@@ -21,7 +23,7 @@ USUAL = {"neighbourhood": 0.0, "town": 0.4}
 
 
 def laid(name: str, seed: int, *traffic: Traffic) -> Place:
-    return getattr(plugins.place(name), f"{name}_random")(np.random.default_rng(seed), *traffic)
+    return plugins.load(PlaceSpec, name).random(np.random.default_rng(seed), *traffic)
 
 
 def of(place: Place, *families: str) -> list[PlacePiece]:

@@ -7,20 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from viewsphere import plugins
+import viewsphere_zoo as zoo
 from viewsphere.assets.metadata.surface import Surface
 from viewsphere.assets.metadata.symmetries import find
 from viewsphere.model.symmetries import Symmetries
-from viewsphere.zoo.bottle import FORMS, Bottle, bottle
-from viewsphere.zoo.bottle import draw as draw_bottle
-from viewsphere.zoo.bowl import SHAPES as BOWLS
-from viewsphere.zoo.bowl import Bowl, bowl
-from viewsphere.zoo.can import Can, can
-from viewsphere.zoo.household.canvas import blank
-from viewsphere.zoo.household.patterns import PATTERNS
-from viewsphere.zoo.household.prints import GROUNDS, PICTURES, wrapper
-from viewsphere.zoo.mug import SHAPES, Mug, mug
-from viewsphere.zoo.plate import Plate, plate
+from viewsphere_zoo.families.bottle import FORMS, Bottle, bottle
+from viewsphere_zoo.families.bottle import draw as draw_bottle
+from viewsphere_zoo.families.bowl import SHAPES as BOWLS
+from viewsphere_zoo.families.bowl import Bowl, bowl
+from viewsphere_zoo.families.can import Can, can
+from viewsphere_zoo.families.mug import SHAPES, Mug, mug
+from viewsphere_zoo.families.plate import Plate, plate
+from viewsphere_zoo.household.canvas import blank
+from viewsphere_zoo.household.patterns import PATTERNS
+from viewsphere_zoo.household.prints import GROUNDS, PICTURES, wrapper
 from zoo_mesh import assert_family, assert_sound, part_vertices
 
 SIZES = {
@@ -166,4 +166,4 @@ def test_prints_close_around_a_vessel() -> None:
 
 
 def test_all_families_of_the_table_are_registered() -> None:
-    assert set(SIZES) <= set(plugins.families())
+    assert set(SIZES) <= set(zoo.family_names())

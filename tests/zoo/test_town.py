@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from viewsphere import plugins, zoo
-from viewsphere.zoo.indoors.furnishing import overlap
-from viewsphere.zoo.places import Place, PlacePiece
-from viewsphere.zoo.places.town import town_random
-from viewsphere.zoo.town_ground import TownGround, town_ground
-from viewsphere.zoo.townscape import blocks
+import viewsphere_zoo as zoo
+from viewsphere.model.place import Place, PlacePiece
+from viewsphere_zoo.families.town_ground import TownGround, town_ground
+from viewsphere_zoo.indoors.furnishing import overlap
+from viewsphere_zoo.places.town import town_random
+from viewsphere_zoo.townscape import blocks
 from zoo_mesh import assert_sound, drawn, faces, part_vertices, seeds
 
 SEEDS = seeds(6, few=3)
@@ -29,7 +29,7 @@ def of(place: Place, *families: str) -> list[PlacePiece]:
 
 def plan(piece: PlacePiece) -> tuple[float, float, float, float]:
     """The floor that a building's walls cover, by its parameters."""
-    p = plugins.family(piece.family).draw(np.random.default_rng(piece.seed))
+    p = zoo.family(piece.family).draw(np.random.default_rng(piece.seed))
     w, d = p.footprint if piece.family == "house" else (p.width, p.depth)
     m = np.abs(at(piece)[:2, :2])
     (x, y), (a, b) = at(piece)[:2, 3], m @ (w / 2, d / 2)
@@ -48,7 +48,7 @@ def test_a_seed_gives_one_layout() -> None:
 
 def test_pieces_are_named_rigid_and_instances_of_few_members(place: Place) -> None:
     assert len({p.name for p in place.pieces}) == len(place.pieces) > 300
-    assert {p.family for p in place.pieces} <= set(zoo.families())
+    assert {p.family for p in place.pieces} <= set(zoo.family_names())
     assert len({(p.family, p.seed) for p in place.pieces}) <= 60
     for p in place.pieces:
         np.testing.assert_allclose(at(p)[:3, :3] @ at(p)[:3, :3].T, np.eye(3), atol=1e-12)
@@ -69,7 +69,7 @@ def test_pieces_are_named_rigid_and_instances_of_few_members(place: Place) -> No
 
 def test_buildings_stand_behind_pavements_and_not_in_one_another(place: Place) -> None:
     ground = of(place, "town_ground")[0]
-    p: TownGround = plugins.family("town_ground").draw(np.random.default_rng(ground.seed))
+    p: TownGround = zoo.family("town_ground").draw(np.random.default_rng(ground.seed))
     plans = [plan(piece) for piece in of(place, "shop", "house")]
     for a, b in itertools.combinations(plans, 2):
         assert not overlap(a, b, -0.01)
@@ -121,7 +121,7 @@ def test_the_ground_is_sound_and_the_roads_are_level(seed: int) -> None:
     _, area = faces(mesh)
     flat = np.isin(mesh.triangle_part, [mesh.parts.index(n) for n in ("road", "pavement", "verge") if n in mesh.parts])
     assert (area[flat, 2] > 0).all()
-    ground = plugins.family("town_ground").draw(np.random.default_rng(seed))
+    ground = zoo.family("town_ground").draw(np.random.default_rng(seed))
     width = ground.x[-1] - ground.x[0] + 2 * blocks.HALF
     road = part_vertices(mesh, "road")
     assert np.ptp(road[:, 0]) == pytest.approx(width, abs=1e-4)
@@ -130,7 +130,7 @@ def test_the_ground_is_sound_and_the_roads_are_level(seed: int) -> None:
 
 @pytest.mark.slow
 def test_the_country_begins_where_the_town_ends() -> None:
-    ground = plugins.family("town_ground").draw(np.random.default_rng(4))
+    ground = zoo.family("town_ground").draw(np.random.default_rng(4))
     land = drawn("outskirts", 4)
     near = np.abs(part_vertices(land, "meadow")[:, :2])
     inside = (near[:, 0] < ground.half[0] - 1e-3) & (near[:, 1] < ground.half[1] - 1e-3)

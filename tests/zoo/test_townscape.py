@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import plugins, zoo
-from viewsphere.zoo import driveway, fence, hedge
-from viewsphere.zoo.house import House, house
-from viewsphere.zoo.house import draw as draw_house
-from viewsphere.zoo.lamp_post import LampPost, lamp_post
-from viewsphere.zoo.landscape import Landscape, landscape
-from viewsphere.zoo.road_sign import RoadSign, road_sign
-from viewsphere.zoo.street import draw as draw_street
-from viewsphere.zoo.street import plots, street
-from viewsphere.zoo.townscape import textures
-from viewsphere.zoo.tree import Tree, tree
+from viewsphere_zoo.families import driveway, fence, hedge
+from viewsphere_zoo.families.house import House, house
+from viewsphere_zoo.families.house import draw as draw_house
+from viewsphere_zoo.families.lamp_post import LampPost, lamp_post
+from viewsphere_zoo.families.landscape import Landscape, landscape
+from viewsphere_zoo.families.road_sign import RoadSign, road_sign
+from viewsphere_zoo.families.street import draw as draw_street
+from viewsphere_zoo.families.street import plots, street
+from viewsphere_zoo.families.tree import Tree, tree
+from viewsphere_zoo.townscape import textures
 from zoo_mesh import assert_sound, drawn, faces, outward_share, part_vertices, seeds
 
 SIZES = {
@@ -211,4 +211,4 @@ def test_textures_tile_without_a_seam() -> None:
 
 
 def test_all_families_of_the_townscape_are_registered() -> None:
-    assert set(SIZES) <= set(plugins.families())
+    assert set(SIZES) <= set(zoo.family_names())

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import plugins, zoo
-from viewsphere.zoo.backpack import Backpack, backpack
-from viewsphere.zoo.bollard import Bollard, bollard
-from viewsphere.zoo.bus import Bus, bus
-from viewsphere.zoo.fountain import Fountain, fountain
-from viewsphere.zoo.motorcycle import Motorcycle, motorcycle
-from viewsphere.zoo.shop import Shop, shop
-from viewsphere.zoo.townscape.lettering import lettering
-from viewsphere.zoo.traffic_cone import TrafficCone, traffic_cone
-from viewsphere.zoo.traffic_light import TrafficLight, traffic_light
-from viewsphere.zoo.truck import Truck, truck
+from viewsphere_zoo.families.backpack import Backpack, backpack
+from viewsphere_zoo.families.bollard import Bollard, bollard
+from viewsphere_zoo.families.bus import Bus, bus
+from viewsphere_zoo.families.fountain import Fountain, fountain
+from viewsphere_zoo.families.motorcycle import Motorcycle, motorcycle
+from viewsphere_zoo.families.shop import Shop, shop
+from viewsphere_zoo.families.traffic_cone import TrafficCone, traffic_cone
+from viewsphere_zoo.families.traffic_light import TrafficLight, traffic_light
+from viewsphere_zoo.families.truck import Truck, truck
+from viewsphere_zoo.townscape.lettering import lettering
 from zoo_mesh import assert_sound, drawn, outward_share, part_vertices, seeds
 
 SIZES = {
@@ -81,7 +81,7 @@ def test_a_camera_sees_outsides(family: str) -> None:
 
 @pytest.mark.parametrize("family", SIZES)
 def test_draws_cover_all_styles(family: str) -> None:
-    draw = plugins.family(family).draw
+    draw = zoo.family(family).draw
     draws = [draw(np.random.default_rng(seed)) for seed in range(80)]
     for name, kinds in STYLES[family].items():
         counts = {v: sum(getattr(p, name) == v for p in draws) for v in {getattr(p, name) for p in draws}}
@@ -287,4 +287,4 @@ def test_lettering_covers_each_cell_of_its_letters_once() -> None:
 
 
 def test_all_families_of_traffic_are_registered() -> None:
-    assert set(SIZES) <= set(plugins.families())
+    assert set(SIZES) <= set(zoo.family_names())

@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import viewsphere_zoo as zoo
 from quick import quick
-from viewsphere import zoo
 from viewsphere.errors import UserError
-from viewsphere.zoo.car import SIZES, Car, car, draw
-from viewsphere.zoo.hair_drier import HairDrier, hair_drier
+from viewsphere_zoo.families.car import SIZES, Car, car, draw
+from viewsphere_zoo.families.hair_drier import HairDrier, hair_drier
 from zoo_mesh import assert_sound, drawn, outward_share, part_vertices
 
 BODIES = ("sedan", "hatchback", "van", "pickup")
@@ -30,14 +30,14 @@ DRIERS = tuple(
 
 def test_families_are_listed_without_importing_them() -> None:
     code = (
-        "import sys; from viewsphere import zoo; assert {'car', 'hair_drier'} <= set(zoo.families()), zoo.families();"
-        "assert not {'viewsphere.zoo.car', 'viewsphere.zoo.hair_drier'} & set(sys.modules)"
+        "import sys; import viewsphere_zoo as zoo; assert {'car', 'hair_drier'} <= set(zoo.family_names()), zoo.family_names();"
+        "assert not {'viewsphere_zoo.families.car', 'viewsphere_zoo.families.hair_drier'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_an_unknown_family_names_the_nearest() -> None:
-    with pytest.raises(UserError, match=r"zoo family: 'cars' is unknown; did you mean 'car'\? Valid: .*car, .*"):
+    with pytest.raises(UserError, match=r"family: 'cars' is unknown; did you mean 'car'\? Valid: .*car, .*"):
         zoo.build("cars", np.random.default_rng(0))
 
 

@@ -19,7 +19,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from viewsphere import plugins
 from viewsphere.assets.load import check_source, suffix_of
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh, unpacked
@@ -37,10 +36,10 @@ from viewsphere.files import open_file, read_bytes
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
+from viewsphere.plugins.source import Named, source_of
 from viewsphere.scratch import scratch_folder, temporary
 
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "clip", "fps", "shown")
-ZOO = "zoo:"
 PREFIX = "reading-"
 BATCH = 32
 """Most frames of a file that are read at once."""
@@ -49,43 +48,38 @@ LIBRARIES = ("numpy", "lxml", "pillow", "charset-normalizer", "DracoPy", "meshop
 """Packages that parse model files. A model whose reader lacked one of the optional ones is read again once it is installed."""
 
 
-Build = Callable[[ModelSpec], Mesh | Path]
-"""Makes the mesh of a source that begins with `zoo:`, or the file of one that moves."""
-
-
 def load_normalised(
     spec: ModelSpec,
-    build: Build | None = None,
     folder: Path | None = None,
     step: TimeStep | None = None,
 ) -> Mesh:
     """The model in object axes and metres: the mesh that `load` gives."""
-    return load(spec, build, folder, step)[0]
+    return load(spec, folder, step)[0]
 
 
 def load(
     spec: ModelSpec,
-    build: Build | None = None,
     folder: Path | None = None,
     step: TimeStep | None = None,
 ) -> tuple[Mesh, FileFacts]:
     """The model in object axes and metres at a time step (None: as it rests), and what its file says of itself; from the cache
     when it holds them.
 
-    `build` makes the mesh of a source that begins with `zoo:` (in object axes, metres), or a file that is read in its place;
-    such meshes are normalised too but neither cached nor made in another process. `folder` is the cache's, by default
-    `cache_folder()`. A damaged entry is built again; a cache that cannot be written is no error. Read back, every
-    array is equal bit for bit. Raises ModelError as the readers do and when reading takes too long or too much.
+    A source of models supplies a mesh, or a file that is read in its place; such meshes are normalised too but neither cached
+    here nor made in another process. `folder` is the cache's, by default `cache_folder()`. A damaged entry is
+    built again; a cache that cannot be written is no error. Read back, every array is equal bit for bit. Raises ModelError as
+    the readers do and when reading takes too long or too much.
     """
     frame = frame_of(spec, step)
     if spec.parts is not None:
-        whole, facts = load(spec.whole, build, folder, None if frame is None else TimeStep(frame=frame))
+        whole, facts = load(spec.whole, folder, None if frame is None else TimeStep(frame=frame))
         return taken(whole, spec, step), facts
-    if spec.source.startswith(ZOO):
-        built = _built(spec, build)
+    named = source_of(spec.source)
+    if named is not None:
+        built = _built(spec, named)
         if isinstance(built, Path):
-            return load(in_file(spec, built), None, folder, step)
-        raw, facts = built, _zoo_facts(spec, built)
+            return load(in_file(spec, built), folder, step)
+        raw, facts = built, _facts(spec, named, built)
         return normalise(raw, facts, spec), placed(raw, facts, spec)
     path, inside = split_source(Path(spec.source))
     folder = folder or cache_folder()
@@ -111,16 +105,16 @@ def frame_of(spec: ModelSpec, step: TimeStep | None) -> int | None:
     return spec.rest if step is None else step.frame
 
 
-def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = None, build: Build | None = None) -> None:
-    """Put what the cache lacks of an animated model at these frames into it: the file is opened once for many. `build` makes
-    the file of a source that begins with `zoo:`.
+def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = None) -> None:
+    """Put what the cache lacks of an animated model at these frames into it: the file is opened once for many.
 
     Raises ModelError as `load` does; a cache that cannot be written is no error.
     """
     folder = folder or cache_folder()
     spec = spec if spec.parts is None else spec.whole
-    if spec.source.startswith(ZOO):
-        built = _built(spec, build)
+    named = source_of(spec.source)
+    if named is not None:
+        built = _built(spec, named)
         spec = in_file(spec, built) if isinstance(built, Path) else spec
     path, inside = split_source(Path(spec.source))
     lacking: dict[int, str] = {}
@@ -177,25 +171,22 @@ def _aside(folder: Path) -> Generator[Path]:
 
 
 def in_file(spec: ModelSpec, file: Path) -> ModelSpec:
-    """The specification of a model of the zoo as that of the file which it is in."""
+    """The specification of a model of a source as that of the file that the source supplies."""
     return spec.model_copy(update={"source": str(file)})
 
 
-def _built(spec: ModelSpec, build: Build | None) -> Mesh | Path:
-    """A procedural model; ModelError when there is nothing to build it with."""
-    if build is None:
-        raise ModelError(f"{spec.source}: no builder for procedural models was given")
+def _built(spec: ModelSpec, named: Named) -> Mesh | Path:
+    """The mesh or file that a source supplies."""
     try:
-        return build(spec)
+        return named.spec.load(spec)
     except OSError as error:
         raise ModelError(f"{spec.source}: expected to write its file into the cache ({error}); set VIEWSPHERE_CACHE") from None
 
 
-def _zoo_facts(spec: ModelSpec, mesh: Mesh) -> FileFacts:
-    family = spec.source.removeprefix(ZOO)
-    known = plugins.family(family) if family in plugins.families() else None
-    points = part_points(mesh, getattr(known, "KEYPOINTS", {}), getattr(known, "SKELETON", ()))
-    return FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0, size=extents(mesh), keypoints=points)
+def _facts(spec: ModelSpec, named: Named, mesh: Mesh) -> FileFacts:
+    family = named.spec.family(named.name)
+    points = None if family is None else part_points(mesh, family.keypoints, family.skeleton)
+    return FileFacts(Path(spec.source), named.prefix, "+z", "-y", 1.0, size=extents(mesh), keypoints=points)
 
 
 def cache_folder() -> Path:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.cache import ZOO, Build, in_file, load
+from viewsphere.assets.cache import load
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.metadata.model_metadata import found_symmetries, metadata_of
 from viewsphere.assets.normalise import axes
@@ -17,6 +17,8 @@ from viewsphere.assets.readers import reader_of
 from viewsphere.assets.timeline import Timeline, animation_of
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
+from viewsphere.plugins import prefix_of
+from viewsphere.plugins.source import file_in
 from viewsphere.recipe.sidecar import ENDING
 
 
@@ -31,8 +33,8 @@ class ModelReport:
 
     `diameter` is the largest distance between two vertices, metres. `symmetries` (as a sidecar has them) are those that the
     model declares, if it `declares` any, else those of its surface, and `keypoints` its named points, both in the `axes` that
-    are told: those of the file with its own unit, for a model of the zoo those of the object. `sidecar` is the name of the file
-    beside the model that says or may say this, empty for the zoo.
+    are told: those of the file with its own unit, of the object for a model of a source. `sidecar` is the name of the file
+    beside the model that says or may say this, empty for a source.
     """
 
     source: str
@@ -61,18 +63,18 @@ class ModelReport:
     suggestions: tuple[str, ...]
 
 
-def describe(source: Path | ModelSpec, build: Build | None = None) -> ModelReport:
+def describe(source: Path | ModelSpec) -> ModelReport:
     """Read a model and report what is in it; a path is read with default settings.
 
-    `build` makes the mesh of a `zoo:` source, or its file. Raises ModelError as reading and normalising do.
+    Raises ModelError as reading and normalising do.
     """
     spec = source if isinstance(source, ModelSpec) else _default_spec(source)
-    mesh, facts = load(spec, build)
+    mesh, facts = load(spec)
     low, high = mesh.bounds
     width, length, height = (float(x) for x in high - low)
-    animation, problems = _animation(spec, build)
+    animation, problems = _animation(spec)
     metadata = metadata_of(spec, mesh, facts)
-    is_file = not spec.source.startswith(ZOO)
+    is_file = not prefix_of(spec.source)
     back = np.linalg.inv(facts.object_from_file) if is_file else np.eye(4)
     symmetries = found_symmetries(mesh) if metadata.symmetries is None else metadata.symmetries
     counts = np.bincount(mesh.triangle_part, minlength=len(mesh.parts))
@@ -111,13 +113,13 @@ def _default_spec(path: Path) -> ModelSpec:
     return ModelSpec(key=path.stem, source=str(path.absolute()), category="model", category_id=1)
 
 
-def _animation(spec: ModelSpec, build: Build | None) -> tuple[Timeline | None, tuple[str, ...]]:
+def _animation(spec: ModelSpec) -> tuple[Timeline | None, tuple[str, ...]]:
     """Return the times of the file's animations, and the reasons why the times are unknown."""
-    if spec.source.startswith(ZOO):
-        built = None if build is None else build(spec)
-        return _animation(in_file(spec, built), None) if isinstance(built, Path) else (None, ())
+    file = file_in(spec)
+    if file is None:
+        return None, ()
     try:
-        return animation_of(Path(spec.source), spec.confined), ()
+        return animation_of(file, spec.confined), ()
     except ModelError as error:
         return None, (f"it may move, but its frames are not known: {error}",)
 

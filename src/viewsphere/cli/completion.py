@@ -13,16 +13,17 @@ import typer
 from viewsphere import plugins
 from viewsphere.recipe.starts import FIRST, kinds, start
 
-ZOO = "zoo:"
 BASH = "complete_bash"
 
 
 def models(incomplete: str) -> list[str]:
-    """Zoo families and files of this folder; nothing where the word can be no family: then the shell completes files."""
-    if not ZOO.startswith(incomplete[: len(ZOO)]):
+    """Models of sources and files of this folder; nothing where the word can be no such model: the shell completes files."""
+    prefixes = [f"{prefix}:" for prefix in plugins.names("sources")]
+    if not any(prefix.startswith(incomplete[: len(prefix)]) for prefix in prefixes):
         return []
-    here = () if incomplete.startswith(ZOO) else Path().glob(f"{incomplete}[!.]*")
-    return [ZOO + name for name in plugins.families()] + sorted(f"{p}/" if p.is_dir() else str(p) for p in here)
+    listed = (f"{e.name}:{name}" for e in plugins.entry_points("viewsphere.source_names") for name in e.load()())
+    here = () if incomplete.startswith(tuple(prefixes)) else Path().glob(f"{incomplete}[!.]*")
+    return [*listed, *sorted(f"{p}/" if p.is_dir() else str(p) for p in here)]
 
 
 def formats(incomplete: str) -> list[str]:

@@ -6,17 +6,21 @@ import os
 import platform
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from viewsphere.cli.arguments import AsJson
 from viewsphere.cli.terminal import print_json, say
 from viewsphere.errors import UserError
+from viewsphere.model.validation_errors import one_of
 from viewsphere.run.workers.worker_count import cores
+
+if TYPE_CHECKING:
+    from viewsphere.plugins.source import Download
 
 LEFT = 12
 
@@ -28,22 +32,24 @@ def doctor(
             "--setup-blender", help="First create a Python environment with Blender in your data folder (about 1 GB)."
         ),
     ] = False,
-    setup_people: Annotated[
-        bool,
+    setup: Annotated[
+        list[str] | None,
         typer.Option(
-            "--setup-people",
-            help="First download MakeHuman's bodies for zoo:person (CC0; 48 MB, 2 MB kept in the cache).",
+            "--setup",
+            metavar="NAME",
+            help="First download the optional data that this report lists under this name.",
         ),
-    ] = False,
+    ] = None,
     json_: AsJson = False,
 ) -> None:
     """Report features that work on this machine: processor, kernels, optional packages, Blender. Missing ones are no error."""
     if setup_blender:
         _set_up_blender()
-    if setup_people:
-        from viewsphere.zoo.people import makehuman
-
-        makehuman.set_up(lambda line: say(line, err=True))
+    for name in setup or ():
+        downloads = _downloads()
+        if name not in downloads:
+            raise UserError(f"--setup: {one_of(name, tuple(downloads))}")
+        downloads[name].fetch(lambda line: say(line, err=True))
     found = examine()
     if json_:
         print_json(found)
@@ -54,8 +60,6 @@ def doctor(
 
 def examine() -> dict[str, Any]:
     """The findings about this machine, as plain data."""
-    from viewsphere.zoo.people import makehuman
-
     return {
         "viewsphere": version("viewsphere"),
         "python": {"version": platform.python_version(), "executable": sys.executable},
@@ -65,8 +69,14 @@ def examine() -> dict[str, Any]:
         "speed": _speed(),
         "extras": [_extra(name, packages) for name, packages in sorted(_extras().items())],
         "blender": _blender(),
-        "people": makehuman.where(),
+        "downloads": {name: download.file() for name, download in _downloads().items()},
     }
+
+
+def _downloads() -> Mapping[str, Download]:
+    from viewsphere.plugins.source import sources
+
+    return {name: download for spec in sources().values() for name, download in spec.downloads.items()}
 
 
 def _set_up_blender() -> None:
@@ -171,7 +181,8 @@ def _lines(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for extra in found["extras"]:
         packages = ", ".join(f"{name} {is_ or 'missing'}" for name, is_ in extra["packages"].items())
         yield f"[{extra['name']}]", packages + (f": {extra['install']}" if extra["install"] else "")
-    yield "people", found["people"] or "mannequins; MakeHuman's bodies by viewsphere doctor --setup-people"
+    for name, download in _downloads().items():
+        yield name, found["downloads"][name] or download.without
     yield "Blender", _blender_line(blender)
     for device in blender["devices"]:
         yield "", f"{device['kind']}: {device['name']}"

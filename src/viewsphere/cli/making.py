@@ -139,7 +139,7 @@ def schema() -> None:
 def inspect(
     model: Annotated[
         str | None,
-        typer.Argument(help="Model file, or zoo:<family>.", show_default=False, autocompletion=completion.models),
+        typer.Argument(help="Model file, or a name such as zoo:car.", show_default=False, autocompletion=completion.models),
     ] = None,
     output: Annotated[
         Path | None,
@@ -448,9 +448,10 @@ def _estimate(recipe: Recipe, workers: int | None) -> Estimate:
 
 def _compile_kernels(recipe: Recipe | None = None) -> None:
     """Compile the kernels that a recipe's frames call, or a plain one's: the first picture on a machine takes longer."""
+    from viewsphere.plugins.source import model_for
     from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.shots.precompile import precompile_for, told_to
 
-    plain = {"models": [{"source": "zoo:car"}], "viewpoints": {"azimuth": [0], "elevation": [20], "distance": 4}}
+    plain = {"models": [{"source": model_for("example")}], "viewpoints": {"azimuth": [0], "elevation": [20], "distance": 4}}
     with ProgressBar(quiet=False) as bar:
         precompile_for(recipe or Recipe.model_validate(plain), told_to(bar.show))

@@ -33,8 +33,11 @@ def for_command(name: str) -> str:
         case "new":
             return "new: expected a folder for the recipe; found none\nit need not exist; next: viewsphere new cars"
         case "inspect":
-            model = next(iter(_near(*_models())), "zoo:car")
-            here = "no model at hand? the zoo has some" if model == "zoo:car" else f"found {model} here"
+            from viewsphere.plugins.source import model_for
+
+            near = next(iter(_near(*_models())), None)
+            here = "no model at hand? some come with viewsphere" if near is None else f"found {near} here"
+            model = near or model_for("example")
             return f"inspect: expected a model; found none\n{here}; next: viewsphere inspect {model}"
         case "plan" | "preview":
             return f"{name}: expected a recipe; found none\n{_recipe_here()}; next: viewsphere {name} {_recipe()}"

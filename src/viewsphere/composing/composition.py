@@ -39,13 +39,13 @@ from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.place import Bay, Lane, Surface
 from viewsphere.model.scene import IDENTITY, Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
 from viewsphere.store import Category
-from viewsphere.zoo.places import Bay, Lane, Surface
 
 __all__ = ["BoxOf", "Composition", "Moved", "Numbering", "center", "center_of_all", "compose", "still"]
 
@@ -90,9 +90,9 @@ class Composition(Sendable):
         place = self.recipe.scene.place
         if place is not None and place.labels == "own":
             for names in self._place_draws:
-                laid = draw_place(self.recipe, place, names).pieces if place.name else ()
+                laid = draw_place(self.recipe, place, names).pieces if place.prefix else ()
                 yield from (piece.category for piece in laid)
-            if not place.name:
+            if not place.prefix:
                 yield place.category
         if self.blend is not None:
             yield from (one.category for one in self.blend.labelled)
@@ -134,7 +134,7 @@ class Composition(Sendable):
         count += 0 if self.blend is None else len(self.blend.labelled)
         if scene.place is not None and scene.place.labels == "own":
             place = scene.place
-            count += max(len(draw_place(self.recipe, place, n).pieces) if place.name else 1 for n in self._place_draws)
+            count += max(len(draw_place(self.recipe, place, n).pieces) if place.prefix else 1 for n in self._place_draws)
         return count
 
     def cast(self, spec: ModelSpec, pose: str | None, redraw: int = 0) -> tuple[ModelSpec, ...]:
@@ -210,7 +210,7 @@ class Composition(Sendable):
         floor and surfaces are clear.
         """
         place = self.recipe.scene.place
-        if place is None or place.name:
+        if place is None or place.prefix:
             return None
         piece = self._place(self.place_names(subject, pose, redraw))[0]
         room_from_piece = composed(_inverse(world_from_room), piece.world_from_piece)
@@ -221,7 +221,7 @@ class Composition(Sendable):
         cars, up to a height above the floor; None where the place is none of the zoo's.
         """
         place = self.recipe.scene.place
-        if place is None or not place.name:
+        if place is None or not place.prefix:
             return None
         pieces = self._place(self.place_names(subject, pose, redraw))
         placed = tuple(sorted(((p.model, p.world_from_piece) for p in pieces), key=lambda one: one[0].key))

@@ -20,7 +20,6 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.recipe.aim import FARTHEST
-from viewsphere.zoo import build_zoo_model
 
 Float = NDArray[np.float64]
 
@@ -49,7 +48,7 @@ def shape_of(shown: tuple[ModelSpec, TimeStep | None]) -> Shape:
     from viewsphere.assets.cache import load_normalised  # which loads readers of models
 
     spec, step = shown
-    mesh = load_normalised(spec, build_zoo_model, step=step)
+    mesh = load_normalised(spec, step=step)
     is_used = np.zeros(len(mesh.vertices), np.bool_)
     is_used[mesh.triangles] = True
     return Shape(mesh.vertices.astype(np.float64), mesh.triangles, is_used)

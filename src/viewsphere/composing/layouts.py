@@ -106,7 +106,7 @@ class Laid:
         if placer.around is None:
             return ()
         pieces: Sequence[Piece] = placer.around(self.members, self.room, self.shapes, self.rng, *options)
-        return tuple(Piece(p.family, p.size, composed(self.world_from_room, p.world_from_piece)) for p in pieces)
+        return tuple(Piece(p.source, p.size, composed(self.world_from_room, p.world_from_piece)) for p in pieces)
 
     def _in_world(self, pose: Matrix4, turn: Matrix4) -> Matrix4:
         pose = pose if turn == IDENTITY else composed(pose, turn)

@@ -48,7 +48,7 @@ def redraws_scenes(recipe: Recipe) -> bool:
 def redraws_place(recipe: Recipe) -> bool:
     """Return whether a scene's redraw changes its place. The categories of a labelled place are planned, so it stays."""
     place = recipe.scene.place
-    return place is not None and bool(place.name) and place.draw != "fixed" and place.labels != "own"
+    return place is not None and bool(place.prefix) and place.draw != "fixed" and place.labels != "own"
 
 
 def is_redrawn(recipe: Recipe) -> bool:

@@ -17,10 +17,10 @@ from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.model.instant import Moment, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.recipe.models import ZOO, ModelEntry
+from viewsphere.plugins.source import file_in
+from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.time import Frames, Steps, chosen_frames
-from viewsphere.zoo import file_of
 
 if TYPE_CHECKING:
     from viewsphere.assets.timeline import Blenders
@@ -211,19 +211,15 @@ def _steps(
 
 
 def animated_file(spec: ModelSpec, field: str) -> Path:
-    """The file of a model that is to move; raises RecipeError, which begins with the field, for one of the zoo that stays."""
-    if not spec.source.startswith(ZOO):
-        return Path(spec.source)
+    """The file of a model that is to move; raises RecipeError, which begins with the field, for one of a source that stays."""
     try:
-        file = file_of(spec)
+        file = file_in(spec)
     except OSError as error:
         raise RecipeError(
             f"{field}: {spec.source}: expected to write its file into the cache ({error}); set VIEWSPHERE_CACHE"
         ) from None
     if file is None:
-        raise RecipeError(
-            f"{field}: expected a file, or a family that moves, such as zoo:person; found {spec.source}, which does not move"
-        )
+        raise RecipeError(f"{field}: expected a file, or a model that moves; found {spec.source}, which does not move")
     return file
 
 

@@ -6,7 +6,6 @@ added at the end. A thing's class is 31 more than its category's id. 0 is no cla
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -48,82 +47,6 @@ STUFF: dict[str, Color] = {
 
 STUFF_IDS = {name: i for i, name in enumerate(STUFF, 1)}
 SKY, GROUND, SCENERY = (STUFF_IDS[name] for name in ("sky", "ground", "scenery"))
-
-_MARKS = dict.fromkeys(("centre_line", "zebra"), "road marking")
-_PAVED = dict.fromkeys(("kerb", "pavement"), "pavement")
-_GREEN = dict.fromkeys(("lawn", "verge", "base"), "grass")
-_STREET = {"": "road", "edge_line": "road marking", **_MARKS, **_PAVED, **_GREEN}
-_TOWN = {
-    "": "road",
-    **dict.fromkeys(("stop_line", "parking"), "road marking"),
-    "yard": "pavement",
-    **_MARKS,
-    **_PAVED,
-    **_GREEN,
-}
-_DOOR = dict.fromkeys(("door", "door_frame", "door_handle"), "door")
-_WINDOW = dict.fromkeys(("window_frame", "window_handle", "sill"), "window")
-_FITTED = dict.fromkeys(("ceiling_lamp", "radiator", "curtain", "curtain_rod"), "furniture")
-_VEHICLES = ("bicycle", "boat", "bus", "car", "motorcycle", "truck")
-_STREET_FURNITURE = ("bench", "bollard", "fountain", "post box", "traffic cone", "wheelie bin")
-_FURNITURE = ("bed", "cabinet", "chair", "lamp", "refrigerator", "plain table", "sofa", "table")
-_HOUSEHOLD = (
-    "backpack",
-    "book",
-    "bottle",
-    "bowl",
-    "box",
-    "can",
-    "hair drier",
-    "laptop",
-    "monitor",
-    "mug",
-    "open box",
-    "plant",
-    "plate",
-)
-
-Parts = dict[str, str]
-
-STUFF_OF: dict[str, Parts] = {
-    "street": {**_STREET, **dict.fromkeys(("gutter", "edging", "crossing"), "pavement")},
-    "town ground": _TOWN,
-    "landscape": {"": "grass", "road": "road", "thicket": "vegetation", "wood": "vegetation", "house": "building"},
-    "outskirts": {"": "grass", "thicket": "vegetation", "wood": "vegetation", "house": "building"},
-    "driveway": {"": "pavement"},
-    "house": {"": "building"},
-    "shop": {"": "building"},
-    "tree": {"": "vegetation"},
-    "hedge": {"": "vegetation"},
-    "shrub": {"": "vegetation"},
-    "fence": {"": "fence"},
-    "lamp post": {"": "pole"},
-    "road sign": {"": "traffic sign", "pole": "pole"},
-    "traffic light": {"": "traffic sign", "base": "pole", "post": "pole"},
-    **dict.fromkeys(_STREET_FURNITURE, Parts({"": "street furniture"})),
-    **dict.fromkeys(_VEHICLES, Parts({"": "vehicle"})),
-    "person": {"": "person"},
-    "interior": {"": "wall", "floor": "floor", "ceiling": "ceiling", "outer_wall": "building", **_DOOR, **_WINDOW, **_FITTED},
-    **dict.fromkeys(_FURNITURE, Parts({"": "furniture"})),
-    "shelf": {"": "furniture", **dict.fromkeys(("book", "box", "vase"), "household item")},
-    "television": {"": "household item", **dict.fromkeys(("console", "door", "drawer", "handle", "leg"), "furniture")},
-    "rug": {"": "floor"},
-    **dict.fromkeys(_HOUSEHOLD, Parts({"": "household item"})),
-}
-"""Stuff that the pieces of the zoo's places are, by their categories and names of parts; empty: all other parts."""
-
-
-def stuff_of(category: str, part: str) -> int:
-    """The class of a part of scenery of a category.
-
-    Where the zoo does not say, names do: of a part, else of its category, without numbers at their end and what comes before a
-    slash: Road.001 is road. Else it is scenery.
-    """
-    known = STUFF_OF.get(category.replace("_", " "))
-    if known is not None:
-        return STUFF_IDS[known.get(part, known[""])]
-    names = (re.sub(r"[\W\d_]+$", "", name.rpartition("/")[-1]).lower().replace("_", " ") for name in (part, category))
-    return next((STUFF_IDS[name] for name in names if name in STUFF_IDS), SCENERY)
 
 
 def thing_class(category_id: int) -> int:

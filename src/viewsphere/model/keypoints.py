@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
 from itertools import chain
 from typing import Annotated, TypeVar
 
@@ -98,3 +99,19 @@ def _once(values: list[T], what: str, words: Callable[[T], str]) -> None:
     again = next((value for i, value in enumerate(values) if value in values[:i]), None)
     if again is not None:
         raise ValueError(f"expected every {what} once; found {words(again)} again")
+
+
+@dataclass(frozen=True)
+class At:
+    """A place in the box around a part: its centre, or by `where` (x, y, z) from -1 to 1 towards its sides; for an edge or a
+    corner of the box the part's nearest vertex. Of several `parts`, `seat_pad|seat`, the first that a model has counts.
+    """
+
+    parts: str
+    where: Place = (0.0, 0.0, 0.0)
+
+
+def sided(name: str, parts: str, where: Place = (0.0, 0.0, 0.0)) -> dict[str, At]:
+    """The points `name_left` and `name_right`: `{}` in `parts` is left or right, and `where` is that of the left, at +X."""
+    x, y, z = where
+    return {f"{name}_left": At(parts.format("left"), where), f"{name}_right": At(parts.format("right"), (-x, y, z))}

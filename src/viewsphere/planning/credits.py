@@ -1,4 +1,4 @@
-"""The credits of models: from their entries, else from a table beside their files; the zoo's models belong to the project."""
+"""The credits of models: from their entries, else from their sources or a table beside their files."""
 
 from __future__ import annotations
 
@@ -16,14 +16,12 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import first_few, quantity
 from viewsphere.model.validation_errors import report, shown
-from viewsphere.recipe.models import ZOO
+from viewsphere.plugins.source import source_of
 
 TABLE = "credits.csv"
 """Name of the table in a folder of models: its column `file` has names of files, and patterns, of which the first counts."""
 
 COLUMNS = ("file", *Credit.model_fields)
-
-ZOO_CREDIT = Credit(licence="Apache-2.0", attribution="The viewsphere contributors")
 
 Table = Mapping[str, Credit]
 """Credits by the files' names, or patterns of them."""
@@ -48,8 +46,9 @@ def unlicensed(keys: Iterable[str], known: Mapping[str, Credit]) -> Iterator[str
 
 
 def _looked_up(spec: ModelSpec, table: Callable[[Path, bool], Table]) -> Credit | None:
-    if spec.source.startswith(ZOO):
-        return ZOO_CREDIT
+    named = source_of(spec.source)
+    if named is not None:
+        return named.spec.credit(spec)
     file = split_source(Path(spec.source))[0]
     rows = table(file.parent, spec.confined)
     return rows.get(file.name) or next((credit for name, credit in rows.items() if fnmatchcase(file.name, name)), None)

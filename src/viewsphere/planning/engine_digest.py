@@ -25,7 +25,7 @@ def engine_digest(name: str) -> str:
     Two states of a program may carry one version, but only equal sources surely paint alike. Raises UserError for an engine
     that is not there.
     """
-    engine, file = plugins.load(EngineSpec, name), plugins.source("engines", name)
+    engine, file = plugins.load(EngineSpec, name), plugins.module_file("engines", name)
     own = [] if file is None else [file.parent if file.name == "__init__.py" else file]
     digest = hashlib.sha256()
     for root in (*own, *engine.programs, *SHARED):

@@ -21,20 +21,17 @@ from viewsphere.assets.readers import reader_of, suffixes
 from viewsphere.composing.scene.entries_walked import below, matching, named
 from viewsphere.composing.seeds import generator, share
 from viewsphere.composing.tables import Cells, table_rows
-from viewsphere.errors import ModelError, RecipeError, each
+from viewsphere.errors import ModelError, RecipeError, UserError, each
 from viewsphere.limits import limits
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.model_spec import ModelSpec, Size
-from viewsphere.model.validation_errors import Nearest, one_of
-from viewsphere.plugins import families
+from viewsphere.model.validation_errors import Nearest
+from viewsphere.plugins import prefix_of
+from viewsphere.plugins.source import Named, model_for, source_of, suggested
 from viewsphere.recipe.draws import drawn
-from viewsphere.recipe.models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres
+from viewsphere.recipe.models import Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import Category
-from viewsphere.zoo import things
-
-ANY = "any"
-"""Stands for every family of the zoo whose members are things."""
 
 LONGEST_KEY = 150
 """Bytes; names of files and of folders that are being written add up to some hundred more."""
@@ -45,25 +42,32 @@ Sizes = Mapping[str, tuple[float, float, float]]
 
 @dataclass(frozen=True)
 class _Found:
-    """A model that an entry means: the entry's index, the key it would like, a file's path or `zoo:<family>`."""
+    """A model that an entry means: the entry's index, the key it would like, a file's path or a name such as `zoo:car`.
+
+    is_drawn: whether a seed decides which model it is.
+    """
 
     entry: int
     key: str
     source: str
+    is_drawn: bool = False
 
     @property
-    def in_zoo(self) -> bool:
-        return self.source.startswith(ZOO)
+    def is_file(self) -> bool:
+        return not prefix_of(self.source)
 
 
 def count_models(recipe: Recipe) -> int:
     """Return the number of models, without making their specifications.
-    Raises RecipeError for missing files and unknown families of the zoo, of all entries together.
+    Raises RecipeError for missing files and unknown models of sources, of all entries together.
     """
 
     def count(index: int) -> int:
-        families = _families(recipe, index)
-        return len(families) * _count(recipe, index) if families else len(_files(recipe, index))
+        names = _expanded(recipe, index)
+        if not names:
+            return len(_files(recipe, index))
+        single = sum(len(expanded) for named, expanded in names if not named.spec.drawn)
+        return single + sum(_count(recipe, index) for named, _ in names if named.spec.drawn)
 
     return sum(each(count, (i for i, entry in enumerate(recipe.models) if entry.is_labelled)))
 
@@ -88,13 +92,13 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
 
     def numbered(found: _Found) -> tuple[ModelSpec, int]:
         entry = recipe.models[found.entry]
-        if not found.in_zoo:
+        if found.is_file:
             _check_file(entry, found)
         category = _category(entry, found.source)
         spec = ModelSpec(
             key=found.key,
             source=found.source,
-            seed=int(generator(recipe.lasting_seed, found.source, found.key).integers(2**63)) if found.in_zoo else None,
+            seed=int(generator(recipe.lasting_seed, found.source, found.key).integers(2**63)) if found.is_drawn else None,
             category=category,
             supercategory=entry.supercategory,
             category_id=ids[category] if entry.is_labelled else 0,
@@ -164,7 +168,7 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
 
     def add(i: int) -> None:
         entry = recipe.models[i]
-        for source in chain.from_iterable(map(_meant, entry.source)):
+        for source in _single(recipe, i):
             name = _category(entry, source)
             category = result.setdefault(name, Category(len(result) + 1, name, entry.supercategory))
             if category.supercategory != entry.supercategory:
@@ -177,16 +181,31 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
     return tuple(result.values())
 
 
-def _families(recipe: Recipe, index: int) -> tuple[str, ...]:
-    """The zoo families of an entry, none for one of files; raises RecipeError for one that is not there."""
-    for family in recipe.models[index].families:
-        if family not in (ANY, *families()):
-            raise RecipeError(f"models[{index}].source: zoo: {one_of(family, families())}")
-    return recipe.models[index].families
+def _expanded(recipe: Recipe, index: int) -> tuple[tuple[Named, tuple[str, ...]], ...]:
+    """The names of an entry that sources know, each with the single models that it stands for; none for an entry of files.
+    Raises RecipeError for an unknown name.
+    """
+    found: list[tuple[Named, tuple[str, ...]]] = []
+    for source in recipe.models[index].names:
+        named = source_of(source)
+        assert named is not None
+        try:
+            found.append((named, named.spec.expand(named.name)))
+        except UserError as error:
+            raise RecipeError(f"models[{index}].source: {named.prefix}: {error}") from None
+    return tuple(found)
+
+
+def _single(recipe: Recipe, index: int) -> Iterator[str]:
+    """The sources of all single models that an entry may have, as far as its category depends on them."""
+    entry = recipe.models[index]
+    if entry.category or not entry.names:
+        return iter(entry.source)
+    return (f"{named.prefix}:{name}" for named, names in _expanded(recipe, index) for name in names)
 
 
 def _count(recipe: Recipe, index: int) -> int:
-    """Return an entry's number of models for each of its zoo families; raises RecipeError above the limit."""
+    """Return an entry's number of models for each name that they are drawn from; raises RecipeError above the limit."""
     entry, most = recipe.models[index], limits.MAX_MODELS
     names = ("models", "count", entry.name or "", *entry.source)
     count = 1 if entry.count is None else drawn(entry.count, lambda path: generator(recipe.lasting_seed, *names, *path))
@@ -219,32 +238,28 @@ def _sidecar(recipe: Recipe, index: int) -> str | None:
 
 
 def _category(entry: ModelEntry, source: str) -> str:
-    return entry.category or source.removeprefix(ZOO).replace("_", " ")
+    return entry.category or source.partition(":")[2].replace("_", " ")
 
 
 def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
     entry = recipe.models[index]
-    for family in _families(recipe, index):
+    prefix = f"{entry.name}_" if entry.name else ""
+    for origin, names in _expanded(recipe, index):
+        if not origin.spec.drawn:
+            yield from (_Found(index, _short(_free(prefix + _as_key(n))), f"{origin.prefix}:{n}") for n in names)
+            continue
         for number in range(_count(recipe, index)):
-            yield _Found(index, f"{entry.name or family}_{number:03d}", ZOO + _drawn_family(recipe, family, number))
-    if not entry.families:
-        prefix = f"{entry.name}_" if entry.name else ""
+            key = f"{entry.name or _as_key(origin.name)}_{number:03d}"
+            yield _Found(index, key, f"{origin.prefix}:{_drawn_name(recipe, names, number)}", is_drawn=True)
+    if not entry.names:
         for file in _files(recipe, index):
             yield _Found(index, _short(_free(prefix + _as_key(file.stem))), file.as_posix())
 
 
-def _meant(source: str) -> tuple[str, ...]:
-    """Return the sources of all families that a source may mean; the source itself where it means a single one."""
-    return tuple(ZOO + family for family in things()) if source == ZOO + ANY else (source,)
-
-
-def _drawn_family(recipe: Recipe, family: str, number: int) -> str:
-    """The family of a model: of `any` each in turn before one comes again, every round in an order of its own."""
-    if family != ANY:
-        return family
-    known = things()
-    turn, place = divmod(number, len(known))
-    return sorted(known, key=lambda name: share(recipe.lasting_seed, "family", str(turn), name))[place]
+def _drawn_name(recipe: Recipe, names: Sequence[str], number: int) -> str:
+    """The name of a drawn model: each in turn before one comes again, every round in an order of its own."""
+    turn, place = divmod(number, len(names))
+    return sorted(names, key=lambda name: share(recipe.lasting_seed, "family", str(turn), name))[place]
 
 
 def _as_key(text: str) -> str:
@@ -276,9 +291,9 @@ def _files(recipe: Recipe, index: int) -> tuple[Path, ...]:
 
 def left_out(recipe: Recipe) -> Iterator[str]:
     """A warning for each entry whose folders and patterns hold files that only Blender reads, and that no entry names."""
-    taken = cache(lambda: {file for i, entry in enumerate(recipe.models) if not entry.families for file in _files(recipe, i)})
+    taken = cache(lambda: {file for i, entry in enumerate(recipe.models) if not entry.names for file in _files(recipe, i)})
     for i, entry in enumerate(recipe.models):
-        sources = () if entry.families else entry.source
+        sources = () if entry.names else entry.source
         unread = {f for source in sources for f in _unread(recipe.folder, source, f"models[{i}]")}
         if unread and (unread := unread - taken()):
             yield f"models[{i}].source: {_naming(recipe.folder, unread)}"
@@ -334,9 +349,8 @@ def _candidates(folder: Path, source: str, where: str) -> list[Path]:
         return _shown(path, where)
     if has_magic(source):
         return matching(folder, source, where)
-    kinds = "a file, folder, pattern or zoo:<family>"
-    meant = f"; did you mean {ZOO + source!r}?" if source in families() else ""
-    raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}{meant}")
+    kinds = "a file, folder, pattern or a source's model, such as " + model_for("example")
+    raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}{suggested(source)}")
 
 
 def _wanted(path: Path) -> Set[str]:
@@ -375,7 +389,7 @@ def _with_unique_keys(found: list[_Found]) -> list[_Found]:
 def _longer_keys(group: Sequence[_Found]) -> list[str]:
     """Return the keys of all models that would like the same one, in their order."""
     keys = [item.key for item in group]
-    if len(group) == 1 or any(item.in_zoo for item in group):
+    if len(group) == 1 or not all(item.is_file for item in group):
         return keys
     paths = [Path(item.source) for item in group]
     for folders in range(max(len(path.parts) for path in paths)):
@@ -395,13 +409,13 @@ def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes], hi
     size = recipe.models[found.entry].real_size
     if isinstance(size, Dimensions):
         return size.width, size.height, size.length
-    if size == "file" or (size is None and found.in_zoo):
+    if size == "file" or (size is None and not found.is_file):
         return "file"
     if size is None:
         return None
     path, unit = (size.csv, unit_metres(size.unit)) if isinstance(size, SizeTable) else (size, 1.0)
     sizes = table(recipe.folder / path)
-    name = found.key if found.in_zoo else Path(found.source).stem
+    name = Path(found.source).stem if found.is_file else found.key
     row = sizes.get(name) or sizes.get(found.key)
     if row is None:
         raise RecipeError(

@@ -1,8 +1,9 @@
 """Finds plug-ins by name, and loads them.
 
 A plug-in is one module that holds a spec, such as `FORMAT = FormatSpec(...)`. A module's name is the plug-in's name, so listing
-names imports no plug-in. Third parties name their modules in entry points of the groups `viewsphere.formats` and so on. A
-plug-in of theirs that cannot be loaded is an error for those that name it, and for nothing else.
+names imports no plug-in. Other packages name their modules in entry points of the groups `viewsphere.formats` and so on, or a
+package with a module a plug-in in the group `viewsphere.packages`: `families = "my_package.families"`. A plug-in of theirs that
+cannot be loaded is an error for those that name it, and for nothing else.
 
 A module of labels may hold several, as `LABELS = (ChannelLabel(name="flow", ...), ...)`. Listing reads their names in the text
 of that statement, without importing the module. Loading compares them with the labels. Third parties write one entry point for
@@ -20,12 +21,26 @@ import sys
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from importlib import metadata
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 from viewsphere.errors import PluginError, UserError
 
-Kind = Literal["engines", "formats", "labels", "lights", "materials", "motions", "placers", "readers", "samplers"]
+Kind = Literal[
+    "engines",
+    "families",
+    "formats",
+    "labels",
+    "lights",
+    "materials",
+    "motions",
+    "placers",
+    "places",
+    "readers",
+    "samplers",
+    "sources",
+]
 
 
 class Specified(Protocol):
@@ -38,8 +53,8 @@ S = TypeVar("S", bound=Specified)
 
 
 class Seam(NamedTuple):
-    """The package of a kind's built-in plug-ins, the constant of a module that holds its spec, and the constant that holds
-    several specs; empty: a module holds one.
+    """The package of a kind's built-in plug-ins (empty: there are none), the constant of a module that holds its spec, and the
+    constant that holds several specs; empty: a module holds one.
     """
 
     package: str
@@ -49,6 +64,7 @@ class Seam(NamedTuple):
 
 SEAMS: dict[Kind, Seam] = {
     "engines": Seam("viewsphere.engines", "ENGINE"),
+    "families": Seam("", "FAMILY"),
     "formats": Seam("viewsphere.formats", "FORMAT"),
     "labels": Seam("viewsphere.labels", "LABEL", "LABELS"),
     "lights": Seam("viewsphere.recipe.lights", "LIGHT"),
@@ -56,13 +72,25 @@ SEAMS: dict[Kind, Seam] = {
     "motions": Seam("viewsphere.composing.motion", "MOTION"),
     "placers": Seam("viewsphere.composing.placing", "PLACER"),
     "readers": Seam("viewsphere.assets.readers", "READER"),
+    "places": Seam("", "PLACE"),
     "samplers": Seam("viewsphere.planning.samplers", "SAMPLER"),
+    "sources": Seam("", "SOURCE"),
 }
+
+
+PACKAGES = "viewsphere.packages"
+"""The group of entry points that name packages of plug-ins, each by its kind."""
 
 
 def names(kind: Kind) -> tuple[str, ...]:
     """Names of all plug-ins of this kind, sorted; no plug-in is imported."""
-    return tuple(sorted({*shipped(kind), *(entry.name for entry in entry_points(group=f"viewsphere.{kind}"))}))
+    return tuple(sorted(_found(kind)))
+
+
+def prefix_of(source: str) -> str:
+    """The prefix of a model's or place's source that a plug-in provides, such as `zoo` of `zoo:car`; empty for a file."""
+    prefix, colon, _ = source.partition(":")
+    return prefix if colon and prefix in names("sources") else ""
 
 
 def load(spec: type[S], name: str) -> S:
@@ -87,55 +115,86 @@ def loadable(spec: type[S]) -> dict[str, S]:
 
 
 def is_third_party(kind: Kind, name: str) -> bool:
-    """Return whether an entry point names the plug-in."""
-    return _entry(kind, name) is not None
+    """Return whether another distribution than viewsphere's brings the plug-in."""
+    found = _found(kind).get(name)
+    return found is not None and found.is_third_party
 
 
 def origin(kind: Kind, name: str) -> str:
     """The distribution that a plug-in comes from, with its version."""
-    entry = _entry(kind, name)
-    found = metadata.distribution("viewsphere") if entry is None else entry.dist
-    return "" if found is None else f"{found.name} {found.version}"
+    found = _found(kind)[name].distribution or metadata.distribution(OWN)
+    return f"{found.name} {found.version}"
 
 
-def source(kind: Kind, name: str) -> Path | None:
+def module_file(kind: Kind, name: str) -> Path | None:
     """The file of a plug-in's module; None where it has none."""
-    entry = _entry(kind, name)
-    found = importlib.util.find_spec(
-        shipped(kind).get(name, f"{SEAMS[kind].package}.{name}") if entry is None else entry.module
-    )
+    found = importlib.util.find_spec(_found(kind)[name].module)
     return None if found is None or found.origin is None else Path(found.origin)
 
 
-def _entry(kind: Kind, name: str) -> metadata.EntryPoint | None:
-    return next((entry for entry in entry_points(group=f"viewsphere.{kind}") if entry.name == name), None)
+class _Found(NamedTuple):
+    """A plug-in's module, the object in it that an entry point names (empty: the module), and the distribution of the entry
+    point (None: the plug-in is built in).
+    """
+
+    module: str
+    attribute: str = ""
+    distribution: metadata.Distribution | None = None
+
+    @property
+    def is_third_party(self) -> bool:
+        """Return whether another distribution than viewsphere's brings it."""
+        return self.distribution is not None and self.distribution.name != OWN
 
 
 def shipped(kind: Kind) -> Mapping[str, str]:
-    """The modules of the built-in plug-ins of a kind, by the plug-ins' names; none is imported."""
+    """The modules of the plug-ins of a kind that come with viewsphere, by the plug-ins' names; none is imported."""
+    return {name: found.module for name, found in _found(kind).items() if not found.is_third_party}
+
+
+def _found(kind: Kind) -> dict[str, _Found]:
+    """The plug-ins of a kind by name. One that an entry point names comes before one of its name in a package."""
     seam = SEAMS[kind]
-    return _plugins_in(_changes(importlib.import_module(seam.package).__path__), seam)
+    found = {name: _Found(module) for name, module in _plugins_of(seam.package, seam).items()} if seam.package else {}
+    for entry in entry_points(group=PACKAGES):
+        if entry.name == kind:
+            found |= {name: _Found(module, "", entry.dist) for name, module in _packed(entry.module, seam).items()}
+    for entry in entry_points(group=f"viewsphere.{kind}"):
+        found[entry.name] = _Found(entry.module, entry.attr, entry.dist)
+    return found
+
+
+def _packed(package: str, seam: Seam) -> Mapping[str, str]:
+    """The modules of a package of plug-ins by name; of one that cannot be imported the package, whose loading says why."""
+    try:
+        return _plugins_of(package, seam)
+    except Exception:
+        return {package: package}
+
+
+def _plugins_of(package: str, seam: Seam) -> Mapping[str, str]:
+    """The modules of a package by the names of the plug-ins that they hold; listed again after its folder was changed."""
+    return _plugins_in(_changes(importlib.import_module(package).__path__), package, seam)
 
 
 def _module_of(kind: Kind, name: str) -> Any:
     """The module of a plug-in, or the object that its entry point names."""
-    entry = _entry(kind, name)
-    if entry is not None:
-        return _entered(entry)
-    if name not in shipped(kind):
-        raise _unknown(kind[:-1], name, names(kind))
-    return importlib.import_module(shipped(kind)[name])
+    found = _found(kind).get(name)
+    if found is None:
+        raise _unknown(SEAMS[kind].constant.lower(), name, names(kind))
+    return _entered(found, name) if found.is_third_party else importlib.import_module(found.module)
 
 
-def _entered(entry: metadata.EntryPoint) -> Any:
+def _entered(found: _Found, name: str) -> Any:
     """Return the object that a third party's entry point names; any failure is an error of the plug-in."""
     try:
-        return entry.load()
+        module = importlib.import_module(found.module)
+        return attrgetter(found.attribute)(module) if found.attribute else module
     except PluginError as error:
-        raise PluginError("\n".join(f"{_file(entry.module)}: {line}" for line in str(error).splitlines())) from error
+        raise PluginError("\n".join(f"{_file(found.module)}: {line}" for line in str(error).splitlines())) from error
     except Exception as error:
         said = f"{type(error).__name__}: {error}".strip().replace("\n", " ")
-        raise PluginError(f"{_file(entry.module)}: plug-in {entry.name} cannot be imported: {said}") from error
+        raise PluginError(f"{_file(found.module)}: plug-in {name} cannot be imported: {said}") from error
 
 
 def _spec(spec: type[S], found: Any, name: str) -> S:
@@ -197,6 +256,9 @@ def entry_points(group: str) -> metadata.EntryPoints:
     return _of_group(_changes(sys.path), group)
 
 
+OWN = "viewsphere"
+"""The distribution of the built-in plug-ins."""
+
 Changes = tuple[tuple[str, int], ...]
 """Folders, and when each was last changed."""
 
@@ -231,48 +293,14 @@ def attribute(path: str) -> Any:
     return getattr(importlib.import_module(f"viewsphere.{module}"), name)
 
 
-def families() -> tuple[str, ...]:
-    """Names of the zoo's families (its modules, not its packages), sorted; none is imported."""
-    return _modules("viewsphere.zoo")
-
-
-def family(name: str) -> Any:
-    """The module of a zoo family; raises UserError for an unknown name, with the nearest known one."""
-    return _module("viewsphere.zoo", "zoo family", name)
-
-
-def places() -> tuple[str, ...]:
-    """Names of the zoo's places, sorted; none is imported."""
-    return _modules("viewsphere.zoo.places")
-
-
-def place(name: str) -> Any:
-    """The module of a place; raises UserError for an unknown name, with the nearest known one."""
-    return _module("viewsphere.zoo.places", "zoo place", name)
-
-
-def _modules(package: str) -> tuple[str, ...]:
-    return tuple(sorted(name for name, is_package in _listed(package) if not is_package))
-
-
-def _listed(package: str) -> tuple[tuple[str, bool], ...]:
-    """Names of a package's modules, and whether each is a package itself; listed again after its folder was changed."""
-    return _modules_in(_changes(importlib.import_module(package).__path__))
-
-
-@lru_cache(maxsize=2 * len(SEAMS))
-def _modules_in(paths: Changes) -> tuple[tuple[str, bool], ...]:
-    return tuple((m.name, m.ispkg) for m in pkgutil.iter_modules([path for path, _ in paths]))
-
-
-@lru_cache(maxsize=2 * len(SEAMS))
-def _plugins_in(paths: Changes, seam: Seam) -> Mapping[str, str]:
+@lru_cache(maxsize=4 * len(SEAMS))
+def _plugins_in(paths: Changes, package: str, seam: Seam) -> Mapping[str, str]:
     """The modules in a package's folders by the names of the plug-ins that they hold."""
     homes: dict[str, str] = {}
     for module in pkgutil.iter_modules([path for path, _ in paths]):
         if not module.name.startswith("_") and module.name != "shared":
             held = _names_in_text(module, seam.several) if seam.several else None
-            homes |= dict.fromkeys(held or (module.name,), f"{seam.package}.{module.name}")
+            homes |= dict.fromkeys(held or (module.name,), f"{package}.{module.name}")
     return homes
 
 
@@ -309,13 +337,6 @@ def _literal_name(call: object) -> str | None:
         return None
     given = [word.value for word in call.keywords if word.arg == "name"] or call.args[:1]
     return next((each.value for each in given if isinstance(each, ast.Constant) and isinstance(each.value, str)), None)
-
-
-def _module(package: str, what: str, name: str) -> Any:
-    known = _modules(package)
-    if name not in known:
-        raise _unknown(what, name, known)
-    return importlib.import_module(f"{package}.{name}")
 
 
 def _unknown(what: str, name: str, known: tuple[str, ...]) -> UserError:

@@ -14,11 +14,11 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Background, Ground
 from viewsphere.model.validation_errors import Marks, Place, dotted, shown
 from viewsphere.model.validation_errors import Path as Steps
+from viewsphere.plugins import prefix_of
 from viewsphere.recipe.draws import KINDS
 from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.file import parse, read
 from viewsphere.recipe.former_names import present, with_present_names
-from viewsphere.recipe.models import ZOO
 
 PATHS: tuple[tuple[str, ...], ...] = (
     ("models", "*", "source"),
@@ -40,7 +40,7 @@ PATHS: tuple[tuple[str, ...], ...] = (
 """Fields that hold a path; a path is relative to the file in which it is written."""
 
 WORDS = {"file", "daylight"}
-"""Values of these fields that are neither paths nor names of the zoo."""
+"""Values of these fields that are neither paths nor names of a source."""
 
 UNIONS: dict[str, tuple[frozenset[str], ...]] = {
     "sky": tuple(map(frozenset, (["hdri"], ["daylight"], ["night"], ["zenith", "horizon"]))),
@@ -219,7 +219,7 @@ def _rebased(data: Any, pattern: tuple[str, ...], folder: str) -> Any:
     if isinstance(data, dict) and isinstance(data.get("choice"), list):
         return {**data, "choice": [_rebased(option, pattern, folder) for option in data["choice"]]}
     if not pattern:
-        if not isinstance(data, str) or data in WORDS or data.startswith((ZOO, "~")):
+        if not isinstance(data, str) or data in WORDS or data.startswith("~") or prefix_of(data):
             return data
         return Path(folder, data).as_posix()
     step, rest = pattern[0], pattern[1:]

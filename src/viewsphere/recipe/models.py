@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from viewsphere import plugins
 from viewsphere.model.appearance import Word
 from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.frozen import Frozen
@@ -16,13 +14,14 @@ from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Positive
 from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.validation_errors import one_of, shown
+from viewsphere.plugins import prefix_of
+from viewsphere.plugins.source import suggested
 from viewsphere.recipe.draws import CountDrawn, Drawn, is_random
 from viewsphere.recipe.motion import MOTION, MotionField
 from viewsphere.recipe.time import RATE, STEPS, Frames, Rate, Steps
 from viewsphere.recipe.values import OrShort, shape_of
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-ZOO = "zoo:"
 
 UnitName = Literal["m", "cm", "mm", "in", "ft"]
 
@@ -176,9 +175,9 @@ class ModelEntry(OmitNone):
     source_url: SourceUrl = None
 
     @property
-    def families(self) -> tuple[str, ...]:
-        """The zoo families of this entry; empty for an entry of files."""
-        return tuple(s.removeprefix(ZOO) for s in self.source if s.startswith(ZOO))
+    def names(self) -> tuple[str, ...]:
+        """The models of sources in this entry, such as `zoo:car`; empty for an entry of files."""
+        return tuple(filter(prefix_of, self.source))
 
     @property
     def is_labelled(self) -> bool:
@@ -203,26 +202,28 @@ class ModelEntry(OmitNone):
 
     @model_validator(mode="after")
     def _check(self) -> ModelEntry:
-        families = self.families
-        if families and len(families) < len(self.source):
-            raise ValueError("expected either files or zoo families; found both: give each an entry of its own")
-        for family in families:
-            if not re.fullmatch(r"[a-z][a-z0-9_]*", family):
-                raise ValueError(f"expected zoo:<family>, such as zoo:car; found {ZOO + family!r}")
-        if not families and is_random(self.count):
+        names = self.names
+        if names and len(names) < len(self.source):
+            raise ValueError("expected either files or models of a source; found both: give each an entry of its own")
+        for name in names:
+            if name.endswith(":"):
+                raise ValueError(f"expected the name of a model after {name!r}; found none")
+        if not names and is_random(self.count):
             raise ValueError("count is a distribution, but for files it must be one number: the required number of files")
-        if not families and not self.category:
-            zoo = f"; did you mean {ZOO + self.source[0]!r}?" if self.source[0] in plugins.families() else ""
-            raise ValueError(f"expected a category, such as car; found none (only zoo families have one of their own){zoo}")
+        if not names and not self.category:
+            raise ValueError(
+                f"expected a category, such as car; found none (only models of a source have one of their own)"
+                f"{suggested(self.source[0])}"
+            )
         if self.up and self.forward and self.up[1] == self.forward[1]:
             raise ValueError(f"expected up and forward along different axes; found {self.up} and {self.forward}")
-        if families and self.sidecar is not None:
-            raise ValueError("zoo models cannot have a sidecar, because they bring these facts themselves: remove sidecar")
+        if names and self.sidecar is not None:
+            raise ValueError("models of a source cannot have a sidecar, because the source has these facts: remove sidecar")
         if self.frames is None and self.poses != "each":
             raise ValueError(f"expected frames, for poses: {self.poses}; found none")
         if not self.is_labelled and self.frames is not None:
             raise ValueError("frames cannot be set with labels: background, because distractors play no frames: remove one")
-        if self.scale == "real_size" and self.real_size is None and not families:
+        if self.scale == "real_size" and self.real_size is None and not names:
             raise ValueError("expected real_size to be set, for scale: real_size; found none")
         return self
 

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from viewsphere import plugins
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import FARTHEST, Length, Number, Portion
 from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.validation_errors import shown
+from viewsphere.plugins import prefix_of
+from viewsphere.plugins.place import PlaceSpec
+from viewsphere.plugins.source import place_names, place_of
 from viewsphere.recipe.draws import CountDrawn, CountOrNone, Drawn, is_random, span
 from viewsphere.recipe.layout import LAYOUT, ORIENTATION, Layout, Orientation, Spot, placer_of, spots_of
-from viewsphere.recipe.models import ZOO, Unit
+from viewsphere.recipe.models import Unit
 from viewsphere.recipe.motion import MOTION, MotionField, MotionsField
 from viewsphere.recipe.values import Interval, OrShort, Point
 
@@ -57,35 +58,43 @@ class PlaceEntry(OmitNone):
     )
 
     @property
-    def name(self) -> str:
-        """Name of the zoo's place; empty for a file."""
-        return self.source.removeprefix(ZOO) if self.source.startswith(ZOO) else ""
+    def prefix(self) -> str:
+        """The prefix of the place's source; empty for a file."""
+        return prefix_of(self.source)
 
     @property
     def is_room(self) -> bool:
-        """True if it is an indoor place of the zoo."""
-        return self.name in plugins.places() and getattr(plugins.place(self.name), "INDOORS", False)
+        """True if it is an indoor place of a source."""
+        place = self._spec
+        return place is not None and place.indoors
 
     @property
     def has_roads(self) -> bool:
-        """True for a place of the zoo whose module says ROADS."""
-        return self.name in plugins.places() and getattr(plugins.place(self.name), "ROADS", False)
+        """True for a place of a source that has roads."""
+        place = self._spec
+        return place is not None and place.roads
+
+    @property
+    def _spec(self) -> PlaceSpec | None:
+        return place_of(self.source)
 
     @model_validator(mode="after")
     def _check_traffic(self) -> PlaceEntry:
         given = [name for name in ("parked", "walkers") if getattr(self, name) is not None]
         if given and not self.has_roads:
             raise ValueError(
-                f"`{given[0]}` needs a place with roads, and {self.source} has none. Use zoo:neighbourhood or zoo:town, or "
-                f"remove `{given[0]}`"
+                f"`{given[0]}` needs a place with roads, and {self.source} has none. Use {_with_roads()}, or remove "
+                f"`{given[0]}`"
             )
         return self
 
     @model_validator(mode="after")
     def _check(self) -> PlaceEntry:
-        if self.source.startswith(ZOO):
-            if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
-                raise ValueError(f"expected zoo:<place>, such as zoo:neighbourhood; found {self.source!r}")
+        if self.prefix:
+            if not self.source.isascii() or not self.source[len(self.prefix) + 1 :].isidentifier():
+                raise ValueError(
+                    f"expected the name of a place, such as {next(iter(place_names()), 'none')}; found {self.source!r}"
+                )
             given = [name for name in OF_FILES if getattr(self, name) != type(self).model_fields[name].default]
             if given:
                 raise ValueError(f"expected a file beside {given[0]}; found {self.source!r}")
@@ -99,6 +108,10 @@ class PlaceEntry(OmitNone):
         elif (self.labels == "own") != bool(self.category):
             raise ValueError("expected category and labels: own together, for a file; found one of them")
         return self
+
+
+def _with_roads() -> str:
+    return " or ".join(name for name in place_names() if (place := place_of(name)) is not None and place.roads)
 
 
 class CompanyEntry(OmitNone):

@@ -21,6 +21,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.planning.extension import DatasetPart
 from viewsphere.planning.plan import Plan
+from viewsphere.plugins.source import model_for
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exports.exporting import write
@@ -34,7 +35,7 @@ from viewsphere.store import Dataset, Row, Store
 
 SPEED_RECIPE = Recipe.model_validate(
     {
-        "models": [{"source": "zoo:car"}],
+        "models": [{"source": model_for("example")}],
         "viewpoints": {"azimuth": {"start": 0, "stop": 345, "step": 15}, "elevation": [20], "distance": 4},
         "camera": {"size": [640, 480]},
     }

@@ -24,6 +24,7 @@ from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.model.scene import IDENTITY, Vector
 from viewsphere.planning.models import numbered_specs
 from viewsphere.plugins.format import FormatSpec
+from viewsphere.plugins.source import model_for
 from viewsphere.recipe.file import dump
 from viewsphere.recipe.formats import Formats, read_formats
 from viewsphere.recipe.recipe import Recipe
@@ -31,7 +32,6 @@ from viewsphere.recipe.viewpoints import PoseList
 from viewsphere.run.exports.scope import needs_of
 from viewsphere.store.source_cameras import Drafted, SourceCameras, SourceModel
 
-SOURCE, CATEGORY = "zoo:car", "car"
 FILLED = 0.5
 """Share of a picture's width that it fills, of half of the cameras."""
 
@@ -156,7 +156,8 @@ def _recipe(
 ) -> dict[str, Any]:
     views: dict[str, Any] = {"kind": "file", "path": SHOTS, "up": found.up}
     if substitute is not None:
-        entries = [{"source": SOURCE, "category": CATEGORY, "count": 1, "scale": {"length": substitute.length}}]
+        source = model_for("example")
+        entries = [{"source": source, "category": source.partition(":")[2], "count": 1, "scale": {"length": substitute.length}}]
         views["origin"] = list(substitute.origin)
     listed = {"scenes": {"sampler": "listed"}} if any(shot.objects for shot in shots) or found.models else {}
     return {

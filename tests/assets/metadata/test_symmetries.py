@@ -15,7 +15,7 @@ from viewsphere.assets.metadata.symmetries import find, lacking
 from viewsphere.geometry.rotation import rotation_about
 from viewsphere.geometry.rotation_group import is_group
 from viewsphere.model.symmetries import Continuous, Symmetries
-from viewsphere.zoo import build
+from viewsphere_zoo import build
 
 solid = trimesh.creation
 ANYHOW = rotation_matrix(1.1, (0.3, 0.7, -0.4)) @ translation_matrix((0.4, -0.2, 0.7))

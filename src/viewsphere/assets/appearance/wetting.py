@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.model.classes import STUFF_IDS, stuff_of
+from viewsphere.assets.metadata.stuff import stuff_of
+from viewsphere.model.classes import STUFF_IDS
 
 UPRIGHT = 0.35
 """The wetness of walls as a share of the wetness of surfaces that face up."""
@@ -42,7 +43,7 @@ def wetted(mesh: Mesh, amount: float, category: str = "", evenly: bool = False) 
     smooth = mesh.normals[mesh.triangles].sum(axis=1)
     side = np.where((normal * smooth).sum(axis=1) < 0, -1.0, 1.0)  # that of the shading normals
     kind = (side * normal[:, 2] > UP * np.linalg.norm(normal, axis=1)).astype(np.int64)
-    green = np.array([stuff_of(category, part) in GREEN for part in mesh.parts])
+    green = np.array([stuff in GREEN for stuff in stuff_of(category, mesh.parts)])
     kind[green[mesh.triangle_part]] = 2
     made = (
         wet(m, share * amount, film) for share, film in ((UPRIGHT, FILM), (1.0, FILM), (LEAVES, 0.0)) for m in mesh.materials

@@ -3,30 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.keypoints import Keypoints, Pair, Place, left_and_right
-from viewsphere.model.scene import Vector
-
-
-@dataclass(frozen=True)
-class At:
-    """A place in the box around a part: its centre, or by `where` (x, y, z) from -1 to 1 towards its sides; for an edge or a
-    corner of the box the part's nearest vertex. Of several `parts`, `seat_pad|seat`, the first that a model has counts.
-    """
-
-    parts: str
-    where: Vector = (0.0, 0.0, 0.0)
-
-
-def sided(name: str, parts: str, where: Vector = (0.0, 0.0, 0.0)) -> dict[str, At]:
-    """The points `name_left` and `name_right`: `{}` in `parts` is left or right, and `where` is that of the left, at +X."""
-    x, y, z = where
-    return {f"{name}_left": At(parts.format("left"), where), f"{name}_right": At(parts.format("right"), (-x, y, z))}
+from viewsphere.model.keypoints import At, Keypoints, Pair, Place, left_and_right
 
 
 def part_points(mesh: Mesh, places: Mapping[str, At], skeleton: Sequence[Pair] = ()) -> Keypoints | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from viewsphere.assets.paths.inside import split_source
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.recipe.models import ZOO
+from viewsphere.plugins import prefix_of
 from viewsphere.recipe.sidecar import ENDING, Sidecar, read_sidecar
 
 
@@ -33,7 +33,7 @@ def sidecar_of(spec: ModelSpec) -> Path | None:
         return Path(spec.sidecar)
     file, inside = split_source(Path(spec.source))
     path = file.with_name(file.name + ENDING)
-    if spec.source.startswith(ZOO) or inside or not path.exists():
+    if prefix_of(spec.source) or inside or not path.exists():
         return None
     if spec.confined and path.resolve().parent != path.parent.resolve():
         raise ModelError(

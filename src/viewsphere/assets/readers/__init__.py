@@ -58,7 +58,7 @@ def third_party_sources(suffix: str) -> list[Path]:
     name = next((name for name, one in readers().items() if one is reader), None)
     if name is None or not plugins.is_third_party("readers", name):
         return []
-    file = plugins.source("readers", name)
+    file = plugins.module_file("readers", name)
     if file is None:
         return []
     return sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]

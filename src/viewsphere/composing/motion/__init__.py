@@ -14,8 +14,8 @@ from viewsphere.composing.motion.shared.made import Mover, check_motion, check_m
 from viewsphere.composing.motion.shared.start import Origin, Pose, Start
 from viewsphere.composing.motion.shared.way import curve_through
 from viewsphere.model.numbers import Strength
+from viewsphere.model.place import Lane
 from viewsphere.recipe.draws import Drawn
-from viewsphere.zoo.places import Lane
 
 __all__ = [
     "Amplitude",

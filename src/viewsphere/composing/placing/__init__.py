@@ -57,10 +57,10 @@ def draws_of(rng: Draws, *names: str) -> RngOf:
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of scenery that a placer needs: a member of a zoo family that is built to a size, (width, height, length) in
+    """A piece of scenery that a placer needs: the source of a model that is built to a size, (width, height, length) in
     metres, and where it stands.
     """
 
-    family: str
+    source: str
     size: tuple[float, float, float]
     world_from_piece: Matrix4

@@ -14,13 +14,14 @@ from viewsphere.composing.placing import Draws, Piece, Room, Shape, Way, draws_o
 from viewsphere.composing.placing.shared.dropping import Drop, Ground, Matter, poses_of, ways_of
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.geometry.open_box import boards
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.plugins.placer import PlacerSpec
+from viewsphere.plugins.source import model_for
 from viewsphere.recipe.draws import Drawn, drawn
-from viewsphere.zoo.open_box import boards
 
 FULL = 0.5
 """Share of a box's room that hulls of models which lie as they fall may fill at most; packings of alike ones reach 0.6."""
@@ -52,7 +53,7 @@ def ways(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Dr
 def around(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> Sequence[Piece]:
     """The box."""
     width, height, length = _size(shapes, rng, options)
-    return [Piece("open_box", (width, height, length), IDENTITY)]
+    return [Piece(model_for("box"), (width, height, length), IDENTITY)]
 
 
 def _fallen(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -> dict[str, Any]:

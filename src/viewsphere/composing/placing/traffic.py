@@ -18,11 +18,10 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length, Portion, Strength
+from viewsphere.model.place import Bay, Lane, stretches
 from viewsphere.model.scene import Matrix4
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
-from viewsphere.zoo.places import Bay, Lane
-from viewsphere.zoo.townscape.street_life import stretches
 
 Float = NDArray[np.float64]
 

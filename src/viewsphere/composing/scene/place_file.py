@@ -19,8 +19,8 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.hull import convex_hull, smallest_rectangle
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.place import Lane, Surface, standing
 from viewsphere.model.scene import Matrix4, Vector
-from viewsphere.zoo.places import Lane, Surface, standing
 
 if TYPE_CHECKING:
     from viewsphere.assets.mesh import Mesh

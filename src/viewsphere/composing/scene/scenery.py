@@ -14,24 +14,24 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewsphere import plugins
 from viewsphere.assets.paths.inside import split_source
 from viewsphere.composing.placing import Footprint, footprint, standing
 from viewsphere.composing.scene.pictures import IMAGE_SUFFIXES, files_in, proportions
 from viewsphere.composing.scene.place_file import FileOffers, offers_of
 from viewsphere.composing.seeds import Names, generator, scene_generators, share
-from viewsphere.errors import ModelError, RecipeError, UserError
+from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import compose, transform
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.place import Bay, Lane, Place, Surface, Traffic
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.validation_errors import nearest, one_of
+from viewsphere.plugins.source import place_names, place_of
 from viewsphere.recipe.draws import drawn
-from viewsphere.recipe.models import ZOO, unit_metres
+from viewsphere.recipe.models import unit_metres
 from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels, PlaceEntry, PlaneEntry
-from viewsphere.zoo.places import Bay, Lane, Surface, Traffic
 
 TRIES = 200
 """Spots that are tried for one plane."""
@@ -79,7 +79,7 @@ def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: N
 
     Raises RecipeError for an unknown place, for a file that is not there, and for motions of pieces that it does not have.
     """
-    if entry.name:
+    if entry.prefix:
         return _moving(entry, _laid_pieces(recipe, entry, _turned(recipe, entry, names), names, category_id))
     return _moving(entry, (_place_file(recipe, entry, names, category_id),))
 
@@ -92,7 +92,7 @@ def _laid_pieces(
     for piece in laid.pieces:
         spec = ModelSpec(
             key=scenery_key(piece.family, f"{piece.seed}"),
-            source=ZOO + piece.family,
+            source=f"{entry.prefix}:{piece.family}",
             seed=piece.seed,
             category=piece.category,
             category_id=category_id(piece.category, entry.labels),
@@ -144,13 +144,13 @@ def place_surfaces(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tu
 
 
 def is_indoors(recipe: Recipe, entry: PlaceEntry | None) -> bool:
-    """Return whether targets are in a room: whether the place's module says INDOORS, or its file."""
-    return entry is not None and (entry.is_room if entry.name else _file_offers(recipe, entry).indoors)
+    """Return whether targets are in a room, as the place or its file states."""
+    return entry is not None and (entry.is_room if entry.prefix else _file_offers(recipe, entry).indoors)
 
 
 def _offered(recipe: Recipe, entry: PlaceEntry, names: Names) -> Any:
-    """Return the offers of a place, in its own axes: a `zoo.places.Place`, or the `FileOffers` of a file."""
-    return draw_place(recipe, entry, names) if entry.name else _file_offers(recipe, entry)
+    """Return the offers of a place, in its own axes: a `Place`, or the `FileOffers` of a file."""
+    return draw_place(recipe, entry, names) if entry.prefix else _file_offers(recipe, entry)
 
 
 def _file_offers(recipe: Recipe, entry: PlaceEntry) -> FileOffers:
@@ -160,7 +160,7 @@ def _file_offers(recipe: Recipe, entry: PlaceEntry) -> FileOffers:
 def _world_from_place(recipe: Recipe, entry: PlaceEntry, names: Names) -> Matrix4:
     """World from the axes of a place: those of its layout, or of its file's mesh, of which `origin` is at the world's."""
     world_from_place = _turned(recipe, entry, names)
-    if entry.name:
+    if entry.prefix:
         return world_from_place
     x, y, z = entry.origin
     moved = ((1.0, 0.0, 0.0, -x), (0.0, 1.0, 0.0, -y), (0.0, 0.0, 1.0, -z), (0.0, 0.0, 0.0, 1.0))
@@ -189,24 +189,22 @@ def place_pavements(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> t
     return tuple(_carried(way, world_from_place) for way in getattr(_offered(recipe, entry, names), "pavements", ()))
 
 
-def draw_place(recipe: Recipe, entry: PlaceEntry, names: Names) -> Any:
-    """The layout (a `zoo.places.Place`) that a recipe's seed and these names draw; raises RecipeError for an unknown place."""
+def draw_place(recipe: Recipe, entry: PlaceEntry, names: Names) -> Place:
+    """The layout that a recipe's seed and these names draw; raises RecipeError for an unknown place."""
     if entry.parked is None and entry.walkers is None:
-        return _drawn_place(recipe.seed, entry.name, names, None)
+        return _drawn_place(recipe.seed, entry.source, names, None)
     rngs = scene_generators(recipe.seed, names)
     parked = None if entry.parked is None else drawn(entry.parked, rngs, ("place", "parked"))
     walkers = 0 if entry.walkers is None else drawn(entry.walkers, rngs, ("place", "walkers"))
-    return _drawn_place(recipe.seed, entry.name, names, Traffic(parked, walkers))
+    return _drawn_place(recipe.seed, entry.source, names, Traffic(parked, walkers))
 
 
 @lru_cache(maxsize=16)
-def _drawn_place(seed: int, name: str, names: Names, traffic: Traffic | None) -> Any:
-    try:
-        module = plugins.place(name)
-    except UserError:
-        raise RecipeError(f"scene.place: {one_of(ZOO + name, [ZOO + known for known in plugins.places()])}") from None
-    rng, draw = generator(seed, "place", name, *names), getattr(module, f"{name}_random")
-    return draw(rng) if traffic is None else draw(rng, traffic)
+def _drawn_place(seed: int, source: str, names: Names, traffic: Traffic | None) -> Place:
+    place, (_, _, name) = place_of(source), source.partition(":")
+    if place is None:
+        raise RecipeError(f"scene.place: {one_of(source, place_names())}")
+    return place.drawn(generator(seed, "place", name, *names), traffic)
 
 
 def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footprint | None:
@@ -215,9 +213,9 @@ def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footpr
     """
     if entry is None:
         return None
-    if not entry.name:
+    if not entry.prefix:
         return _floor_of_file(recipe, entry, names)
-    rectangle = getattr(draw_place(recipe, entry, names), "free", None)
+    rectangle = draw_place(recipe, entry, names).free
     if rectangle is None:
         return None
     x0, y0, x1, y1 = rectangle

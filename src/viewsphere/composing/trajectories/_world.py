@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.place import Lane
 from viewsphere.model.scene import Vector
-from viewsphere.zoo.places import Lane
 
 Float = NDArray[np.float64]
 

@@ -46,7 +46,6 @@ from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 from viewsphere.urls import here
-from viewsphere.zoo import build_zoo_model
 
 ENGINE = "cycles"
 """The engine that builds and saves the scenes."""
@@ -237,7 +236,7 @@ class StoredModels:
     def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> Mesh:
         """The normalised mesh; raises StoreError for a model that the store has lost, ModelError for a file of scenery."""
         if (spec, step) not in self.keys:
-            return load_normalised(spec, build_zoo_model, step=step)
+            return load_normalised(spec, step=step)
         key, own = self.keys[spec, step]
         model = self.dataset.store.model_info(key)
         info = model and next((one for one in (model, *model.steps) if one.key == own), None)

@@ -12,8 +12,8 @@ from viewsphere.assets.inspect import ModelReport, describe
 from viewsphere.errors import UserError
 from viewsphere.model.model_spec import Axis, ModelSpec
 from viewsphere.model.validation_errors import one_of
+from viewsphere.plugins.source import source_of
 from viewsphere.recipe.models import UNITS, unit_metres
-from viewsphere.zoo import build_zoo_model
 
 
 def model_spec(
@@ -24,18 +24,19 @@ def model_spec(
     unit: str | None = None,
     seed: int = 0,
 ) -> ModelSpec:
-    """A model file or `zoo:<family>` with the settings given, the others by default.
+    """A model file or `zoo:car` with the settings given, the others by default.
 
     Raises UserError for something that is no axis or no unit.
     """
     for name, axis in (("up", up), ("forward", forward)):
         if axis is not None and axis not in get_args(Axis):
             raise UserError(f"--{name}: {one_of(axis, get_args(Axis))}")
-    zoo = source.startswith("zoo:")
+    named = source_of(source)
+    is_drawn = named is not None and named.spec.drawn
     return ModelSpec(
         key=Path(source.replace(":", "-")).stem or "model",
-        source=source if zoo else str(Path(source).absolute()),
-        seed=seed if zoo else None,
+        source=source if named else str(Path(source).absolute()),
+        seed=seed if is_drawn else None,
         category="model",
         category_id=1,
         up=cast("Axis | None", up),
@@ -57,7 +58,7 @@ def _metres(unit: str) -> float:
 
 def inspect_model(spec: ModelSpec) -> ModelReport:
     """Return the report on a model: its contents, and its form after loading; raises ModelError for an unusable file."""
-    return describe(spec, build_zoo_model)
+    return describe(spec)
 
 
 def report_lines(report: ModelReport) -> Iterator[str]:

@@ -7,14 +7,17 @@ from dataclasses import dataclass
 from viewsphere.errors import UserError
 from viewsphere.labels import LabelSpec
 from viewsphere.plugins.engine import EngineSpec
+from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.light import LightSpec
 from viewsphere.plugins.material import MaterialSpec
 from viewsphere.plugins.motion import MotionSpec
+from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.plugins.reader import ReaderSpec
 from viewsphere.plugins.registry import SEAMS, Kind, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.plugins.source import SourceSpec
 from viewsphere.plugins.spec import Spec
 
 SPECS: tuple[type[Spec], ...] = (
@@ -24,9 +27,12 @@ SPECS: tuple[type[Spec], ...] = (
     LightSpec,
     MaterialSpec,
     MotionSpec,
+    PlaceSpec,
     PlacerSpec,
     ReaderSpec,
     SamplerSpec,
+    SourceSpec,
+    ZooFamily,
 )
 """The specs of all kinds."""
 

@@ -11,18 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.metadata.stuff import stuff_of
 from viewsphere.composing.redraws import is_redrawn
 from viewsphere.composing.viewpoints.camera import inside_box
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.classes import STUFF_IDS, stuff_of
+from viewsphere.model.classes import STUFF_IDS
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.planning.distances import Distances
 from viewsphere.planning.plan import Plan
+from viewsphere.plugins.source import rooms_of
 from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.sky_visibility import sky_occlusion
-from viewsphere.zoo import rooms_of
 
 Float = NDArray[np.float64]
 
@@ -190,7 +191,7 @@ def _check_wall(thing: Thing, mesh: Mesh, steps: Sequence[Step]) -> None:
 
 def _walls(category: str, mesh: Mesh) -> NDArray[np.int32]:
     """The triangles (T, 3) of scenery that nobody goes through."""
-    solid = np.array([stuff_of(category, part) in WALLS for part in mesh.parts], np.bool_)
+    solid = np.array([stuff in WALLS for stuff in stuff_of(category, mesh.parts)], np.bool_)
     return mesh.triangles[solid[mesh.triangle_part]]
 
 

@@ -24,11 +24,11 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.planning.distances import Distances
 from viewsphere.planning.plan import Plan
+from viewsphere.plugins.source import is_versioned
 from viewsphere.run.progress import Listener, Progress, null_listener
 from viewsphere.run.shots.stages import Stages, model_files
 from viewsphere.store import ModelInfo, PlanRecord, Store
 from viewsphere.store.shots.manifest import Manifest
-from viewsphere.zoo import build_zoo_model
 
 Steps = dict[int, TimeStep]
 """Time steps by the frames of their model's file, ascending."""
@@ -55,16 +55,16 @@ class Models:
         """Normalise a model, at these time steps if it deforms, and export it into the store, or see that the one there is the
         same; time steps that it lacks are added, and a credit takes the place of an earlier one.
 
-        `trusted`: the plan's digest and version vouch for models of the zoo that are there. Raises ModelError for a file that
-        cannot be used, StoreError for one that changed since its frames were made.
+        `trusted`: the plan's digest and version vouch for models that are there and follow the version. Raises ModelError for a
+        file that cannot be used, StoreError for one that changed since its frames were made.
         """
         known, wanted = self.store.model_info(spec.key), _with_rest(spec, steps)
         self._check_key(spec)
         credit = credit or (known and known.credit)
-        if known is not None and trusted and not wanted and spec.source.startswith("zoo:") and credit == known.credit:
+        if known is not None and trusted and not wanted and is_versioned(spec.source) and credit == known.credit:
             return
         if wanted:
-            read_ahead(spec, wanted, build=build_zoo_model)
+            read_ahead(spec, wanted)
         if known is not None:
             self._compare(spec, known, wanted)
             held = _steps(known)
@@ -72,7 +72,7 @@ class Models:
                 return
             wanted = _with_rest(spec, chain(held.values(), wanted.values()))
             if wanted:
-                read_ahead(spec, wanted, build=build_zoo_model)
+                read_ahead(spec, wanted)
         target = self.store.model_folder(spec.key)
         self._write(spec, wanted, credit, self.store.scratch_folder(target) if known is None else self.store.replacing(target))
 
@@ -82,7 +82,7 @@ class Models:
         """
         wanted = _with_rest(spec, steps)
         if wanted:
-            read_ahead(spec, wanted, build=build_zoo_model)
+            read_ahead(spec, wanted)
         place = self.store.scratch_folder(self.store.model_folder(spec.key), again=True)
         self._write(spec, wanted, self._credit_of(spec.key, credit), place)
 

@@ -31,7 +31,6 @@ from viewsphere.rendering.ground.material import ground_stamps
 from viewsphere.store import ModelInfo, Store
 from viewsphere.truth.raster.visibility import with_ground
 from viewsphere.truth.shot_views import ShotViews
-from viewsphere.zoo import build_zoo_model
 
 if TYPE_CHECKING:
     from viewsphere.engines import Stage  # which takes a third of a worker's start
@@ -96,7 +95,7 @@ class Stages:
     def _loaded(self, spec: ModelSpec, step: TimeStep | None) -> Mesh:
         """Many may be parts of one model, which is loaded once."""
         if spec.parts is None:
-            mesh, self._facts[_name(spec, step)] = load(spec, build_zoo_model, step=step)
+            mesh, self._facts[_name(spec, step)] = load(spec, step=step)
             return with_body_parts(mesh, spec)
         frame = frame_of(spec, step)
         return taken(self.model(spec.whole, None if frame is None else TimeStep(frame=frame)), spec, step)
@@ -133,7 +132,7 @@ class Stages:
         for spec in specs:
             frames = {step.frame for step in planned.steps_of(spec)}
             if frames and spec.rest is not None:
-                read_ahead(spec, frames | {spec.rest}, build=build_zoo_model)
+                read_ahead(spec, frames | {spec.rest})
 
     def stage(self, shot: Shot) -> Stage:
         """The engine's stage for this shot, built anew only when the scene is another one, or a picture in it has changed."""

@@ -8,6 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from viewsphere.plugins.source import is_versioned
+
 if TYPE_CHECKING:
     from viewsphere.model.model_spec import ModelSpec
     from viewsphere.recipe.recipe import Recipe
@@ -65,7 +67,7 @@ def _model_seconds(work: Missing) -> Iterator[float]:
     """Seconds for each model that is to be made, or compared with the one that the store holds."""
     store = work.store
     for spec, steps in work.portion.models:
-        is_trusted = spec.source.startswith("zoo:") and not steps and store.model_folder(spec.key).is_dir()
+        is_trusted = is_versioned(spec.source) and not steps and store.model_folder(spec.key).is_dir()
         if not is_trusted:
             yield (MODEL_S + MODEL_S_PER_MB * _megabytes(spec)) * max(1, len(steps))
 

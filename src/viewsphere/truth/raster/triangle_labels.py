@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.classes import GROUND, stuff_of, thing_class
+from viewsphere.assets.metadata.stuff import stuff_of
+from viewsphere.model.classes import GROUND, thing_class
 from viewsphere.model.thing import Thing
 
 Int32 = NDArray[np.int32]
@@ -66,7 +67,7 @@ class TriangleLabels:
 def scenery_classes(things: Sequence[Thing], meshes: Sequence[Mesh]) -> Int32:
     """Class of each triangle of scenery, (T,)."""
     classes = [
-        np.array([stuff_of(thing.model.category, part) for part in mesh.parts], np.int32)[mesh.triangle_part]
+        np.array(stuff_of(thing.model.category, mesh.parts), np.int32)[mesh.triangle_part]
         for thing, mesh in zip(things, meshes, strict=True)
     ]
     return np.concatenate([np.empty(0, np.int32), *classes])

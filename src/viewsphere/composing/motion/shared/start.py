@@ -13,9 +13,9 @@ from viewsphere.assets.clip import Timeline
 from viewsphere.composing.placing import Draws
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.place import Lane
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import TimeStep
-from viewsphere.zoo.places import Lane
 
 Float = NDArray[np.float64]
 

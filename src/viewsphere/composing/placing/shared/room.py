@@ -14,8 +14,8 @@ from viewsphere.composing.placing.shared.obstacles import Obstacles
 from viewsphere.composing.placing.shared.shape import Shape
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.place import Bay, Lane
 from viewsphere.model.scene import Matrix4
-from viewsphere.zoo.places import Bay, Lane
 
 Spot = tuple[float, float, float]
 """(x, y) on the floor, metres, and the azimuth that a front faces there, degrees."""

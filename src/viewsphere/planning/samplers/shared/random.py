@@ -20,18 +20,18 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.place import Surface
 from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.model.validation_errors import one_of
 from viewsphere.planning.samplers.shared.sampling_context import SamplingContext
 from viewsphere.planning.splits import drawn_split, shared
+from viewsphere.plugins.source import model_for
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.layout import SurfaceEntry
-from viewsphere.recipe.models import ZOO
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
-from viewsphere.zoo.places import Surface
 
 LOOKS = 8
 """Looks of one piece of scenery."""
@@ -175,7 +175,7 @@ def scene_around(context: SamplingContext, subject: str, pose: str | None, box_o
     pieces = list(scene_laid(context, subject, pose, box_of).around)
     on, seed = scenes_entry(context.recipe).surface, context.recipe.seed
     if isinstance(on, SurfaceEntry):
-        pieces.append(Piece("plain_table", (on.size[0], on.height, on.size[1]), IDENTITY))
+        pieces.append(Piece(model_for("table"), (on.size[0], on.height, on.size[1]), IDENTITY))
     return tuple(
         Thing(id=0, model=_spec(piece, seed, subject), motion=Motion.still(piece.world_from_piece), scenery=True)
         for piece in pieces
@@ -184,12 +184,13 @@ def scene_around(context: SamplingContext, subject: str, pose: str | None, box_o
 
 def _spec(piece: Piece, seed: int, subject: str) -> ModelSpec:
     """The model of a piece of scenery, one of a few looks that are drawn for the scene."""
-    look = int(generator(seed, "piece", subject, piece.family).integers(LOOKS))
+    name = piece.source.partition(":")[2]
+    look = int(generator(seed, "piece", subject, name).integers(LOOKS))
     return ModelSpec(
-        key=scenery_key(piece.family, f"{piece.size} {look}"),
-        source=ZOO + piece.family,
+        key=scenery_key(name, f"{piece.size} {look}"),
+        source=piece.source,
         seed=look,
-        category=piece.family,
+        category=name,
         category_id=0,
         centring="as_is",
         size=piece.size,

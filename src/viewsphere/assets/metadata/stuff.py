@@ -1,0 +1,26 @@
+"""The stuff classes of scenery, by categories and names of parts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from viewsphere.model.classes import SCENERY, STUFF_IDS
+from viewsphere.plugins.source import sources
+
+
+def stuff_of(category: str, parts: Sequence[str]) -> list[int]:
+    """The classes of the parts of scenery of a category.
+
+    A family of models with the category's name states the classes of its parts. Elsewhere names decide: of a part, else of its
+    category, without numbers at their end and what comes before a slash: Road.001 is road. Else it is scenery.
+    """
+    families = (source.family(category.replace(" ", "_")) for source in sources().values())
+    family = next((each for each in families if each is not None), None)
+    if family is not None:
+        return [STUFF_IDS[family.classes.get(part, family.classes[""])] for part in parts]
+    return [next((STUFF_IDS[name] for name in map(_plain, (part, category)) if name in STUFF_IDS), SCENERY) for part in parts]
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\W\d_]+$", "", name.rpartition("/")[-1]).lower().replace("_", " ")

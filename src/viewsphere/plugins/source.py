@@ -1,0 +1,160 @@
+"""The spec of a source of models and places: what follows its prefix in a recipe, as in `zoo:car`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.errors import UserError
+from viewsphere.model.credit import Credit
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.plugins.family import ZooFamily
+from viewsphere.plugins.place import PlaceSpec
+from viewsphere.plugins.registry import Kind, load, names, prefix_of
+from viewsphere.plugins.spec import Spec
+
+Role = Literal["example", "table", "box"]
+"""Uses of a model by viewsphere itself: to show and measure something, as a table's top, as an open box."""
+
+
+class Download(NamedTuple):
+    """Data on the network: what `without` them models are, a function that fetches them and reports its steps, and one that
+    returns the file that holds them, if there is one.
+    """
+
+    without: str
+    fetch: Callable[[Callable[[str], None]], Any]
+    file: Callable[[], str | None]
+
+
+def _no_names() -> tuple[str, ...]:
+    return ()
+
+
+class SourceSpec(Spec):
+    """Functions that find and load models by name. The plug-in's name is the prefix, and `name` is the text after the colon."""
+
+    KIND: ClassVar[Kind] = "sources"
+
+    names: Callable[[], tuple[str, ...]] = Field(
+        description="names to list and complete, sorted; a long list may leave names out"
+    )
+    expand: Callable[[str], tuple[str, ...]] = Field(
+        description="`expand(name)`: the names of single models that a name stands for. Raises UserError for an unknown name"
+    )
+    load: Callable[[ModelSpec], Any] = Field(
+        description="`load(model)`: the `viewsphere.assets.mesh.Mesh` in object axes, metres; or the path of a file to read"
+    )
+    credit: Callable[[ModelSpec], Credit | None] = Field(description="`credit(model)`: the licence and attribution, if known")
+    drawn: bool = Field(
+        default=False,
+        description="whether a name stands for any number of models, each drawn from `model.seed`; else each name is one model",
+    )
+    versioned: bool = Field(
+        default=False,
+        description="whether its models change only with the version of viewsphere, so a finished data set need not read them",
+    )
+    family: Callable[[str], ZooFamily | None] = Field(
+        default=lambda name: None, description="`family(name)`: facts about the models of a name, if there are any"
+    )
+    places: Callable[[], tuple[str, ...]] = Field(default=_no_names, description="names of places for `scene.place`, sorted")
+    place: Callable[[str], PlaceSpec] | None = Field(
+        default=None, description="`place(name)`: a place. Raises UserError for an unknown name"
+    )
+    roles: Mapping[Role, str] = Field(
+        default={}, description="names of models that viewsphere itself uses: `example`, `table`, `box`"
+    )
+    downloads: Mapping[str, Download] = Field(
+        default={}, description="data that better models need, by name; `viewsphere doctor --setup` fetches them"
+    )
+
+
+class Named(NamedTuple):
+    """A source, its prefix, and the name after the colon."""
+
+    spec: SourceSpec
+    prefix: str
+    name: str
+
+
+def source_of(text: str) -> Named | None:
+    """The source that a model's or place's text names, such as `zoo:car`; None for a file."""
+    prefix = prefix_of(text)
+    return Named(load(SourceSpec, prefix), prefix, text[len(prefix) + 1 :]) if prefix else None
+
+
+def is_versioned(text: str) -> bool:
+    """Return whether the version of viewsphere decides what a model is."""
+    named = source_of(text)
+    return named is not None and named.spec.versioned
+
+
+def place_of(text: str) -> PlaceSpec | None:
+    """The place that a text names, such as `zoo:town`; None for a file and for an unknown place."""
+    named = source_of(text)
+    if named is None or named.spec.place is None or named.name not in named.spec.places():
+        return None
+    return named.spec.place(named.name)
+
+
+def place_names() -> tuple[str, ...]:
+    """All places of all sources, such as `zoo:town`, sorted."""
+    return tuple(f"{prefix}:{name}" for prefix, spec in sources().items() for name in spec.places())
+
+
+def model_names() -> tuple[str, ...]:
+    """All models of all sources, such as `zoo:car`, sorted."""
+    return tuple(f"{prefix}:{name}" for prefix, spec in sources().items() for name in spec.names())
+
+
+def family_of(text: str) -> ZooFamily | None:
+    """The family of a model's source; None for a file, and for a source that has no families."""
+    named = source_of(text)
+    return None if named is None else named.spec.family(named.name)
+
+
+def sources() -> Mapping[str, SourceSpec]:
+    """All sources by prefix; raises PluginError for one that cannot be loaded."""
+    return {prefix: load(SourceSpec, prefix) for prefix in names("sources")}
+
+
+def model_for(role: Role) -> str:
+    """The source of the model that viewsphere itself uses, such as `zoo:car`; raises UserError where no source has one."""
+    for prefix, spec in sources().items():
+        if role in spec.roles:
+            return f"{prefix}:{spec.roles[role]}"
+    raise UserError(f"expected a source with a model as {role}; found none: install viewsphere again")
+
+
+def suggested(name: str) -> str:
+    """A hint for a name whose prefix was forgotten; empty for other texts."""
+    return next((f"; did you mean {text!r}?" for text in model_names() if text.partition(":")[2] == name), "")
+
+
+def file_in(spec: ModelSpec) -> Path | None:
+    """The file of a model that a source supplies as a file; None for one that it supplies as a mesh."""
+    named = source_of(spec.source)
+    if named is None:
+        return Path(spec.source)
+    made = named.spec.load(spec)
+    return made if isinstance(made, Path) else None
+
+
+@lru_cache(maxsize=1024)
+def rooms_of(source: str, seed: int | None) -> tuple[NDArray[np.float64], ...]:
+    """The air of the rooms in a model of this source and seed, each a box (8, 3) in its own axes, metres; none for a model
+    without rooms.
+    """
+    family = family_of(source)
+    if family is None or family.rooms is None or family.draw is None:
+        return ()
+    rooms: tuple[NDArray[np.float64], ...] = family.rooms(family.draw(np.random.default_rng(seed)))
+    for room in rooms:
+        room.setflags(write=False)  # kept for the next call
+    return rooms
