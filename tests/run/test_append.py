@@ -427,7 +427,7 @@ def test_old_models_may_not_change_splits(tmp_path):
 
 
 def test_a_zoo_model_whose_code_changed_is_refused(out, monkeypatch):
-    from viewsphere import zoo
+    import viewsphere_zoo as zoo
     from viewsphere_zoo.families import post_box
 
     drawn = post_box.post_box_random
