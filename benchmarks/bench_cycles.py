@@ -21,7 +21,7 @@ from bench_scene import write_reference
 
 from viewsphere import Recipe, plan, plugins
 from viewsphere.blender.interpreter import find_blender
-from viewsphere.engines._blender.staging import CyclesStage
+from viewsphere.engines.shared.blender.staging import CyclesStage
 from viewsphere.geometry.box import box_vertices
 from viewsphere.labels import annotated, context_of, observe
 from viewsphere.model.shot import Shot

@@ -8,10 +8,10 @@ import json
 import numpy as np
 
 from scratch import scratch_cache
+from viewsphere.assets.animation.timeline import Blenders, Timeline
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.sandbox.client import READ_HERE
-from viewsphere.assets.timeline import Blenders, Timeline
 
 LAST = 49
 TORN = 37

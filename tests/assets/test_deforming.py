@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from animated import TORN, walker
-from viewsphere.assets.deforming import DeformingMesh, sharing
+from viewsphere.assets.animation.deforming import DeformingMesh, sharing
 from viewsphere.assets.exporting.export import export_deforming
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.load import load_model

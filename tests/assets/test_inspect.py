@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from animated import leaf
+from viewsphere.assets.animation.timeline import Blenders
 from viewsphere.assets.inspect import describe
-from viewsphere.assets.timeline import Blenders
 from viewsphere.errors import MissingExtraError, ModelError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.reports.inspection import report_lines

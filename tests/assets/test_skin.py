@@ -8,14 +8,14 @@ import pytest
 
 from rigged import BODY, arm, person, write_gltf
 from small import ROOT
+from viewsphere.assets.animation.deforming import DeformingMesh
+from viewsphere.assets.animation.skin import NONE, strongest
 from viewsphere.assets.cache import load
-from viewsphere.assets.deforming import DeformingMesh
 from viewsphere.assets.exporting.export import export_deforming, export_glb
 from viewsphere.assets.exporting.exported import read_exported
 from viewsphere.assets.exporting.glb import material_names
 from viewsphere.assets.load import load_model
 from viewsphere.assets.metadata.model_metadata import with_body_parts
-from viewsphere.assets.skin import NONE, strongest
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec, Parts
 from viewsphere.run.shots.models import mesh_digest

@@ -19,7 +19,7 @@ from viewsphere.blender.process import BlenderProcess
 from viewsphere.check import check
 from viewsphere.check.cycles import near
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.engines._blender import staging
+from viewsphere.engines.shared.blender import staging
 from viewsphere.errors import MissingExtraError, ModelError
 from viewsphere.formats.blend import StoredModels
 from viewsphere.model.model_spec import ModelSpec

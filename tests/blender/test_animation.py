@@ -16,9 +16,9 @@ from scratch import scratch_cache
 from shots import camera_of
 from viewsphere import Dataset, Recipe, generate, plan
 from viewsphere.assets import cache as model_cache
+from viewsphere.assets.animation.timeline import Blenders, Clip
 from viewsphere.assets.cache import load, load_normalised, read_ahead
 from viewsphere.assets.inspect import describe
-from viewsphere.assets.timeline import Blenders, Clip
 from viewsphere.check import check
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.camera import project
@@ -193,7 +193,7 @@ def test_a_changed_layer_is_asked_about_anew(tmp_path, named, monkeypatch):
     usd(tmp_path / "deep" / "moves.usda", MOVES)
     assert timeline(top).moves
     with monkeypatch.context() as known:
-        known.setattr("viewsphere.assets.timeline.started", None)
+        known.setattr("viewsphere.assets.animation.timeline.started", None)
         assert timeline(top).moves
     usd(tmp_path / "deep" / "moves.usda")
     assert not timeline(top).moves
@@ -208,7 +208,7 @@ def test_layers_are_each_file_s_own(tmp_path, monkeypatch):
         assert all(blenders.timeline(path, True).moves for path in (first, second))
     usd(inner[0])
     assert not timeline(first).moves
-    monkeypatch.setattr("viewsphere.assets.timeline.started", None)
+    monkeypatch.setattr("viewsphere.assets.animation.timeline.started", None)
     assert timeline(second).moves
 
 

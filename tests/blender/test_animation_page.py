@@ -13,7 +13,7 @@ import yaml
 from command_line import viewsphere
 from small import ROOT
 from viewsphere import Dataset, Recipe, plan
-from viewsphere.assets.timeline import Blenders, Timeline
+from viewsphere.assets.animation.timeline import Blenders, Timeline
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.viewpoints import PoseList
 

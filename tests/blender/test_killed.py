@@ -9,10 +9,10 @@ import pytest
 from fake_blender import with_modules
 
 from quick import quick
+from viewsphere.assets.animation.timeline import Blenders
 from viewsphere.assets.cache import cache_folder, load
 from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.assets.scene_file import scene_file
-from viewsphere.assets.timeline import Blenders
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec

@@ -12,7 +12,7 @@ from command_line import viewsphere
 from small import ROOT
 from viewsphere import Dataset, Recipe, plan
 from viewsphere.blender.interpreter import SCRIPTS
-from viewsphere.engines._blender.options import PRESETS, Options, parse_options
+from viewsphere.engines.shared.blender.options import PRESETS, Options, parse_options
 
 PAGE = (ROOT / "docs" / "blender.md").read_text("utf-8")
 RECIPE, ENGINE, FORMATS = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)

@@ -10,8 +10,8 @@ from viewsphere.assets.cache import load_normalised
 from viewsphere.blender.interpreter import SCRIPTS
 from viewsphere.check import check
 from viewsphere.engines import cycles
-from viewsphere.engines._blender.file_frame import FileFrame
-from viewsphere.engines._blender.staging import camera_request
+from viewsphere.engines.shared.blender.file_frame import FileFrame
+from viewsphere.engines.shared.blender.staging import camera_request
 from viewsphere.errors import RecipeError, UserError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.rendering.view import develop

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from viewsphere import Recipe, plan
+from viewsphere.assets.animation.timeline import Blenders, Timeline
 from viewsphere.assets.scene_file import SceneFile, SceneObject
-from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.composing.scene.blend_scene import BlendScenery
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices

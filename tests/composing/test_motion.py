@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from installed import installed
 from small import ROOT
 from viewsphere import plugins
-from viewsphere.assets.timeline import Timeline
+from viewsphere.assets.animation.timeline import Timeline
 from viewsphere.composing import motion
 from viewsphere.composing.motion import Lane, Start, check_motion, check_motions, mover
 from viewsphere.composing.placing import standing

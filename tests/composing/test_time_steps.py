@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewsphere.assets.timeline import Blenders, Timeline
+from viewsphere.assets.animation.timeline import Blenders, Timeline
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.scene import Floor

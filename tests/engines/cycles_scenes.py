@@ -10,7 +10,7 @@ import numpy as np
 from shots import camera_of
 from viewsphere import Recipe, plan
 from viewsphere.engines import cycles
-from viewsphere.engines._blender.staging import Arrangement, camera_request
+from viewsphere.engines.shared.blender.staging import Arrangement, camera_request
 from viewsphere.model.shot import Shot
 from viewsphere.run.shots.stages import Stages
 

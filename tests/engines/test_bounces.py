@@ -15,8 +15,8 @@ from shots import painted, still_shot
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines import raster
 from viewsphere.engines.raster.indirect import bounces as baking
-from viewsphere.engines.raster.indirect import final_gather as gathering
 from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
+from viewsphere.engines.raster.indirect.gathering import final_gather as gathering
 from viewsphere.engines.raster.indirect.kernels_probes import look_up
 from viewsphere.engines.raster.lightmaps import lightmaps
 from viewsphere.engines.raster.options import parse_options

@@ -16,8 +16,8 @@ from built_once import built_once
 from viewsphere import render
 from viewsphere.assets.srgb import linear
 from viewsphere.blender.process import BlenderProcess
-from viewsphere.engines._blender.border import border_of
-from viewsphere.engines._blender.staging import keeper_of
+from viewsphere.engines.shared.blender.border import border_of
+from viewsphere.engines.shared.blender.staging import keeper_of
 from viewsphere.errors import BlenderDied, UserError
 from viewsphere.truth.raster.visibility import rasterize
 

@@ -13,7 +13,7 @@ import pytest
 from cycles_scenes import DRAFT, HAIR_DRIER, recipe_of
 
 from viewsphere import generate, render
-from viewsphere.engines._blender.staging import keeper_of
+from viewsphere.engines.shared.blender.staging import keeper_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900), pytest.mark.usefixtures("blender")]
 
@@ -79,7 +79,7 @@ def test_five_killed_blenders_cost_nothing(blender):
 
 
 def test_a_run_whose_blender_is_killed_gives_the_same_files(blender, tmp_path, monkeypatch):
-    from viewsphere.engines._blender.staging import CyclesStage
+    from viewsphere.engines.shared.blender.staging import CyclesStage
 
     start = time.perf_counter()
     generate(endured(), tmp_path / "calm", workers=0)

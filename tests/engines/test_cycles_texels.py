@@ -13,7 +13,7 @@ from shots import still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.srgb import encoded
 from viewsphere.engines import cycles
-from viewsphere.engines._blender.texels import BUMPED, CONTENTS, FINEST, Kind, halved, spread_of
+from viewsphere.engines.shared.blender.texels import BUMPED, CONTENTS, FINEST, Kind, halved, spread_of
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint

@@ -12,10 +12,10 @@ from light_stage import flat
 
 from viewsphere import plan
 from viewsphere.engines import cycles
-from viewsphere.engines._blender.border import AROUND, border_of
-from viewsphere.engines._blender.lens import resampled, views_of
-from viewsphere.engines._blender.options import PRESETS, Options, parse_options
-from viewsphere.engines._blender.requests import scene_request
+from viewsphere.engines.shared.blender.border import AROUND, border_of
+from viewsphere.engines.shared.blender.lens import resampled, views_of
+from viewsphere.engines.shared.blender.options import PRESETS, Options, parse_options
+from viewsphere.engines.shared.blender.requests import scene_request
 from viewsphere.errors import MissingExtraError, RecipeError, UserError, ViewsphereError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Distortion, Intrinsics

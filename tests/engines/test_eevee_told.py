@@ -14,10 +14,10 @@ from shots import camera_of
 from viewsphere import plan, plugins, render
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.engines import eevee, workbench
-from viewsphere.engines._blender.backdrop import Backdrop
-from viewsphere.engines._blender.options import EEVEE_PRESETS, WORKBENCH_PRESETS, Eevee, Workbench, options_of
-from viewsphere.engines._blender.requests import scene_request, settings_request
-from viewsphere.engines._blender.staging import SPARE, clip_of
+from viewsphere.engines.shared.blender.backdrop import Backdrop
+from viewsphere.engines.shared.blender.options import EEVEE_PRESETS, WORKBENCH_PRESETS, Eevee, Workbench, options_of
+from viewsphere.engines.shared.blender.requests import scene_request, settings_request
+from viewsphere.engines.shared.blender.staging import SPARE, clip_of
 from viewsphere.errors import RecipeError
 from viewsphere.planning.engine_digest import engine_digest
 from viewsphere.rendering.finish import finished

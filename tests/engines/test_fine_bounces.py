@@ -15,7 +15,7 @@ from test_raster import DARK, box, camera, rectangle
 from viewsphere.assets.mesh import Material
 from viewsphere.engines.raster.indirect import bounces
 from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
-from viewsphere.engines.raster.indirect.near_field_gather import with_near
+from viewsphere.engines.raster.indirect.gathering.near_field_gather import with_near
 from viewsphere.engines.raster.reflections import kernels_mirror
 from viewsphere.engines.raster.reflections import planar_reflections as panes
 from viewsphere.engines.raster.reflections.glossy_reflections import NOWHERE

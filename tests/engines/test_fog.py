@@ -10,8 +10,8 @@ from light_stage import flat, quad
 from test_physics import camera, stage_of
 
 from viewsphere.assets.mesh import Material
-from viewsphere.engines._blender.veiling import veil
 from viewsphere.engines.raster.shading.painting import paint
+from viewsphere.engines.shared.blender.veiling import veil
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.scene import Ground, Scene, Sky, Sun
 from viewsphere.model.weather import CONTRAST, Fog

@@ -11,7 +11,7 @@ from shots import painted, still_shot
 from viewsphere import Recipe
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines import raster
-from viewsphere.engines._lamps import BELOW, GLOW, ROOM, lamplight, lit
+from viewsphere.engines.shared.lamps import BELOW, GLOW, ROOM, lamplight, lit
 from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Ground, Scene, Sky
 from viewsphere.model.thing import Motion, Thing

@@ -9,8 +9,8 @@ from test_raster import DARK, box, camera, mesh_of, rectangle
 
 from shots import painted
 from viewsphere.engines.raster.indirect import bounces as baking
-from viewsphere.engines.raster.indirect import final_gather as gathering
 from viewsphere.engines.raster.indirect import irradiance_volumes as volumes
+from viewsphere.engines.raster.indirect.gathering import final_gather as gathering
 from viewsphere.engines.raster.indirect.kernels_probes import look_up
 from viewsphere.engines.raster.lightmaps import kernels_lightmap as kernels
 from viewsphere.engines.raster.lightmaps import lightmaps

@@ -17,9 +17,9 @@ from shots import with_camera
 from viewsphere import Recipe, plan
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines import raster
-from viewsphere.engines._passes import shading_of
 from viewsphere.engines.raster.shading import kernels_split
 from viewsphere.engines.raster.shading.painting import paint
+from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PASSES

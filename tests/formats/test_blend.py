@@ -17,8 +17,8 @@ from small import small_recipe
 from viewsphere import Dataset, generate, plan, plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.engines import cycles
-from viewsphere.engines._blender import saving
-from viewsphere.engines._blender.file_frame import FileFrame
+from viewsphere.engines.shared.blender import saving
+from viewsphere.engines.shared.blender.file_frame import FileFrame
 from viewsphere.errors import MissingExtraError, StoreError, UserError
 from viewsphere.formats import blend
 from viewsphere.geometry.camera import orbit_center, orbit_rotation

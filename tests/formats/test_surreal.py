@@ -17,9 +17,9 @@ from rigged import person, write_gltf
 from scratch import scratch_cache
 from small import tree_hash
 from viewsphere import Dataset, Recipe, generate
+from viewsphere.assets.animation.timeline import Blenders, Timeline
 from viewsphere.assets.load import load_model
 from viewsphere.assets.sandbox.client import READ_HERE
-from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.check import check
 from viewsphere.errors import MissingExtraError, UserError
 from viewsphere.formats import Scope, surreal

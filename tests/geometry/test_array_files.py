@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from viewsphere.codecs.deflate import deflate
+from viewsphere.codecs.deflate.kernels_deflate import STORED
 from viewsphere.codecs.exr import decode_exr, encode_exr
-from viewsphere.codecs.kernels_deflate import STORED
 from viewsphere.codecs.npz import decode_npz, encode_npz
 from viewsphere.codecs.png_tiff import encode_tiff
 from viewsphere.errors import UserError

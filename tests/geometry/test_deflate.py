@@ -11,7 +11,7 @@ from isal import isal_zlib
 
 from quick import quick
 from viewsphere.codecs.deflate import RAW, ZLIB, compressed, deflate_lines
-from viewsphere.codecs.kernels_huffman import LONGEST_CODE
+from viewsphere.codecs.deflate.kernels_huffman import LONGEST_CODE
 
 PLACES = ((1 << 20, 0), (3 << 20, 7), (5 << 20, 255), (9 << 20, 90))
 """Bytes of a thread's stack, and the number that freed memory is full of."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from viewsphere.geometry.noise import WAVES, noise
+from viewsphere.composing.noise import WAVES, noise
 
 
 def over_time(seed, highest, seconds=200.0, rate=50):

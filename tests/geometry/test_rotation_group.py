@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
+from viewsphere.assets.metadata.rotation_group import is_group, largest_group
 from viewsphere.geometry.rotation import compose, random_rotation, rotation_about
-from viewsphere.geometry.rotation_group import is_group, largest_group
 
 CENTER = np.array([0.3, -0.2, 0.5])
 

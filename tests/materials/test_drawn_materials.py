@@ -7,8 +7,8 @@ import pytest
 
 from viewsphere import materials, plugins
 from viewsphere.errors import UserError
-from viewsphere.materials._patterns.kernels_noise import add_noise
-from viewsphere.materials._patterns.noise import cells, noise, wave
+from viewsphere.materials.shared.kernels_noise import add_noise
+from viewsphere.materials.shared.noise import cells, noise, wave
 from viewsphere.plugins.material import MaterialSpec
 
 NAMES = plugins.names("materials")

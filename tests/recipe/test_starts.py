@@ -14,7 +14,7 @@ import viewsphere as vs
 from command_line import viewsphere
 from deadline import DEADLINE
 from shots import unit_box
-from viewsphere.engines._blender.options import PRESETS
+from viewsphere.engines.shared.blender.options import PRESETS
 from viewsphere.errors import RecipeError
 from viewsphere.plugins import names
 from viewsphere.recipe.file import read, schema

@@ -9,7 +9,7 @@ import pytest
 import viewsphere as vs
 from unlit import write_unlit
 from viewsphere.check import check
-from viewsphere.engines._arranged import Arrangements
+from viewsphere.engines.shared.arranged import Arrangements
 from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.shot_views import ShotViews
 from viewsphere.truth.surface_points.points import points_seen

@@ -9,7 +9,7 @@ from test_point_raster import embree_scene
 from two_views import brute_hidden
 
 import viewsphere as vs
-from viewsphere.engines._arranged import Arrangements
+from viewsphere.engines.shared.arranged import Arrangements
 from viewsphere.run.shots.stages import Stages
 from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.raster.visibility import rasterize

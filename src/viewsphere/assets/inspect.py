@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.assets.animation.timeline import Timeline, animation_of
 from viewsphere.assets.cache import load
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.metadata.model_metadata import found_symmetries, metadata_of
 from viewsphere.assets.normalise import axes
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.readers import reader_of
-from viewsphere.assets.timeline import Timeline, animation_of
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
 from viewsphere.plugins import prefix_of

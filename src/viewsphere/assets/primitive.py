@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.animation.skin import joined
 from viewsphere.assets.appearance.unseen import is_unseen
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.readers.shared.coordinates import check_coordinates
 from viewsphere.assets.scene_annotations import Annotation
-from viewsphere.assets.skin import joined
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.scene import IDENTITY, Matrix4

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere import plugins
-from viewsphere.assets.deforming import Load
+from viewsphere.assets.animation.deforming import Load
 from viewsphere.check.failure import failure
 from viewsphere.formats.blend import StoredModels
 from viewsphere.model.sample import Sample

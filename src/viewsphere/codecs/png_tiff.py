@@ -84,7 +84,7 @@ def _filtered(array: NDArray[Any], components: int) -> NDArray[np.uint8]:
 
 def _zlib(rows: NDArray[np.uint8], components: int) -> bytes:
     """The zlib stream of a rendered picture, filtered."""
-    from viewsphere.codecs.kernels_huffman import subtract_left
+    from viewsphere.codecs.deflate.kernels_huffman import subtract_left
 
     lines = np.empty((len(rows), 1 + rows.shape[1]), np.uint8)
     subtract_left(np.ascontiguousarray(rows), components, lines)

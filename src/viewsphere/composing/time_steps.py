@@ -11,7 +11,7 @@ from itertools import accumulate, chain, groupby, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewsphere.assets.clip import Timeline, no_animation
+from viewsphere.assets.animation.clip import Timeline, no_animation
 from viewsphere.composing.viewpoints.poses import Poses, RepeatedPoses
 from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.model.instant import Moment, Viewpoint
@@ -23,7 +23,7 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.time import Frames, Steps, chosen_frames
 
 if TYPE_CHECKING:
-    from viewsphere.assets.timeline import Blenders
+    from viewsphere.assets.animation.timeline import Blenders
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def timed(
     """
     if not is_animated(recipe):
         return tuple(spec for spec, _ in models), (None,) * len(models), views
-    from viewsphere.assets.timeline import Blenders  # which loads readers of models
+    from viewsphere.assets.animation.timeline import Blenders  # which loads readers of models
 
     with Blenders.none_yet() as blenders:
         scene = tuple(_scene_steps(recipe, blenders))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from viewsphere.engines import _blender
-from viewsphere.engines._blender import PROGRAMS, stage
+from viewsphere.engines.shared import blender as _blender
+from viewsphere.engines.shared.blender import PROGRAMS, stage
 from viewsphere.plugins.engine import EngineSpec
 
 if TYPE_CHECKING:

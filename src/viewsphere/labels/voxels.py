@@ -48,7 +48,7 @@ def compute(context: LabelContext) -> NDArray[np.void]:
     inside; scenery's and the ground's where a triangle has a part in it. Of several things in a cell it is the first one's:
     objects by their ids, then scenery, then the ground. Where only some of a triangle is surface, all of it counts.
     """
-    from viewsphere.geometry import kernels_voxels as kernels
+    from viewsphere.geometry.voxels import kernels_voxels as kernels
 
     grid = Grid.of(context.options_of("voxels", Voxels), context.camera)
     owner, filled = np.full(grid.size, -1, np.int32), np.zeros(grid.size, np.uint8)
@@ -136,7 +136,7 @@ def _indoors(context: LabelContext, points: Float, grid: Grid) -> NDArray[np.boo
 
 def _state(context: LabelContext, grid: Grid) -> NDArray[np.uint8]:
     """Return the visibility state of each cell's centre."""
-    from viewsphere.geometry import kernels_voxels as kernels
+    from viewsphere.geometry.voxels import kernels_voxels as kernels
 
     codes, (ahead, up, right) = np.array([OUTSIDE, FREE, OCCLUDED], np.uint8), grid.size
     out = np.empty((ahead, up * right), np.uint8)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from viewsphere import plugins
-from viewsphere.materials._patterns.surface import Color, Light, Map, Surface
+from viewsphere.materials.shared.surface import Color, Light, Map, Surface
 from viewsphere.plugins.material import MaterialSpec
 
 __all__ = ["Color", "Light", "Map", "Surface", "drawn", "is_grained", "metres", "surface", "word"]

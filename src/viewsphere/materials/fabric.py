@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.materials._patterns.noise import noise, wave
-from viewsphere.materials._patterns.surface import Color, Map, Surface
-from viewsphere.materials._patterns.tones import mixed, shaded
+from viewsphere.materials.shared.noise import noise, wave
+from viewsphere.materials.shared.surface import Color, Map, Surface
+from viewsphere.materials.shared.tones import mixed, shaded
 from viewsphere.plugins.material import MaterialSpec
 
 

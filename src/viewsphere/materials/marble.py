@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewsphere.materials._patterns.noise import noise, smooth
-from viewsphere.materials._patterns.surface import Color, Map, Surface
-from viewsphere.materials._patterns.tones import colored, mixed, times
+from viewsphere.materials.shared.noise import noise, smooth
+from viewsphere.materials.shared.surface import Color, Map, Surface
+from viewsphere.materials.shared.tones import colored, mixed, times
 from viewsphere.plugins.material import MaterialSpec
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewsphere.materials._patterns.noise import noise, smooth
-from viewsphere.materials._patterns.surface import Color, Surface
+from viewsphere.materials.shared.noise import noise, smooth
+from viewsphere.materials.shared.surface import Color, Surface
 from viewsphere.plugins.material import MaterialSpec
 
 

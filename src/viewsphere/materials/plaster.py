@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewsphere.materials._patterns.noise import cells, noise, smooth
-from viewsphere.materials._patterns.surface import Color, Surface
-from viewsphere.materials._patterns.tones import shaded
+from viewsphere.materials.shared.noise import cells, noise, smooth
+from viewsphere.materials.shared.surface import Color, Surface
+from viewsphere.materials.shared.tones import shaded
 from viewsphere.plugins.material import MaterialSpec
 
 

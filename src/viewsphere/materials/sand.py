@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewsphere.materials._patterns.noise import cells, noise, smooth, wave
-from viewsphere.materials._patterns.surface import Color, Surface
-from viewsphere.materials._patterns.tones import mixed, shaded, times
+from viewsphere.materials.shared.noise import cells, noise, smooth, wave
+from viewsphere.materials.shared.surface import Color, Surface
+from viewsphere.materials.shared.tones import mixed, shaded, times
 from viewsphere.plugins.material import MaterialSpec
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewsphere.materials._patterns.courses import courses, uneven
-from viewsphere.materials._patterns.noise import noise, smooth
-from viewsphere.materials._patterns.surface import Color, Surface
-from viewsphere.materials._patterns.tones import colored, mixed, shaded, times
+from viewsphere.materials.shared.courses import courses, uneven
+from viewsphere.materials.shared.noise import noise, smooth
+from viewsphere.materials.shared.surface import Color, Surface
+from viewsphere.materials.shared.tones import colored, mixed, shaded, times
 from viewsphere.plugins.material import MaterialSpec
 
 

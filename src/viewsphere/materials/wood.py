@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewsphere.materials._patterns.courses import courses, even
-from viewsphere.materials._patterns.surface import Surface
-from viewsphere.materials._patterns.timber import OAK, Timber, draw_timber, grain
-from viewsphere.materials._patterns.tones import colored, shaded
+from viewsphere.materials.shared.courses import courses, even
+from viewsphere.materials.shared.surface import Surface
+from viewsphere.materials.shared.timber import OAK, Timber, draw_timber, grain
+from viewsphere.materials.shared.tones import colored, shaded
 from viewsphere.plugins.material import MaterialSpec
 
 

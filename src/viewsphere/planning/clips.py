@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from viewsphere.assets.clip import Timeline
+from viewsphere.assets.animation.clip import Timeline
 from viewsphere.composing.motion import Start, mover
 from viewsphere.composing.seeds import generator
 from viewsphere.composing.time_steps import animated_file, animation, resting
@@ -19,7 +19,7 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.sequence import TimeEntry
 
 if TYPE_CHECKING:
-    from viewsphere.assets.timeline import Blenders
+    from viewsphere.assets.animation.timeline import Blenders
 
 
 def with_clips(
@@ -30,7 +30,7 @@ def with_clips(
 
     Raises RecipeError for files that cannot be read, and for those in which nothing moves, all together.
     """
-    from viewsphere.assets.timeline import Blenders  # which loads readers of models
+    from viewsphere.assets.animation.timeline import Blenders  # which loads readers of models
 
     with Blenders.none_yet() as blenders:
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from viewsphere import plugins
-from viewsphere.assets.clip import Timeline
+from viewsphere.assets.animation.clip import Timeline
 from viewsphere.assets.metadata.sidecars import said_of
 from viewsphere.composing.composition import BoxOf, Numbering, compose
 from viewsphere.composing.filling import filled

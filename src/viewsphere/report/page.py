@@ -72,7 +72,8 @@ def script_json(value: object) -> str:
 
 def _modules(folder: Path, name: str) -> dict[str, str]:
     """A folder's modules as data URLs, by the names under which they import one another."""
-    return {f"{name}/{file.name}": _data_url(read_bytes(file)) for file in sorted(folder.glob("*.js"))}
+    files = (file for file in sorted(folder.rglob("*.js")) if VENDOR.parent not in file.parents)
+    return {f"{name}/{file.relative_to(folder).as_posix()}": _data_url(read_bytes(file)) for file in files}
 
 
 def _data_url(script: bytes) -> str:

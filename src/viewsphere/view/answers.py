@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -190,7 +191,7 @@ class Answers:
 def _layer_names(channels: Sequence[str]) -> list[str]:
     """The layers that frames with these channels may have."""
     have = {*channels}
-    drawn = [name for name in PASSES | channel_labels() if name in have and name not in PICTURES]
+    drawn = [name for name in chain(PASSES, channel_labels()) if name in have and name not in PICTURES]
     return [*(["rgb"] if is_shown(channels) else []), *drawn]
 
 

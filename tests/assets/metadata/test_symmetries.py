@@ -10,10 +10,10 @@ import trimesh
 from trimesh.transformations import rotation_matrix, translation_matrix
 
 from quick import quick
+from viewsphere.assets.metadata.rotation_group import is_group
 from viewsphere.assets.metadata.surface import Surface
 from viewsphere.assets.metadata.symmetries import find, lacking
 from viewsphere.geometry.rotation import rotation_about
-from viewsphere.geometry.rotation_group import is_group
 from viewsphere.model.symmetries import Continuous, Symmetries
 from viewsphere_zoo import build
 

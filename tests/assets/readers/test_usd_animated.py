@@ -3,8 +3,8 @@
 import pytest
 
 from scratch import scratch_cache
+from viewsphere.assets.animation.timeline import Blenders, animation_of
 from viewsphere.assets.sandbox.client import READ_HERE
-from viewsphere.assets.timeline import Blenders, animation_of
 from viewsphere.errors import ModelError
 
 pytest.importorskip("pxr")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.deforming import DeformingMesh
+from viewsphere.assets.animation.deforming import DeformingMesh
 from viewsphere.assets.exporting.glb import deforming_glb_bytes, glb_bytes
 from viewsphere.assets.exporting.runs import runs
 from viewsphere.assets.mesh import Material, Mesh, Texture

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.deforming import DeformingMesh
+from viewsphere.assets.animation.deforming import DeformingMesh
 from viewsphere.assets.exporting.rigged import Clip, RiggedModel, quaternions
 from viewsphere.assets.exporting.runs import Run, runs
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture

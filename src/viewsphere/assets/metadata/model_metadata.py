@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 
+from viewsphere.assets.animation.skin import grouped
 from viewsphere.assets.cache import frame_of, readers_digest
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.metadata.sidecars import said_of
@@ -15,7 +16,6 @@ from viewsphere.assets.metadata.spread_points import spread_points
 from viewsphere.assets.metadata.surface import Surface
 from viewsphere.assets.metadata.symmetries import find, lacking
 from viewsphere.assets.primitive import FileFacts
-from viewsphere.assets.skin import grouped
 from viewsphere.caches.arrays import Content
 from viewsphere.caches.entries import kept
 from viewsphere.errors import ModelError

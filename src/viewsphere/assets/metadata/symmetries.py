@@ -15,6 +15,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from viewsphere.assets.metadata.rotation_group import largest_group
 from viewsphere.assets.metadata.surface import DistanceField, Surface
 from viewsphere.assets.metadata.symmetry_lines import (
     APART,
@@ -33,7 +34,6 @@ from viewsphere.assets.metadata.symmetry_lines import (
     usual_axes,
 )
 from viewsphere.geometry.rotation import rotation_about, transform
-from viewsphere.geometry.rotation_group import largest_group
 from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.symmetries import Continuous, Symmetries
 

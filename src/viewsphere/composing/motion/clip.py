@@ -9,7 +9,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from viewsphere.assets.clip import no_animation
+from viewsphere.assets.animation.clip import no_animation
 from viewsphere.composing.motion import Move, Pose, Start
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.composing.motion import Amplitude, Move, Pose, Start
-from viewsphere.geometry.noise import noise
+from viewsphere.composing.noise import noise
 from viewsphere.geometry.rotation import rotation_about
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Positive
@@ -27,7 +27,7 @@ class Options(Frozen):
 
 
 def moves(options: Options, start: Start) -> Move:
-    """Band-limited noise (`viewsphere.geometry.noise`) of six components."""
+    """Band-limited noise (`viewsphere.composing.noise`) of six components."""
     sides, turns = np.array(options.position), np.radians(options.rotation_deg)
     way = noise(start.rng("noise"), 6, options.highest_hz)
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.composing.noise import noise
 from viewsphere.composing.trajectories._aim import DIGITS
 from viewsphere.composing.trajectories._world import RigPose, Trajectory, World
-from viewsphere.geometry.noise import noise
 from viewsphere.geometry.rotation import compose, rigid, rotation_about
 from viewsphere.model.camera import Intrinsics
 from viewsphere.recipe.aim import Shake

@@ -12,7 +12,7 @@ from viewsphere.plugins.engine import EngineSpec
 if TYPE_CHECKING:
     from pydantic import JsonValue
 
-    from viewsphere.assets.deforming import Load
+    from viewsphere.assets.animation.deforming import Load
     from viewsphere.engines.raster.staging import RasterStage
     from viewsphere.model.shot import Shot
 

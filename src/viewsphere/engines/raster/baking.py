@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import linear
-from viewsphere.engines._arranged import Arranged
-from viewsphere.engines._lamps import lamplight
 from viewsphere.engines.raster.indirect.bounce_scene import BounceScenes
 from viewsphere.engines.raster.indirect.bounces import bake_bounces, tree_of_scene
 from viewsphere.engines.raster.materials.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
@@ -28,6 +26,8 @@ from viewsphere.engines.raster.shadows.shadow_maps import Casters, Extent, bake_
 from viewsphere.engines.raster.shadows.still_maps import StillMaps
 from viewsphere.engines.raster.shadows.thing_occlusion import TargetShades
 from viewsphere.engines.raster.sky.environment import bake_surrounding, lamps_on_ground, sky_lights
+from viewsphere.engines.shared.arranged import Arranged
+from viewsphere.engines.shared.lamps import lamplight
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.rendering.ground.material import SLABS, ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.rendering.sky.sky import even_light

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines._arranged import Arranged, Arrangements
 from viewsphere.engines.raster import kernels_blur as kernels
 from viewsphere.engines.raster.records import Float32
+from viewsphere.engines.shared.arranged import Arranged, Arrangements
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.camera import Camera

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.deforming import Load
-from viewsphere.engines._arranged import Arranged, Arrangements
-from viewsphere.engines._passes import shading_of
+from viewsphere.assets.animation.deforming import Load
 from viewsphere.engines.raster.antialiasing.supersampling import paint_finely
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
 from viewsphere.engines.raster.blurring import Blur
@@ -25,6 +23,8 @@ from viewsphere.engines.raster.reflections.planar_reflections import mirror_in_p
 from viewsphere.engines.raster.reflections.wet_ground import mirror_in_water
 from viewsphere.engines.raster.shading.painting import NO_SPLIT, Baked, materials, paint
 from viewsphere.engines.raster.shadows.thing_occlusion import TargetShades
+from viewsphere.engines.shared.arranged import Arranged, Arrangements
+from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import RecipeError
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of

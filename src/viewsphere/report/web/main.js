@@ -5,10 +5,10 @@ import { byId, el, plural } from "report/dom.js";
 import { showDistributions } from "report/charts.js";
 import { showPlayer } from "report/player.js";
 import { showGallery } from "report/gallery.js";
-import { showModels } from "report/models.js";
+import { showModels } from "report/scenes/models.js";
 import { showProvenance, verdict } from "report/provenance.js";
 import { figure, figureList, markSection, theme } from "report/shell.js";
-import { showSphere } from "report/sphere.js";
+import { showSphere } from "report/scenes/sphere.js";
 
 function overview() {
   const sizes = summary.sizes.map(([w, h]) => `${w} × ${h}`).join(", ");

@@ -5,7 +5,7 @@ import { byId, count, decimal, el, onLayout, plural } from "report/dom.js";
 import { layerButtons } from "report/gallery.js";
 import { legend, openLightbox } from "report/lightbox.js";
 import { draw } from "report/overlay.js";
-import { showRig } from "report/rig3d.js";
+import { showRig } from "report/scenes/rig3d.js";
 import { subscribe } from "report/state.js";
 
 const TAIL = 8;

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import cast, get_args
 
-from viewsphere.assets.clip import Timeline
+from viewsphere.assets.animation.clip import Timeline
 from viewsphere.assets.inspect import ModelReport, describe
 from viewsphere.errors import UserError
 from viewsphere.model.model_spec import Axis, ModelSpec

@@ -11,8 +11,8 @@ from itertools import chain
 from pathlib import Path
 from textwrap import shorten
 
+from viewsphere.assets.animation.deforming import DeformingMesh
 from viewsphere.assets.cache import frame_of, read_ahead
-from viewsphere.assets.deforming import DeformingMesh
 from viewsphere.assets.exporting.export import export_deforming, export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError, each

@@ -10,7 +10,7 @@ from itertools import accumulate, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.deforming import Load
+from viewsphere.assets.animation.deforming import Load
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing

@@ -23,9 +23,9 @@ live.model = async (key) => {
 };
 
 const sections = {
-  viewpoints: async () => (await import("report/sphere.js")).showSphere(),
+  viewpoints: async () => (await import("report/scenes/sphere.js")).showSphere(),
   distributions: async () => (await import("report/charts.js")).showDistributions(),
-  models: async () => (await import("report/models.js")).showModels(),
+  models: async () => (await import("report/scenes/models.js")).showModels(),
 };
 const drawn = new Set();
 let counted = 0;

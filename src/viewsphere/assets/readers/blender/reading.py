@@ -17,6 +17,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from viewsphere.assets.animation.skin import strongest
 from viewsphere.assets.appearance.alpha import SOLID, with_alpha_modes
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.assets.paths import endings
@@ -26,7 +27,6 @@ from viewsphere.assets.readers.blender.nodes import Painter, Picture, images_of
 from viewsphere.assets.readers.shared.named_points import NamedPoint, named_points
 from viewsphere.assets.readers.shared.transform import moved
 from viewsphere.assets.scene_annotations import Annotation, Marker, Point, annotation_of
-from viewsphere.assets.skin import strongest
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.codecs.npz import load_array

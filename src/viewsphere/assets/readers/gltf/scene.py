@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.assets.animation.skin import strongest
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
 from viewsphere.assets.readers.gltf.animation import Posed
 from viewsphere.assets.readers.gltf.document import Document
@@ -17,7 +18,6 @@ from viewsphere.assets.readers.gltf.marks import is_line
 from viewsphere.assets.readers.shared.coordinates import check_coordinates
 from viewsphere.assets.readers.shared.smoothing import flat
 from viewsphere.assets.readers.shared.transform import moved, unit
-from viewsphere.assets.skin import strongest
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.keypoints import is_name
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.assets.animation.skin import strongest
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
 from viewsphere.assets.readers.shared.coordinates import check_coordinates
 from viewsphere.assets.readers.shared.polygon_proof import cut_polygons
 from viewsphere.assets.readers.usd.library import UsdGeom
 from viewsphere.assets.readers.usd.shapes import polygons_of
-from viewsphere.assets.skin import strongest
 
 PER_CORNER = "faceVarying"
 ROWS = {"constant": "one", "uniform": "face", "vertex": "point", "varying": "point", PER_CORNER: "corner"}

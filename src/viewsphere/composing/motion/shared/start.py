@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewsphere.assets.clip import Timeline
+from viewsphere.assets.animation.clip import Timeline
 from viewsphere.composing.placing import Draws
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.model_spec import ModelSpec

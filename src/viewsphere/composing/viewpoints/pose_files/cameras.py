@@ -16,7 +16,7 @@ from viewsphere.recipe.time import chosen_frames
 from viewsphere.recipe.viewpoints import PoseList
 
 if TYPE_CHECKING:
-    from viewsphere.assets.timeline import Blenders
+    from viewsphere.assets.animation.timeline import Blenders
 
 SUFFIXES = (".abc", ".blend", ".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
 
@@ -27,7 +27,7 @@ def read_cameras(path: Path, entry: PoseList, zooms: bool = False) -> PoseFile:
 
     Raises RecipeError for a file without such a camera or such frames, and without `zooms` for a lens that changes.
     """
-    from viewsphere.assets.timeline import Blenders  # which loads readers of models
+    from viewsphere.assets.animation.timeline import Blenders  # which loads readers of models
 
     with Blenders.none_yet() as blenders:
         try:

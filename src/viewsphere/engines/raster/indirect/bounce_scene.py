@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.engines._arranged import Arranged
 from viewsphere.engines.raster.indirect.bounces import BounceScene
 from viewsphere.engines.raster.materials.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.materials.surface import Lengths, Rows
 from viewsphere.engines.raster.records import Float32, Int32
 from viewsphere.engines.raster.reflections.tracing import cast, tree_of
 from viewsphere.engines.raster.shadows.shadow_maps import Casters
+from viewsphere.engines.shared.arranged import Arranged
 from viewsphere.model.thing import Thing
 
 Float = NDArray[np.float64]

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from viewsphere.engines.raster.indirect import kernels_probes as kernels
 from viewsphere.engines.raster.indirect.directions import TURNS, dome
 from viewsphere.engines.raster.indirect.emissive_triangles import EmissiveTriangles, emissive_triangles_of
-from viewsphere.engines.raster.indirect.final_gather import FinalGather, Look, Round, Spots, look
+from viewsphere.engines.raster.indirect.gathering.final_gather import FinalGather, Look, Round, Spots, look
+from viewsphere.engines.raster.indirect.gathering.patch_rays import RAYS as PATCH_RAYS
+from viewsphere.engines.raster.indirect.gathering.patch_rays import WAYS, PatchRays, rays_of
 from viewsphere.engines.raster.indirect.irradiance_volumes import (
     LAST,
     Grid,
@@ -33,8 +35,6 @@ from viewsphere.engines.raster.indirect.irradiance_volumes import (
 from viewsphere.engines.raster.indirect.kernels_bounce import COLUMNS, terms
 from viewsphere.engines.raster.indirect.kernels_emissive import shine_at, shine_at_probes, shine_near
 from viewsphere.engines.raster.indirect.kernels_views import FOLD, NODES, send_views, spread_views
-from viewsphere.engines.raster.indirect.patch_rays import RAYS as PATCH_RAYS
-from viewsphere.engines.raster.indirect.patch_rays import WAYS, PatchRays, rays_of
 from viewsphere.engines.raster.indirect.radiosity_patches import Patches, Rays, Table, patches_of
 from viewsphere.engines.raster.kept_light import digest_of, kept_light
 from viewsphere.engines.raster.lightmaps.lightmaps import Charts, has_planes

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster.indirect.directions import domes
-from viewsphere.engines.raster.indirect.patch_rays import axes_along
+from viewsphere.engines.raster.indirect.gathering.patch_rays import axes_along
 from viewsphere.engines.raster.lightmaps import kernels_sites as kernels
 from viewsphere.engines.raster.lightmaps.kernels_lightmap import ALONG, COLUMNS, WEIGHT, count_in
 from viewsphere.engines.raster.lightmaps.kernels_vertex_light import FACET, NONE

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.raster.indirect.patch_rays import axes_along
+from viewsphere.engines.raster.indirect.gathering.patch_rays import axes_along
 from viewsphere.engines.raster.records import Float32, Int32
 
 Float = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from viewsphere.engines.raster.antialiasing import kernels_chosen
 from viewsphere.engines.raster.antialiasing.samples import Layer, Marks, Samples, differs_behind, edge_samples, layers
 from viewsphere.engines.raster.indirect.bounces import BounceScene
-from viewsphere.engines.raster.indirect.near_field_gather import with_near
+from viewsphere.engines.raster.indirect.gathering.near_field_gather import with_near
 from viewsphere.engines.raster.materials.kernels_material import L_BENDS
 from viewsphere.engines.raster.materials.surface import Rows
 from viewsphere.engines.raster.records import Bounces, Float32, Int32, PictureRays, Surfaces, Textures

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.engines._arranged import Arranged
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.shadows.kernels_occlusion import CLEAR
 from viewsphere.engines.raster.shadows.occlusion import (
@@ -28,6 +27,7 @@ from viewsphere.engines.raster.shadows.occlusion import (
     joined_volumes,
 )
 from viewsphere.engines.raster.shadows.shadow_maps import Casters, Extent
+from viewsphere.engines.shared.arranged import Arranged
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Repaint

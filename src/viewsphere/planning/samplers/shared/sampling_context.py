@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from pydantic import JsonValue
 
-from viewsphere.assets.clip import Timeline
+from viewsphere.assets.animation.clip import Timeline
 from viewsphere.composing.composition import Composition
 from viewsphere.composing.layouts import Remembering, unremembered
 from viewsphere.composing.redraws import redraw_names

@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
+from viewsphere.assets.animation.deforming import Load, sharing
 from viewsphere.assets.appearance.repaint import textured
 from viewsphere.assets.appearance.wetting import wetted
-from viewsphere.assets.deforming import Load, sharing
 from viewsphere.assets.mesh import Mesh
-from viewsphere.engines._lamps import lit
+from viewsphere.engines.shared.lamps import lit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.deforming import Load
+from viewsphere.assets.animation.deforming import Load
 from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.engines._blender.file_frame import FileFrame
-from viewsphere.engines._blender.requests import members_of
-from viewsphere.engines._blender.staging import STAGE_SECONDS, Arrangement, build_stage, camera_request
+from viewsphere.engines.shared.blender.file_frame import FileFrame
+from viewsphere.engines.shared.blender.requests import members_of
+from viewsphere.engines.shared.blender.staging import STAGE_SECONDS, Arrangement, build_stage, camera_request
 from viewsphere.geometry.camera import orbit_angles
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import picture_of

@@ -1,7 +1,7 @@
 // The rig of a sequence among its objects: the frusta of its sensors at an instant, and the way it goes.
 
 import { box, categoryToken, frameSize } from "report/data.js";
-import { makeStage, themeColor } from "report/stage3d.js";
+import { makeStage, themeColor } from "report/scenes/stage3d.js";
 
 const { BufferAttribute, BufferGeometry, Group, LineBasicMaterial, LineSegments } = globalThis.viewsphereVendor;
 

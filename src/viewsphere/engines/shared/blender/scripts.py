@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.blender.interpreter import SCRIPTS
-from viewsphere.engines._blender.options import AnyOptions
+from viewsphere.engines.shared.blender.options import AnyOptions
 from viewsphere.errors import RecipeError
 from viewsphere.files import read_text
 from viewsphere.model.shot import Shot

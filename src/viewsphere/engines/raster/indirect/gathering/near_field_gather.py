@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewsphere.engines.raster.indirect import kernels_near as kernels
 from viewsphere.engines.raster.indirect.bounces import BounceScene
 from viewsphere.engines.raster.indirect.directions import domes
-from viewsphere.engines.raster.indirect.patch_rays import axes_along
+from viewsphere.engines.raster.indirect.gathering import kernels_near as kernels
+from viewsphere.engines.raster.indirect.gathering.patch_rays import axes_along
 from viewsphere.engines.raster.records import NO_NEAR, Bounces, Float32, Int32, PictureRays
 from viewsphere.engines.raster.reflections.tracing import Tree, cast
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewsphere.materials._patterns.kernels_noise import lay_colors
-from viewsphere.materials._patterns.surface import BRIGHTEST, DARKEST, Color, Light, Map
+from viewsphere.materials.shared.kernels_noise import lay_colors
+from viewsphere.materials.shared.surface import BRIGHTEST, DARKEST, Color, Light, Map
 
 
 def colored(tone: Map, *stops: tuple[float, Color]) -> Light:

@@ -11,23 +11,23 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.deforming import Load
+from viewsphere.assets.animation.deforming import Load
 from viewsphere.assets.mesh import Mesh
 from viewsphere.blender.interpreter import GRAPHICS, find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.codecs.npz import load_array
-from viewsphere.engines._arranged import Arrangements
-from viewsphere.engines._blender.backdrop import Backdrop
-from viewsphere.engines._blender.border import border_of
-from viewsphere.engines._blender.file_frame import FileFrame
-from viewsphere.engines._blender.lens import resampled, views_of
-from viewsphere.engines._blender.options import AnyOptions, options_of
-from viewsphere.engines._blender.requests import Request, kinds_of, materials_request, scene_request, staged
-from viewsphere.engines._blender.scripts import script_request
-from viewsphere.engines._blender.sweeping import Sweeping
-from viewsphere.engines._blender.texels import Kind, Levels
-from viewsphere.engines._blender.veiling import lay_sky, veil
-from viewsphere.engines._passes import shading_of
+from viewsphere.engines.shared.arranged import Arrangements
+from viewsphere.engines.shared.blender.backdrop import Backdrop
+from viewsphere.engines.shared.blender.border import border_of
+from viewsphere.engines.shared.blender.file_frame import FileFrame
+from viewsphere.engines.shared.blender.lens import resampled, views_of
+from viewsphere.engines.shared.blender.options import AnyOptions, options_of
+from viewsphere.engines.shared.blender.requests import Request, kinds_of, materials_request, scene_request, staged
+from viewsphere.engines.shared.blender.scripts import script_request
+from viewsphere.engines.shared.blender.sweeping import Sweeping
+from viewsphere.engines.shared.blender.texels import Kind, Levels
+from viewsphere.engines.shared.blender.veiling import lay_sky, veil
+from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of

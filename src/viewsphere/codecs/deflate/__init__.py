@@ -45,7 +45,7 @@ def deflate(array: NDArray[Any]) -> bytes | memoryview:
     array = np.ascontiguousarray(array)
     if array.dtype.newbyteorder("=") != np.float32 or step not in (1, 3):
         return compressed(array, RAW)
-    from viewsphere.codecs.kernels_deflate import STORED, deflate_runs, match_codes
+    from viewsphere.codecs.deflate.kernels_deflate import STORED, deflate_runs, match_codes
 
     data = array.reshape(-1).view(np.uint8)
     out = np.empty(data.size + 5 * (data.size // STORED) + 64, np.uint8)
@@ -59,7 +59,7 @@ def deflate_lines(lines: NDArray[np.uint8], step: int) -> bytes:
     Twice as fast as `compressed`, and of the same size for what is rendered: see `kernels_huffman`. Lines that it would make
     longer, such as noise, are left to `compressed`.
     """
-    from viewsphere.codecs import kernels_huffman as kernels
+    from viewsphere.codecs.deflate import kernels_huffman as kernels
 
     words = np.empty((lines.shape[1] - 1) // step + kernels.RUN, np.uint32)
     out, room = np.empty(2 * lines.size + 512, np.uint8), np.zeros((4, kernels.SYMBOLS), np.int64)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.engines._blender.file_frame import FileFrame
-from viewsphere.engines._blender.lens import views_of
-from viewsphere.engines._blender.requests import staged
+from viewsphere.engines.shared.blender.file_frame import FileFrame
+from viewsphere.engines.shared.blender.lens import views_of
+from viewsphere.engines.shared.blender.requests import staged
 from viewsphere.model.shot import Shot
 
 MOMENTS = 9

@@ -3,7 +3,7 @@
 import { data, poseName, shown, summary } from "report/data.js";
 import { bars, byId, count, decimal, degrees, el, onLayout, plural, ramp, svg } from "report/dom.js";
 import { histogram } from "report/charts.js";
-import { makeStage, onSphere, themeColor } from "report/stage3d.js";
+import { makeStage, onSphere, themeColor } from "report/scenes/stage3d.js";
 import { setFilter, subscribe } from "report/state.js";
 
 const { BufferAttribute, BufferGeometry, Color, DoubleSide, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, Raycaster, SphereGeometry, Vector2 } = globalThis.viewsphereVendor;

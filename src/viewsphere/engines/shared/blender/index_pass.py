@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.deforming import Load
+from viewsphere.assets.animation.deforming import Load
 from viewsphere.codecs.npz import load_array
-from viewsphere.engines._blender.file_frame import FileFrame
-from viewsphere.engines._blender.requests import members_of
-from viewsphere.engines._blender.staging import FRAME_SECONDS, STAGE_SECONDS, Arrangement, build_stage, camera_request
+from viewsphere.engines.shared.blender.file_frame import FileFrame
+from viewsphere.engines.shared.blender.requests import members_of
+from viewsphere.engines.shared.blender.staging import FRAME_SECONDS, STAGE_SECONDS, Arrangement, build_stage, camera_request
 from viewsphere.errors import BlenderError, UserError
 from viewsphere.model.shot import Shot
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from viewsphere.materials._patterns.courses import Courses
-from viewsphere.materials._patterns.noise import cells, noise, smooth
-from viewsphere.materials._patterns.surface import Color, Map
-from viewsphere.materials._patterns.tones import times
+from viewsphere.materials.shared.courses import Courses
+from viewsphere.materials.shared.noise import cells, noise, smooth
+from viewsphere.materials.shared.surface import Color, Map
+from viewsphere.materials.shared.tones import times
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from viewsphere.materials._patterns.kernels_noise import add_noise, find_cells
-from viewsphere.materials._patterns.surface import Map
+from viewsphere.materials.shared.kernels_noise import add_noise, find_cells
+from viewsphere.materials.shared.surface import Map
 
 Cells = int | tuple[int, int]
 """Number of cells along each side, or across and down."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewsphere.codecs.kernels_deflate import send
+from viewsphere.codecs.deflate.kernels_deflate import send
 from viewsphere.kernels.jit import inner, njit
 
 U = np.uintp

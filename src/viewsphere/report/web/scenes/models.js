@@ -3,7 +3,7 @@
 import { box, data, frameSize, models, shown, summary, categoryName } from "report/data.js";
 import { byId, count, decimal, el, plural } from "report/dom.js";
 import { openLightbox } from "report/lightbox.js";
-import { makeStage, onSphere, themeColor } from "report/stage3d.js";
+import { makeStage, onSphere, themeColor } from "report/scenes/stage3d.js";
 
 const {
   BufferAttribute, BufferGeometry, DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, Points, PointsMaterial, Raycaster, Vector2,

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from viewsphere.assets.animation.clip import Clip, Timeline
 from viewsphere.assets.cache import kept
-from viewsphere.assets.clip import Clip, Timeline
 from viewsphere.assets.load import animated_reader, suffix_of
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.paths.inside import split_source

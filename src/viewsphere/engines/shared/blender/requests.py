@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.appearance.repaint import repainted
 from viewsphere.assets.mesh import Image, Material, Mesh
-from viewsphere.engines._blender.file_frame import FileFrame
-from viewsphere.engines._blender.options import AnyOptions
-from viewsphere.engines._blender.texels import Kind, Levels
-from viewsphere.engines._lamps import lamplight
+from viewsphere.engines.shared.blender.file_frame import FileFrame
+from viewsphere.engines.shared.blender.options import AnyOptions
+from viewsphere.engines.shared.blender.texels import Kind, Levels
+from viewsphere.engines.shared.lamps import lamplight
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint, Thing

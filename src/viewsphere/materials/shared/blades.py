@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.materials._patterns.kernels_noise import lay_strokes
-from viewsphere.materials._patterns.surface import Map
+from viewsphere.materials.shared.kernels_noise import lay_strokes
+from viewsphere.materials.shared.surface import Map
 
 
 class Strokes(NamedTuple):

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pydantic import JsonValue
 
-    from viewsphere.assets.deforming import Load
-    from viewsphere.engines._blender.staging import CyclesStage
+    from viewsphere.assets.animation.deforming import Load
+    from viewsphere.engines.shared.blender.staging import CyclesStage
     from viewsphere.model.sample import Sample
     from viewsphere.model.scene import Finish
     from viewsphere.model.shot import Shot
@@ -26,8 +26,8 @@ def check(options: Mapping[str, JsonValue], renderer: str) -> None:
     that is not there or not allowed.
     """
     from viewsphere.blender.interpreter import find_blender
-    from viewsphere.engines._blender.options import options_of
-    from viewsphere.engines._blender.scripts import check_script
+    from viewsphere.engines.shared.blender.options import options_of
+    from viewsphere.engines.shared.blender.scripts import check_script
 
     checked = options_of(renderer, options)
     check_script(checked.script)
@@ -39,27 +39,27 @@ def stage(shot: Shot, load: Load) -> CyclesStage:
 
     Raises UserError for an unknown engine option or one out of range, or where Blender cannot be used.
     """
-    from viewsphere.engines._blender.staging import build_stage
+    from viewsphere.engines.shared.blender.staging import build_stage
 
     return build_stage(shot, load)
 
 
 def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int32] | None:
     """Ids of the objects that Cycles sees in each pixel, (H, W) int32; see `index_pass.indices`."""
-    from viewsphere.engines._blender import index_pass
+    from viewsphere.engines.shared.blender import index_pass
 
     return index_pass.indices(shot, instant, sensor, load)
 
 
 def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: str) -> tuple[str, ...]:
     """Write a shot of any engine as a .blend file, with the cameras of its frames' samples; see `saving.save`."""
-    from viewsphere.engines._blender import saving
+    from viewsphere.engines.shared.blender import saving
 
     return saving.save(shot, samples, load, file, data)
 
 
 def shows_sky(shot: Shot, finish: Finish) -> bool:
     """Return whether a picture of a shot has the sky where nothing else is; `save` needs frames that agree in this."""
-    from viewsphere.engines._blender import saving
+    from viewsphere.engines.shared.blender import saving
 
     return saving.shows_sky(shot, finish)

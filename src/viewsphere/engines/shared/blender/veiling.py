@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines._blender.backdrop import Backdrop
+from viewsphere.engines.shared.blender.backdrop import Backdrop
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.weather import Fog

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.materials._patterns.surface import Map
+from viewsphere.materials.shared.surface import Map
 
 
 @dataclass(frozen=True, eq=False)

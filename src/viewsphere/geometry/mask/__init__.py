@@ -26,7 +26,7 @@ def encode_rle(mask: Mask) -> str:
 
 def decode_rle(height: int, width: int, counts: str) -> Mask:
     """The (height, width) bool mask of a compressed run-length code; raises ValueError when it does not fill the image."""
-    from viewsphere.geometry.kernels_mask import draw_runs
+    from viewsphere.geometry.mask.kernels_mask import draw_runs
 
     return draw_runs(rle_runs(height, width, counts), height, width)
 
@@ -35,7 +35,7 @@ def rle_runs(height: int, width: int, counts: str) -> Runs:
     """The run lengths (column-major, first of pixels that are not in the mask) of a compressed code, without its pixels;
     raises ValueError when they do not fill the image.
     """
-    from viewsphere.geometry.kernels_mask import read_runs
+    from viewsphere.geometry.mask.kernels_mask import read_runs
 
     codes = np.frombuffer(counts.encode("ascii", "replace"), np.uint8)
     runs, whole = read_runs(codes, height * width)
@@ -130,7 +130,7 @@ def mask_polygons(mask: Mask) -> list[list[float]]:
     the identical mask, and the shoelace areas sum to the number of pixels. Islands in holes are components
     of their own. Empty for an empty mask.
     """
-    from viewsphere.geometry.kernels_mask import trace_rings
+    from viewsphere.geometry.mask.kernels_mask import trace_rings
 
     box = mask_box(mask)
     if box is None:

@@ -17,7 +17,7 @@ def touch(points: Float, triangles: NDArray[np.int32], rows: Rows, owner: Cells,
 
     points (V, 3) are counted in cells. Cells are half-open: a point on the border of two belongs to the farther one.
     """
-    from viewsphere.geometry import kernels_voxels as kernels
+    from viewsphere.geometry.voxels import kernels_voxels as kernels
 
     kernels.touch(points, triangles, rows, owner, filled, np.uint8(value))
 
@@ -26,7 +26,7 @@ def fill(points: Float, triangles: NDArray[np.int32], rows: Rows, owner: Cells, 
     """Likewise the cells whose centres lie inside of closed surfaces, made of these rows of triangles: where their winding
     number is not 0, so parts of an object may reach into one another.
     """
-    from viewsphere.geometry import kernels_voxels as kernels
+    from viewsphere.geometry.voxels import kernels_voxels as kernels
 
     if not len(rows):
         return
@@ -45,7 +45,7 @@ def heights(points: Float, triangles: NDArray[np.int32], rows: Rows, size: tuple
 
     The lines are along the middle axis of a grid of this size (ahead, right). Lines without a crossing have inf and -inf.
     """
-    from viewsphere.geometry import kernels_voxels as kernels
+    from viewsphere.geometry.voxels import kernels_voxels as kernels
 
     lowest, highest = np.full(size, np.inf), np.full(size, -np.inf)
     kernels.heights(points, triangles, rows, lowest, highest)
@@ -57,7 +57,7 @@ def closed(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArr
 
     Vertices in one place are one, and shared vertices join triangles to pieces.
     """
-    from viewsphere.geometry import kernels_voxels as kernels
+    from viewsphere.geometry.voxels import kernels_voxels as kernels
 
     if not len(triangles):
         return np.zeros(0, np.bool_)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster.indirect.emissive_triangles import EmissiveTriangles
+from viewsphere.engines.raster.indirect.gathering.patch_rays import PatchRays
 from viewsphere.engines.raster.indirect.kernels_probes import SKY, send_around
-from viewsphere.engines.raster.indirect.patch_rays import PatchRays
 from viewsphere.engines.raster.indirect.radiosity_patches import Patches, Rays
 from viewsphere.engines.raster.lightmaps import kernels_lightmap as kernels
 from viewsphere.engines.raster.lightmaps.lightmaps import Charts, charts_of

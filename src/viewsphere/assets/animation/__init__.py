@@ -1,0 +1,1 @@
+"""Models that move by themselves: clips, time steps, skins and deforming meshes."""

@@ -1,0 +1,1 @@
+"""Light gathered for the pixels of a picture, from patches of surfaces."""
