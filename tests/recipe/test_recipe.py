@@ -119,6 +119,7 @@ MISTAKES = [
         "models[0]: expected either files or models",
         "",
     ),
+    ({"models": [{"source": "zo:car"}]}, "models[0]: expected a category", "; there is no source 'zo'; did you mean 'zoo'?"),
     ({"models": [{"source": "zoo:"}]}, "models[0]: expected the name of a model after 'zoo:'", ""),
     ({"models": [{**MODELS[0], "unit": "mmm"}]}, "models[0].unit: 'mmm' is unknown; did you mean 'mm'? Valid: m, cm", ""),
     ({"models": [{**MODELS[0], "unit": 0}]}, "models[0].unit: 0 is unknown. Valid: m, cm", ""),

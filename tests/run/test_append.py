@@ -430,9 +430,11 @@ def test_a_zoo_model_whose_code_changed_is_refused(out, monkeypatch):
     import viewsphere_zoo as zoo
     from viewsphere_zoo.families import post_box
 
-    drawn = post_box.post_box_random
+    def random(rng):
+        return post_box.post_box_random(np.random.default_rng(int(rng.integers(9))))
+
     monkeypatch.setattr(zoo, "_digest", lambda family: "of other sources")
-    monkeypatch.setattr(post_box, "post_box_random", lambda rng: drawn(np.random.default_rng(int(rng.integers(9)))))
+    monkeypatch.setattr(post_box, "FAMILY", post_box.FAMILY.model_copy(update={"random": random}))
     before = state(out)
     with pytest.raises(StoreError, match=r"model 'post_box_000' \(zoo:post_box\) changed"):
         generate(recipe(models=models(3)), out, append=True)

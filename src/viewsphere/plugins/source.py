@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +15,7 @@ from pydantic import Field
 from viewsphere.errors import UserError
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.validation_errors import nearest
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.registry import Kind, load, names, prefix_of
@@ -133,7 +135,12 @@ def model_for(role: Role) -> str:
 
 
 def suggested(name: str) -> str:
-    """A hint for a name whose prefix was forgotten; empty for other texts."""
+    """A hint for a name whose prefix is misspelt or was forgotten; empty for other texts."""
+    known, (prefix, colon, _) = names("sources"), name.partition(":")
+    if not known:
+        return "; no source of models is installed: install viewsphere again (scripts/setup in a clone)"
+    if colon and re.fullmatch(r"[a-z]\w+", prefix):
+        return f"; there is no source {prefix!r}{nearest(prefix, known)}"
     return next((f"; did you mean {text!r}?" for text in model_names() if text.partition(":")[2] == name), "")
 
 
