@@ -174,6 +174,111 @@ def test_a_channel_that_needs_its_neighbours_is_refused_for_still_pictures(label
         plan(small_recipe(channels=["rgb", "borders"]))
 
 
+def test_a_label_that_reads_a_view_without_listing_it_is_refused(labelled):
+    """Else a run would compute it, and `check` could not: it gives labels no views that they do not need."""
+    labelled("unseen", UNSEEN.replace("needs=(Next(),)", "needs=(Previous(),)").replace("Next\n", "Next, Previous\n"))
+    recipe = eventful_recipe(8, channels=["rgb", "unseen"], formats=[])
+    with pytest.raises(PluginError, match=r"label unseen: `compute` reads Next\(instants=1\), which `needs` does not list"):
+        next(iter(render(recipe)))
+
+
+EDGES = """
+import numpy as np
+from viewsphere.labels import ChannelLabel, by_table
+
+def _label(name, axis):
+    def compute(context):
+        ids, out = context.instances.ids, context.empty(np.int32)
+        out[...] = 0
+        before, after = (np.take(ids, range(*ends, 1), axis) for ends in ((0, ids.shape[axis] - 1), (1, ids.shape[axis])))
+        np.moveaxis(out, axis, 0)[:-1] = np.moveaxis(np.where(before != after, before, 0), axis, 0)
+        return out
+
+    return ChannelLabel(
+        name=name, meaning="ids before a border", dtype=np.int32, encoding="png16", ids={"object": by_table}, compute=compute
+    )
+
+LABELS = (_label("edges_down", 0), _label("edges_across", axis=1))
+"""
+TWINS = "edges_down edges_across"
+
+
+def _has_edges(folder: Path) -> None:
+    generate(small_recipe(channels=["rgb", "instances", *TWINS.split()], formats=[]), folder)
+    dataset = Dataset(folder)
+    for sample in dataset:
+        for name, axis in zip(TWINS.split(), (0, 1), strict=True):
+            differ = np.diff(sample.instances, axis=axis) != 0
+            kept = np.take(sample.channels[name], range(differ.shape[axis]), axis)
+            assert np.array_equal(kept > 0, differ & (np.take(sample.instances, range(differ.shape[axis]), axis) > 0))
+    report = check(dataset)
+    assert report.ok, report.findings
+    assert all(report.checked[name] == len(dataset) > 0 for name in TWINS.split())
+
+
+def test_several_labels_are_one_file_with_an_entry_point_each(labelled, tmp_path):
+    labelled(TWINS, EDGES)
+    _has_edges(tmp_path / "out")
+
+
+def test_several_labels_are_one_file_in_the_package_and_are_listed_without_import(monkeypatch, tmp_path):
+    (tmp_path / "shipped").mkdir()
+    (tmp_path / "shipped" / "edges.py").write_text(EDGES)
+    tables = [table for table in vars(labels).values() if hasattr(table, "cache_clear")]
+    with monkeypatch.context() as patch:
+        patch.setattr(labels, "__path__", [*labels.__path__, str(tmp_path / "shipped")])
+        for table in tables:
+            table.cache_clear()
+        assert set(TWINS.split()) < set(plugins.names("labels")) and "edges" not in plugins.names("labels")
+        assert "viewsphere.labels.edges" not in sys.modules
+        assert plugins.source("labels", "edges_across") == tmp_path / "shipped" / "edges.py"
+        _has_edges(tmp_path / "out")
+        sys.modules.pop("viewsphere.labels.edges")
+    for table in tables:
+        table.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("points", "code", "message"),
+    [
+        ("edges_down", EDGES, "LABELS: expected the names edges_down, each once, .*; found edges_down, edges_across"),
+        (
+            f"{TWINS} edges",
+            EDGES,
+            "LABELS: expected the names edges, edges_across, edges_down, .*; found",
+        ),
+        (TWINS, EDGES.replace('"edges_across"', '"edges_down"'), "LABELS: .*; found edges_down, edges_down"),
+        (TWINS, EDGES.replace("(_label(", "[_label(").replace("=1))", "=1)]"), r"LABELS\[0\]: expected a LabelSpec in a tuple"),
+        (
+            TWINS,
+            EDGES.replace('_label("edges_down", 0)', '"edges_down"'),
+            r"LABELS\[0\]: expected a LabelSpec in a tuple",
+        ),
+    ],
+)
+def test_labels_of_a_file_that_are_not_those_of_its_entry_points_are_refused(labelled, points, code, message):
+    labelled(points, code)
+    with pytest.raises(PluginError, match=message):
+        plan(small_recipe(channels=["rgb", "edges_down"]))
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        (EDGES.replace('_label("edges_down", 0)', "_label(NAME, 0)"), "expected a tuple of calls, each with its name as text"),
+        (EDGES.replace("LABELS = ", "NAME = 'edges'\nLABELS = EDGES = "), ""),
+    ],
+)
+def test_names_of_shipped_labels_stand_in_the_text(monkeypatch, tmp_path, code, message):
+    (tmp_path / "edges.py").write_text(code)
+    monkeypatch.setattr(labels, "__path__", [*labels.__path__, str(tmp_path)])
+    if message:
+        with pytest.raises(PluginError, match=message):
+            plugins.names("labels")
+    else:
+        assert set(TWINS.split()) < set(plugins.names("labels"))
+
+
 def test_an_engine_is_one_file(install):
     install("engines", "flat", EXAMPLES["flat"])
     recipe = small_recipe(engine="flat", channels=["rgb", "rgba", "depth", "instances"], formats=[])

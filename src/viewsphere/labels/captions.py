@@ -337,6 +337,7 @@ LABEL = SampleLabel(
     meaning="sentences about the picture",
     needs=(Randomness(), ShotAppearance()),
     options=Captions,
+    names_categories=True,
     fields=(
         Field(
             "captions",

@@ -69,6 +69,7 @@ def _label(name: str, compute: Callable[[LabelContext], Array], meaning: str, pr
         dtype=np.float32,
         unit="m",
         empty=np.inf,
+        in_steps=name == "depth",
         compute=compute,
         prove=prove,
         drawing=Drawing(

@@ -85,6 +85,7 @@ LABEL = ChannelLabel(
     name="panoptic",
     meaning="class * 65536 + object id: the class as in `semantic`, the id 0 of stuff",
     dtype=np.int32,
+    holds_classes=True,
     unit="class and object id",
     empty=SKY << BITS,
     compute=compute,

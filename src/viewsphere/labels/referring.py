@@ -250,6 +250,7 @@ LABEL = SampleLabel(
     meaning="expressions that single objects out",
     needs=(ShotAppearance(),),
     options=Referring,
+    names_categories=True,
     fields=(
         Field(
             "referring",

@@ -23,6 +23,7 @@ LABEL = ChannelLabel(
     name="semantic",
     meaning=f"class of what is seen: stuff below 32 ({class_names()}), things 31 + their category's id",
     dtype=np.int32,
+    holds_classes=True,
     unit="class id",
     empty=SKY,
     encoding="png16",

@@ -14,6 +14,7 @@ from numpy.typing import DTypeLike, NDArray
 class Channel:
     """One array of pixels: (height, width) + (components,) if components > 1; `encoding` is its default file. With no
     components it is no picture but rows, as many as there are. `colors`, sRGB: of the first ids, in files with a palette.
+    `in_steps`: a PNG file has it in whole steps of the recipe's `files.depth_unit`.
     """
 
     name: str
@@ -24,6 +25,7 @@ class Channel:
     encoding: Literal["png", "png16", "tiff", "npz"]
     meaning: str
     colors: tuple[tuple[int, int, int], ...] = ()
+    in_steps: bool = False
 
     @property
     def suffix(self) -> str:

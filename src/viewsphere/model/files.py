@@ -78,7 +78,7 @@ class Files(Frozen):
                 return self.rgb
             case "rgba", _:
                 return self.rgba
-            case "depth", _:
+            case _ if channel.in_steps:
                 return self.depth
             case _, "png16":
                 return self.masks

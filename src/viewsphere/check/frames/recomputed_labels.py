@@ -74,7 +74,7 @@ class RecomputedLabels:
             if kept.dtype.names:  # of rows nothing else says how many there are
                 yield f"expected {len(again):,} rows, found {len(kept):,}"
             return
-        step = depth_step(self._dataset.read(sample.files[name])) if name == "depth" else 0.0
+        step = depth_step(self._dataset.read(sample.files[name])) if channel_labels()[name].in_steps else 0.0
         wrong = _beyond(kept, again, step) if step else unequal(kept, again)
         if wrong.any():
             where = tuple(int(i[0]) for i in np.nonzero(wrong))

@@ -89,7 +89,8 @@ class LabelSpec(Spec):
     inputs besides what the picture's camera sees at its instant, and `options`, the class of those that a recipe's `labels` may
     give.
 
-    `prove` compares a stored sample with itself, which is quick; besides, `check` computes every label again.
+    `names_categories`: its text has the names of categories, which merging then does not spell in another way. `prove` compares
+    a stored sample with itself, which is quick; besides, `check` computes every label again.
     """
 
     model_config = ConfigDict(allow_inf_nan=True)
@@ -103,6 +104,7 @@ class LabelSpec(Spec):
     options: type[Frozen] | None = None
     prove: Proof = no_proof
     drawing: InstanceOf[Drawing] | None = None
+    names_categories: bool = False
 
     @property
     def view_offsets(self) -> frozenset[int]:
@@ -124,13 +126,16 @@ class ChannelLabel(LabelSpec):
     seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact; `colors` are those of the
     first ids in files with a palette.
 
-    `ids` are the kinds of ids in the array, each with a function that gives the array with other ones. Arrays of whole numbers
-    have to declare them; raises ValueError for those that do not.
+    `in_steps`: a PNG file has it in whole steps. `holds_classes`: its numbers are classes, which the plan of the data set then
+    lists. `ids` are the kinds of ids in the array, each with a function that replaces them. Arrays of whole numbers without a
+    declaration raise PluginError.
     """
 
     compute: Callable[[LabelContext], Array]
     dtype: Any
     components: int = 1
+    in_steps: bool = False
+    holds_classes: bool = False
     unit: str = "1"
     empty: float = 0
     encoding: Any = "tiff"
@@ -152,7 +157,17 @@ class ChannelLabel(LabelSpec):
     @property
     def channel(self) -> Channel:
         """The channel that describes the label's file."""
-        return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning, self.colors)
+        return Channel(
+            self.name,
+            self.dtype,
+            self.components,
+            self.unit,
+            self.empty,
+            self.encoding,
+            self.meaning,
+            self.colors,
+            self.in_steps,
+        )
 
 
 def derived(context: LabelContext, i: int) -> Mapping[str, Any]:

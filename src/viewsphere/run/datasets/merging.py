@@ -20,6 +20,7 @@ from viewsphere.labels import (
     SampleLabel,
     channel_labels,
     channels,
+    labels,
     object_labels,
     renumbered,
     sample_labels,
@@ -35,9 +36,6 @@ from viewsphere.store.foreign import ForeignFrame, Loaded
 from viewsphere.store.index import length
 from viewsphere.store.paths import files_inside
 from viewsphere.store.shots.linking import link_model, link_shot
-
-SENTENCES = {"captions", "referring"}
-"""Labels that tell categories' names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,8 +199,9 @@ def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tupl
 
 
 def _tells_names(dataset: Dataset) -> bool:
-    """Return whether the data set has sentences about its objects."""
-    return any(SENTENCES & set(part.recipe.get("annotations") or ()) for part in dataset.plan.parts)
+    """Return whether labels of the data set contain names of categories."""
+    kept = {name for part in dataset.plan.parts for name in (*part.channels, *(part.recipe.get("annotations") or ()))}
+    return any(labels()[name].names_categories for name in kept if name in labels())
 
 
 def _free(name: str, taken: set[str]) -> str:

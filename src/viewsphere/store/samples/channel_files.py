@@ -40,7 +40,7 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
             return npz.encode_npz(array, channel.name)
         case "png":
             return png_tiff.encode_png(array, rendered=True)
-        case "png16" if channel.name == "depth":
+        case "png16" if channel.in_steps:
             return png_tiff.encode_png(_steps(array, files.step), unit=files.step)
         case "png16" | "png8" as kind:
             return _masks(channel, array, kind == "png8")
@@ -125,7 +125,7 @@ def _decoded(channel: Channel, data: bytes) -> NDArray[Any]:
             return exr.decode_exr(data)
         case b"PK\x03\x04":
             return npz.decode_npz(data, channel.name)
-        case b"\x89PNG" if channel.name == "depth":
+        case b"\x89PNG" if channel.in_steps:
             return _metres(data)
         case b"\x89PNG":
             return png_tiff.decode_png(data)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, JsonValue, PlainValidator, TypeAdapter, ValidationError
 
+from viewsphere.labels import channel_labels
 from viewsphere.model.appearance import Appearance
 from viewsphere.model.classes import SemanticClass, classes_of
 from viewsphere.model.credit import Credit
@@ -245,9 +246,6 @@ class Part:
         return self
 
 
-CLASSED = frozenset({"semantic", "panoptic"})
-"""Channels whose numbers mean classes, which the text of the plan then lists."""
-
 NAME_BYTES = 8
 """Of a pose's name in `Part.pose_names`; zeros are that of no pose a recipe can mean."""
 
@@ -389,7 +387,7 @@ class PlanRecord:
             "categories": [c.__dict__ for c in self.categories],
             "parts": [vars(part) | {"blocks": [vars(block) for block in part.blocks]} for part in self.parts],
         }
-        if CLASSED & set(self.channels):
+        if any(channel_labels()[name].holds_classes for name in self.channels if name in channel_labels()):
             value["classes"] = [vars(one) for one in self.classes]
         return sealed(value)
 
