@@ -171,7 +171,7 @@ IN_THE_SOURCE = {
     "others can write this folder",
     "scaled to its real length",
     "expected finished frames",
-    "expected nobody else to append",
+    "another run appended a part",
     "stopped; <what is kept>",
     "its worker died",
     "expected a Ray cluster that answers",

@@ -345,7 +345,7 @@ def hostile(folder):
         "g.mat": "found a link that leads out of it",
         "h.mat": "found a link that leads out of it",
         "i.mat": "cannot identify image file",
-        "car.mat": "model 1: expected faces of vertices 1 to 4; found others",
+        "car.mat": "model 1: a face names a vertex outside 1 to 4",
     }
 
 

@@ -201,8 +201,8 @@ def test_what_is_broken_is_told(videos, tmp_path):
     assert "expected a line of fx fy cx cy k1 k2 p1 p2 k3; found none" in told("calibration.txt", lambda text: "# none\n")
     assert "expected 4, 8 or 9 numbers in calibration.txt; found 6" in told("calibration.txt", lambda text: "1 1 1 1 1 1")
     assert "calibration.txt: expected a text of a line each; found" in told("calibration.txt", None)
-    assert "expected seconds at the beginning of each line" in told("rgb.txt", lambda text: text + "soon rgb/1.png\n")
-    assert "expected seconds at the beginning of each line; found others" in told("rgb.txt", lambda text: text + "nan a\n")
+    assert "expected seconds at the beginning of each line; found: " in told("rgb.txt", lambda text: text + "soon rgb/1.png\n")
+    assert "a line does not begin with seconds" in told("rgb.txt", lambda text: text + "nan a\n")
     assert "picture of 0.1 s: expected a picture; found no rgb/none.png" in told(
         "rgb.txt", lambda text: text.replace("rgb/0.100000.png", "rgb/none.png")
     )

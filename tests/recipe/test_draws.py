@@ -205,7 +205,7 @@ REFUSED = [
     ({"color": [[0, 2], 0, 0]}, ("color", 0, "uniform", 1), "less than or equal to 1; found 2"),
     ({"point": {"uniform": [[0, 0], [1, 1, 1]]}}, ("point", "uniform", 0, 2), "a value; found nothing"),
     ({"point": {"uniform": [0, 1]}}, ("point", "uniform", 0), "a list; found 0"),
-    ({"point": {"normal": [[0, 0, 0], [1, 1]]}}, ("point",), "one per component of the mean"),
+    ({"point": {"normal": [[0, 0, 0], [1, 1]]}}, ("point",), "one for each of 3 components of the mean"),
 ]
 
 

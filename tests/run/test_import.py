@@ -88,7 +88,7 @@ def test_imported_objects_say_what_is_known_and_nan_for_the_rest(tmp_path):
     first, empty, last = Dataset(tmp_path / "out")
     assert first.known_camera is None
     assert (first.width, first.height, first.rgb.shape) == (40, 30, (30, 40, 3))
-    with pytest.raises(StoreError, match="frame 0: expected a camera, found an imported picture"):
+    with pytest.raises(StoreError, match="frame 0: an imported picture has no camera"):
         _ = first.camera
     cat, crowd = first.objects
     assert cat.mask[3:13, 3:12].all()

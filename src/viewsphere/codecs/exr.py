@@ -98,13 +98,13 @@ def decode_exr(data: bytes) -> NDArray[Any]:
             wanted = rows[y : y + _LINES].size
             raw = body if size == wanted else isal_zlib.decompress(body)
             if line != y or len(body) != size or len(raw) != wanted:
-                raise UserError(f"EXR: expected {wanted} bytes of line {y}, found others: the file is damaged")
+                raise UserError(f"EXR: line {y} is damaged: it does not have {wanted} bytes. Save the picture again")
             flat = np.frombuffer(raw, np.uint8)
             rows[y : y + _LINES] = (flat if size == wanted else _unmixed(flat)).reshape(-1, rows.shape[1])
             places.append(position)
             position += 8 + size
         if data[table : table + 8 * blocks] != np.array(places, "<u8").tobytes() or position != len(data):
-            raise UserError("EXR: expected the places of all lines, found others: the file is damaged")
+            raise UserError("EXR: the table of line offsets is damaged. Save the picture again")
     except (struct.error, isal_zlib.error) as error:  # pyright: ignore[reportGeneralTypeIssues]
         raise UserError(f"EXR: expected {height} lines, found damage ({error}): the file is cut off or damaged") from error
     planes = rows.view(dtype.newbyteorder("<")).reshape(height, components, width)

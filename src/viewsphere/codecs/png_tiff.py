@@ -108,7 +108,7 @@ def decode_png(data: bytes) -> NDArray[Any]:
     if len(header) != 13 or not ended or not body:
         raise UserError("PNG: expected a header and pixels, found the file's end: it is cut off")
     if not data.endswith(_chunk(b"IEND", b"")):
-        raise UserError("PNG: expected nothing behind its last chunk, found more: the file is damaged")
+        raise UserError("PNG: the file is damaged: bytes follow its last chunk. Save the picture again")
     return _png_pixels(header, body)
 
 
@@ -136,7 +136,7 @@ def png_unit(data: bytes) -> float | None:
 def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
     """Type and content of every chunk; raises UserError if the file is damaged."""
     if not data.startswith(_SIGNATURE):
-        raise UserError("PNG: expected a PNG file's first 8 bytes, found others: the file is damaged or no PNG")
+        raise UserError("PNG: the first 8 bytes are not those of a PNG file. Save the picture again as PNG")
     position = len(_SIGNATURE)
     while position < len(data):
         length, kind = struct.unpack_from(">I4s", data, position) if position + 12 <= len(data) else (len(data), b"")

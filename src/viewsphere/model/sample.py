@@ -203,16 +203,14 @@ class Sample(Shown):
     def camera(self) -> Camera:
         """The camera; raises StoreError for an imported picture without a known camera."""
         if self.known_camera is None:
-            raise StoreError(
-                f"frame {self.index}: expected a camera, found an imported picture: nobody knows where it was taken"
-            )
+            raise StoreError(f"frame {self.index}: an imported picture has no camera")
         return self.known_camera
 
     @property
     def pose(self) -> Viewpoint:
         """The camera's viewpoint; raises StoreError for an imported picture without a known pose."""
         if self.known_pose is None:
-            raise StoreError(f"frame {self.index}: expected a pose, found an imported picture: nobody knows where it was taken")
+            raise StoreError(f"frame {self.index}: an imported picture has no pose")
         return self.known_pose
 
     @property

@@ -34,7 +34,7 @@ def _motion(matrix: Matrix) -> Matrix:
     if matrix[3] != IDENTITY[3]:
         raise ValueError(f"expected [0, 0, 0, 1] as the last row; found {shown(matrix[3])}")
     if np.abs((rotation[:, None] * rotation).sum(axis=2) - np.eye(3)).max() > RIGID:
-        raise ValueError("expected rows of a rotation, each of length 1 and at right angles to the others; found others")
+        raise ValueError("the rows are not those of a rotation: each needs length 1 and right angles to the others")
     if float((np.cross(rotation[0], rotation[1]) * rotation[2]).sum()) < 0:
         raise ValueError("expected a rotation; found a mirror image, which no motion makes of a model")
     if np.abs(np.array(matrix) - np.eye(4)).max() <= RIGID:

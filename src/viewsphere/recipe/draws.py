@@ -28,6 +28,7 @@ from pydantic_core import CoreSchema, core_schema
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Metres, Natural, Number
 from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.quantity import quantity
 from viewsphere.model.validation_errors import at, nearest, shown
 from viewsphere.recipe.seed_names import seed_name
 from viewsphere.recipe.values import OrShort
@@ -96,7 +97,7 @@ class Distribution(OmitNone):
             raise ValueError(f"expected one of {', '.join(KINDS)}; found {' and '.join(given) or 'none'}")
         if self.weights is not None:
             if self.choice is None or len(self.weights) != len(self.choice):
-                raise ValueError("expected as many weights as choices; found another number")
+                raise ValueError(f"expected as many weights as choices; found {quantity(len(self.weights), 'weight')}")
             if not sum(self.weights):
                 raise ValueError("expected a weight above 0; found none")
         return self
@@ -217,7 +218,9 @@ class _Reader(NamedTuple):
             raise ValueError("expected a mean from min to max; found one outside")
         mean, deviation = values["mean"], values["deviation"]
         if isinstance(mean, tuple) and isinstance(deviation, tuple) and len(mean) != len(deviation):
-            raise ValueError("expected one deviation, or one per component of the mean; found another number")
+            raise ValueError(
+                f"expected one deviation, or one for each of {len(mean)} components of the mean; found {len(deviation)}"
+            )
         return raw.model_copy(update=values)
 
     def _deviation(self, value: Any) -> Any:

@@ -43,7 +43,9 @@ class ScenesEntry(Frozen):
     @model_validator(mode="after")
     def _check(self) -> ScenesEntry:
         if self.spots and span(self.objects) != (len(self.spots),) * 2:
-            raise ValueError(f"expected objects: {len(self.spots)}, as many as the layout lists; found another number")
+            raise ValueError(
+                f"expected objects: {len(self.spots)}, one for each place in the layout. Change objects, or the list of places"
+            )
         return self
 
     @property

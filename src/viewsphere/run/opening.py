@@ -127,9 +127,7 @@ def commit(portion: DatasetPart, store: Store) -> None:
         if there == parts:
             return
         if there != parts[:-1]:
-            raise StoreError(
-                f"{store.root}: expected nobody else to append meanwhile, found a part of another run: run this again"
-            )
+            raise StoreError(f"{store.root}: another run appended a part meanwhile. Run this command again")
         store.save(portion.record)
 
 

@@ -281,7 +281,9 @@ class _Blocks(io.RawIOBase):
         data = self._path.byte_range(self._at, wanted)
         if len(data) != wanted:
             where = f"{wanted:,} bytes from {self._at:,} on"
-            raise RemoteError(f"{self._path}: expected {where}, found {len(data):,}: read it again when nobody writes it")
+            raise RemoteError(
+                f"{self._path}: expected {where}, found {len(data):,}: the file is being written. Run the command again later"
+            )
         buffer[:wanted] = data
         self._at += wanted
         return wanted

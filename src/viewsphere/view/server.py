@@ -110,7 +110,7 @@ class Server(ThreadingMixIn, TCPServer):
 
     def __init__(self, live: Live, address: Address) -> None:
         if address.token is not None and not TOKEN.fullmatch(address.token):
-            raise UserError("--token: expected 16 to 256 letters, digits, - and _, found others: leave it out, and one is made")
+            raise UserError("--token: use 16 to 256 letters, digits, - and _, or leave the option out to get a random token")
         self.token = address.token or secrets.token_urlsafe(24)
         self.answers, self.address, self.lines = Answers(live), address, Lines()
         try:

@@ -120,7 +120,7 @@ MISTAKES = {
     "symmetries: {continuous: [{axis: [0, 0, .nan]}]}": "axis[2]: expected",
     "symmetries: {discrete: [[1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]]}": "expected a motion; found the identity",
     "symmetries: {discrete: [[-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]]}": "found a mirror image",
-    "symmetries: {discrete: [[2,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]]}": "expected rows of a rotation",
+    "symmetries: {discrete: [[2,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]]}": "the rows are not those of a rotation",
     "symmetries: {discrete: [[1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,1,1]]}": "expected [0, 0, 0, 1] as the last row",
     "symmetries: {discrete: [[0,-1,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]]}": "discrete[0] followed by discrete[0] is one, too",
     "keypoints: {points: {}}": "keypoints.points: expected at least 1",

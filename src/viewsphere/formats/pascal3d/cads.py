@@ -61,11 +61,11 @@ def read_shapes(file: Path, category: str) -> tuple[tuple[Float, NDArray[np.int3
 def _shape(vertices: Any, faces: Any) -> tuple[Float, NDArray[np.int32]]:
     """Vertices (V, 3) and triangles (T, 3) of faces, which count from 1."""
     if not (_is_table(vertices) and _is_table(faces) and len(vertices) and len(faces)):
-        raise ValueError("expected vertices and faces of three columns; found others")
+        raise ValueError("vertices or faces do not have three columns")
     if not (np.abs(vertices) < FARTHEST).all():
-        raise ValueError(f"expected finite vertices below {FARTHEST:,.0f}; found others")
+        raise ValueError(f"a vertex is not finite, or beyond {FARTHEST:,.0f}")
     if not ((faces == np.floor(faces)) & (faces >= 1) & (faces <= len(vertices))).all():
-        raise ValueError(f"expected faces of vertices 1 to {len(vertices)}; found others")
+        raise ValueError(f"a face names a vertex outside 1 to {len(vertices)}")
     return vertices.astype(np.float64), faces.astype(np.int32) - np.int32(1)
 
 
@@ -97,6 +97,6 @@ def _points(said: Mapping[str, Any]) -> Iterator[tuple[str, Place]]:
     for name, value in said.items():
         if name not in OWN and isinstance(value, np.ndarray) and value.size == 3:
             if not (np.abs(value) < FARTHEST).all():
-                raise ValueError(f"expected finite places of points; found others of {name:.60}")
+                raise ValueError(f"the point {name:.60} is not at a finite place")
             x, y, z = value.ravel().astype(np.float64).tolist()
             yield name, (x, y, z)

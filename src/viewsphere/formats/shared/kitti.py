@@ -50,7 +50,9 @@ def car_in(shot: Shot, name: str) -> Car:
     """The rig of a shot as a car; raises UserError, with the format's name, for any other."""
     car = car_of(shot.rig)
     if car is None:
-        raise UserError(f"{name}: shot {shot.key}: expected a camera or a rectified pair, and one LiDAR at most; found others")
+        raise UserError(
+            f"{name}: shot {shot.key}: expected a camera or a rectified pair, and at most one LiDAR. Choose another format"
+        )
     return car
 
 

@@ -90,7 +90,7 @@ def _timed(file: Path) -> list[Timed]:
     except ValueError as error:
         raise StoreError(f"{file}: expected seconds at the beginning of each line; found: {error}") from None
     if not np.isfinite([seconds for seconds, _ in found]).all():
-        raise StoreError(f"{file}: expected seconds at the beginning of each line; found others")
+        raise StoreError(f"{file}: a line does not begin with seconds")
     return found
 
 

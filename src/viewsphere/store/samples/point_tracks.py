@@ -48,7 +48,7 @@ def joined(samples: Sequence[Sample]) -> PointTracks:
     first = known[0]
     for sample, row in zip(samples, known, strict=True):
         if not all(np.array_equal(row[name], first[name]) for name in ("instant", "query", "object")):
-            raise StoreError(f"tracks: expected the same points all through a sequence; found others in frame {sample.index}")
+            raise StoreError(f"tracks: frame {sample.index} has other points than its sequence")
     parts = [_in_picture(sample) for sample in samples]
     xy, xyz, world = (np.stack([part[k] for part in parts]) for k in range(3))
     return PointTracks(
