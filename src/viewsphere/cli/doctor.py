@@ -16,7 +16,6 @@ import typer
 from viewsphere.cli.arguments import AsJson
 from viewsphere.cli.terminal import print_json, say
 from viewsphere.errors import UserError
-from viewsphere.model.validation_errors import one_of
 from viewsphere.run.workers.worker_count import cores
 
 if TYPE_CHECKING:
@@ -46,6 +45,8 @@ def doctor(
     if setup_blender:
         _set_up_blender()
     for name in setup or ():
+        from viewsphere.model.validation_errors import one_of
+
         downloads = _downloads()
         if name not in downloads:
             raise UserError(f"--setup: {one_of(name, tuple(downloads))}")

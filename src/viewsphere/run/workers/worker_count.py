@@ -8,8 +8,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewsphere.plugins.source import is_versioned
-
 if TYPE_CHECKING:
     from viewsphere.model.model_spec import ModelSpec
     from viewsphere.recipe.recipe import Recipe
@@ -65,6 +63,8 @@ def _is_plain(recipe: Recipe) -> bool:
 
 def _model_seconds(work: Missing) -> Iterator[float]:
     """Seconds for each model that is to be made, or compared with the one that the store holds."""
+    from viewsphere.plugins.source import is_versioned  # which loads pydantic
+
     store = work.store
     for spec, steps in work.portion.models:
         is_trusted = is_versioned(spec.source) and not steps and store.model_folder(spec.key).is_dir()
