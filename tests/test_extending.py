@@ -318,7 +318,7 @@ INSTALLED = """
 models: [{source: "zoo:peg", count: 3}, {source: "zoo:box", category: box}]
 viewpoints: {azimuth: [0, 40], elevation: 20, distance: 2}
 camera: {size: [96, 72], fov_deg: 40}
-scene: {ground: {material: dots}, lights: {kind: ring, position: [0, 0, 1], strength: 4}, place: "zoo:pegs"}
+scene: {ground: {material: dots}, lights: {kind: ring, position: [0, 0, 1], strength: 4}}
 channels: [rgb, instances, borders]
 formats: [csv_boxes, lines]
 splits: {by: frame, train: 1}

@@ -16,7 +16,7 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import first_few, quantity
 from viewsphere.model.validation_errors import report, shown
-from viewsphere.plugins.source import source_of
+from viewsphere.plugins.source import Named, source_of
 
 TABLE = "credits.csv"
 """Name of the table in a folder of models: its column `file` has names of files, and patterns, of which the first counts."""
@@ -32,8 +32,8 @@ def credits_of(specs: Iterable[ModelSpec], said: Mapping[str, Credit]) -> dict[s
 
     Raises RecipeError, which names file and line, for a table that cannot be used.
     """
-    table = cache(_read)
-    found = {spec.key: said.get(spec.key) or _looked_up(spec, table) for spec in specs}
+    table, source = cache(_read), cache(lambda prefix: source_of(f"{prefix}:"))
+    found = {spec.key: said.get(spec.key) or _looked_up(spec, table, source) for spec in specs}
     return {key: credit for key, credit in found.items() if credit is not None}
 
 
@@ -45,8 +45,9 @@ def unlicensed(keys: Iterable[str], known: Mapping[str, Credit]) -> Iterator[str
         yield f"{have}. Set `licence:` in the recipe, or add a {TABLE} next to the files"
 
 
-def _looked_up(spec: ModelSpec, table: Callable[[Path, bool], Table]) -> Credit | None:
-    named = source_of(spec.source)
+def _looked_up(spec: ModelSpec, table: Callable[[Path, bool], Table], source: Callable[[str], Named | None]) -> Credit | None:
+    prefix, colon, _ = spec.source.partition(":")
+    named = source(prefix) if colon else None
     if named is not None:
         return named.spec.credit(spec)
     file = split_source(Path(spec.source))[0]

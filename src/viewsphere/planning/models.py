@@ -26,7 +26,6 @@ from viewsphere.limits import limits
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.validation_errors import Nearest
-from viewsphere.plugins import prefix_of
 from viewsphere.plugins.source import Named, model_for, source_of, suggested
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import Dimensions, Length, ModelEntry, SizeTable, unit_metres
@@ -44,17 +43,14 @@ Sizes = Mapping[str, tuple[float, float, float]]
 class _Found:
     """A model that an entry means: the entry's index, the key it would like, a file's path or a name such as `zoo:car`.
 
-    is_drawn: whether a seed decides which model it is.
+    is_drawn: whether a seed decides which model it is. is_file: whether no source supplies it.
     """
 
     entry: int
     key: str
     source: str
     is_drawn: bool = False
-
-    @property
-    def is_file(self) -> bool:
-        return not prefix_of(self.source)
+    is_file: bool = False
 
 
 def count_models(recipe: Recipe) -> int:
@@ -253,7 +249,7 @@ def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
             yield _Found(index, key, f"{origin.prefix}:{_drawn_name(recipe, names, number)}", is_drawn=True)
     if not entry.names:
         for file in _files(recipe, index):
-            yield _Found(index, _short(_free(prefix + _as_key(file.stem))), file.as_posix())
+            yield _Found(index, _short(_free(prefix + _as_key(file.stem))), file.as_posix(), is_file=True)
 
 
 def _drawn_name(recipe: Recipe, names: Sequence[str], number: int) -> str:

@@ -82,6 +82,13 @@ PACKAGES = "viewsphere.packages"
 """The group of entry points that name packages of plug-ins, each by its kind."""
 
 
+OWN = "viewsphere"
+"""The distribution of the built-in plug-ins."""
+
+Changes = tuple[tuple[str, int], ...]
+"""Folders, and when each was last changed."""
+
+
 def names(kind: Kind) -> tuple[str, ...]:
     """Names of all plug-ins of this kind, sorted; no plug-in is imported."""
     return tuple(sorted(_found(kind)))
@@ -140,11 +147,7 @@ class _Found(NamedTuple):
     module: str
     attribute: str = ""
     distribution: metadata.Distribution | None = None
-
-    @property
-    def is_third_party(self) -> bool:
-        """Return whether another distribution than viewsphere's brings it."""
-        return self.distribution is not None and self.distribution.name != OWN
+    is_third_party: bool = False
 
 
 def shipped(kind: Kind) -> Mapping[str, str]:
@@ -152,29 +155,43 @@ def shipped(kind: Kind) -> Mapping[str, str]:
     return {name: found.module for name, found in _found(kind).items() if not found.is_third_party}
 
 
-def _found(kind: Kind) -> dict[str, _Found]:
-    """The plug-ins of a kind by name. One that an entry point names comes before one of its name in a package."""
-    seam = SEAMS[kind]
-    found = {name: _Found(module) for name, module in _plugins_of(seam.package, seam).items()} if seam.package else {}
-    for entry in entry_points(group=PACKAGES):
-        if entry.name == kind:
-            found |= {name: _Found(module, "", entry.dist) for name, module in _packed(entry.module, seam).items()}
-    for entry in entry_points(group=f"viewsphere.{kind}"):
-        found[entry.name] = _Found(entry.module, entry.attr, entry.dist)
-    return found
+def _found(kind: Kind) -> Mapping[str, _Found]:
+    """The plug-ins of a kind by name; listed again after a package was installed or a folder of plug-ins was changed."""
+    installed = _changes(sys.path)
+    packages = _packages(installed, kind)
+    return _table(installed, kind, tuple((package, _folders(package.module)) for package in packages))
 
 
-def _packed(package: str, seam: Seam) -> Mapping[str, str]:
-    """The modules of a package of plug-ins by name; of one that cannot be imported the package, whose loading says why."""
+@lru_cache(maxsize=2 * len(SEAMS))
+def _packages(installed: Changes, kind: Kind) -> tuple[_Found, ...]:
+    """The packages with a plug-in of the kind in each module: our own, and those that entry points name."""
+    own = (_Found(SEAMS[kind].package),) if SEAMS[kind].package else ()
+    return *own, *(_entered(entry) for entry in _of_group(installed, PACKAGES) if entry.name == kind)
+
+
+def _folders(package: str) -> Changes:
+    """The folders of a package; none for one that cannot be imported."""
     try:
-        return _plugins_of(package, seam)
+        return _changes(importlib.import_module(package).__path__)
     except Exception:
-        return {package: package}
+        return ()
 
 
-def _plugins_of(package: str, seam: Seam) -> Mapping[str, str]:
-    """The modules of a package by the names of the plug-ins that they hold; listed again after its folder was changed."""
-    return _plugins_in(_changes(importlib.import_module(package).__path__), package, seam)
+@lru_cache(maxsize=4 * len(SEAMS))
+def _table(installed: Changes, kind: Kind, packages: tuple[tuple[_Found, Changes], ...]) -> Mapping[str, _Found]:
+    """The plug-ins by name. One that an entry point names comes before one of its name in a package. A package that cannot be
+    imported stands for itself: loading it says why.
+    """
+    found: dict[str, _Found] = {}
+    for package, folders in packages:
+        held = _plugins_in(folders, package.module, SEAMS[kind]) if folders else {package.module: package.module}
+        found |= {name: package._replace(module=module) for name, module in held.items()}
+    return found | {entry.name: _entered(entry) for entry in _of_group(installed, f"viewsphere.{kind}")}
+
+
+def _entered(entry: metadata.EntryPoint) -> _Found:
+    is_third_party = entry.dist is None or entry.dist.name != OWN  # reading a distribution's name takes 1 ms
+    return _Found(entry.module, entry.attr, entry.dist, is_third_party)
 
 
 def _module_of(kind: Kind, name: str) -> Any:
@@ -182,10 +199,10 @@ def _module_of(kind: Kind, name: str) -> Any:
     found = _found(kind).get(name)
     if found is None:
         raise _unknown(SEAMS[kind].constant.lower(), name, names(kind))
-    return _entered(found, name) if found.is_third_party else importlib.import_module(found.module)
+    return _imported(found, name) if found.is_third_party else importlib.import_module(found.module)
 
 
-def _entered(found: _Found, name: str) -> Any:
+def _imported(found: _Found, name: str) -> Any:
     """Return the object that a third party's entry point names; any failure is an error of the plug-in."""
     try:
         module = importlib.import_module(found.module)
@@ -256,13 +273,6 @@ def entry_points(group: str) -> metadata.EntryPoints:
     return _of_group(_changes(sys.path), group)
 
 
-OWN = "viewsphere"
-"""The distribution of the built-in plug-ins."""
-
-Changes = tuple[tuple[str, int], ...]
-"""Folders, and when each was last changed."""
-
-
 @lru_cache(maxsize=2 * len(SEAMS))
 def _of_group(paths: Changes, group: str) -> metadata.EntryPoints:
     return _installed(paths).select(group=group)
@@ -293,7 +303,6 @@ def attribute(path: str) -> Any:
     return getattr(importlib.import_module(f"viewsphere.{module}"), name)
 
 
-@lru_cache(maxsize=4 * len(SEAMS))
 def _plugins_in(paths: Changes, package: str, seam: Seam) -> Mapping[str, str]:
     """The modules in a package's folders by the names of the plug-ins that they hold."""
     homes: dict[str, str] = {}
