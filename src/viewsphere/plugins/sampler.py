@@ -13,7 +13,7 @@ from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import SpecWithOptions
 
 Recipe = Any
-"""`viewsphere.recipe.Recipe`: what a plug-in gets from higher layers has no type here."""
+"""`viewsphere.recipe.recipe.Recipe`: what a plug-in gets from higher layers has no type here."""
 
 SamplingContext = Any
 """`viewsphere.planning.samplers.SamplingContext`."""

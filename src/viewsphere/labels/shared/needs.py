@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from viewsphere.model.rig import Sensor
     from viewsphere.model.scene import Finish
     from viewsphere.model.shot import Shot
-    from viewsphere.recipe import Recipe
+    from viewsphere.recipe.recipe import Recipe
     from viewsphere.truth.lidar.sweeping import Turning
     from viewsphere.truth.shot_views import Followed, Moment, NeighbourViews, Painted
     from viewsphere.truth.surface_points.points import SurfacePoints
