@@ -17,10 +17,10 @@ from viewsphere.check.digests import damaged
 from viewsphere.check.frames.comparing import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
 from viewsphere.formats import native
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.mask import decode_rle, encode_rle
 from viewsphere.labels import Randomness, ShotAppearance, channel_labels, channels, labels, labels_of, object_labels, on_request
 from viewsphere.labels.shared.spec import no_record
-from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
 from viewsphere.run.exports.exporting import export
 from viewsphere.store import Dataset, encode
@@ -107,8 +107,8 @@ LIFTED = ["nocs", "position"]
 """Labels that are proved by depth, where that is exact, and by object coordinates."""
 
 LENSES = {
-    "brown_conrady": Distortion(model="brown_conrady", coefficients=(-0.2, 0.05, 0.001, 0.0, 0.0)),
-    "fisheye": Distortion(model="fisheye", coefficients=(0.02, 0.05, 0.001, 0.0)),
+    "brown_conrady": lens_parameters("brown_conrady", coefficients=(-0.2, 0.05, 0.001, 0.0, 0.0)),
+    "fisheye": lens_parameters("fisheye", coefficients=(0.02, 0.05, 0.001, 0.0)),
 }
 
 

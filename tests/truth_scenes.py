@@ -8,16 +8,17 @@ import numpy as np
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
-from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.geometry.lenses import lens_parameters
+from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.raster.alpha_masks import ENDLESS
 from viewsphere.truth.raster.geometry import Geometry, build_geometry
 from viewsphere.truth.raster.visibility import rasterize
 
-BARREL = Distortion(model="brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))
-RATIONAL = Distortion(model="brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.6, 0.12, 0.02))
-FISHEYE = Distortion(model="fisheye", coefficients=(0.03, -0.004, 0.0007, -0.0001))
+BARREL = lens_parameters("brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))
+RATIONAL = lens_parameters("brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.6, 0.12, 0.02))
+FISHEYE = lens_parameters("fisheye", coefficients=(0.03, -0.004, 0.0007, -0.0001))
 LENSES = {"pinhole": None, "barrel": BARREL, "rational": RATIONAL, "fisheye": FISHEYE}
 
 

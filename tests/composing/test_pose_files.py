@@ -12,8 +12,9 @@ from shots import camera_of
 from viewsphere.composing.viewpoints.pose_files import read_poses
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_angles, orbit_center, orbit_rotation
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.rotation import quaternion_from_matrix
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.camera import Intrinsics
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 
@@ -139,7 +140,7 @@ def test_nerfstudio_is_opengl_camera_to_world_and_brings_its_lens(tmp_path):
     frames = [{"file_path": f"{i}.png", "transform_matrix": (m @ OPENGL).tolist()} for i, m in enumerate(motions())]
     file.write_text(json.dumps({**lens, "frames": frames}))
     agree(cameras(file), motions())
-    bent = Distortion(model="brown_conrady", coefficients=(0.1, 0, 0, 0.01, 0))
+    bent = lens_parameters("brown_conrady", coefficients=(0.1, 0, 0, 0.01, 0))
     expected = Intrinsics(width=640, height=480, fx=500, fy=510, cx=321, cy=239, distortion=bent)
     planned = make(file, camera={"of_viewpoints": True})
     assert planned.intrinsics == expected
@@ -147,7 +148,7 @@ def test_nerfstudio_is_opengl_camera_to_world_and_brings_its_lens(tmp_path):
     assert make(file, camera={"of_viewpoints": True}).intrinsics.fx == pytest.approx(400 / math.tan(0.4))
     file.write_text(json.dumps({"w": 640, "h": 480, "fl_x": 500, "k1": 0.1, "k4": 0.2, "is_fisheye": True, "frames": frames}))
     fisheye = make(file, camera={"of_viewpoints": True}).intrinsics.distortion
-    assert fisheye == Distortion(model="fisheye", coefficients=(0.1, 0, 0, 0.2))
+    assert fisheye == lens_parameters("fisheye", coefficients=(0.1, 0, 0, 0.2))
     file.write_text(json.dumps({"w": 640, "h": 480, "fl_x": 500, "k4": 0.2, "frames": frames}))
     with pytest.raises(RecipeError, match=r"frames\[0\]: k4: expected 0, .*; found 0.2"):
         make(file)
@@ -170,7 +171,7 @@ def test_colmap_is_world_to_camera_and_brings_its_lens(tmp_path):
     folder = colmap(tmp_path / "sparse", motions())
     agree(cameras(folder, up="+z"), motions(), 1e-11)
     agree(cameras(folder / "images.txt", up="+z"), motions(), 1e-11)
-    bent = Distortion(model="brown_conrady", coefficients=(0.1, 0.02, 0.003, 0.004, 0))
+    bent = lens_parameters("brown_conrady", coefficients=(0.1, 0.02, 0.003, 0.004, 0))
     expected = Intrinsics(width=640, height=480, fx=500, fy=510, cx=321, cy=239, distortion=bent)
     assert make(folder, camera={"of_viewpoints": True}).intrinsics == expected
 

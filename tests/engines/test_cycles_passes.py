@@ -13,7 +13,7 @@ from test_physics import SPEC, camera
 from shots import still_shot
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import cycles, raster
-from viewsphere.model.camera import Distortion
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES
 from viewsphere.model.scene import Background, Finish, Ground, Scene
 from viewsphere.model.thing import Thing
@@ -92,7 +92,7 @@ def test_they_are_raster_s(is_catcher):
 def test_lenses_and_passes_alone():
     """Without a picture; with a lens that Blender has not."""
     bent = VIEW.intrinsics.model_copy(
-        update={"distortion": Distortion(model="brown_conrady", coefficients=(-0.1, 0.02, 0, 0, 0))}
+        update={"distortion": lens_parameters("brown_conrady", coefficients=(-0.1, 0.02, 0, 0, 0))}
     )
     view = type(VIEW)(bent, VIEW.R, VIEW.t)
     found = passes(stage_of(cycles, Ground(), samples=16, denoise="off"), view, ALL)

@@ -18,22 +18,23 @@ from viewsphere.engines.shared.blender.options import PRESETS, Options, parse_op
 from viewsphere.engines.shared.blender.requests import scene_request
 from viewsphere.errors import MissingExtraError, RecipeError, UserError, ViewsphereError
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.geometry.lenses import lens_parameters
+from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize
 
 WIDE = {"width": 80, "height": 60, "cx": 37.0, "cy": 33.0}
-BARREL = Distortion(model="brown_conrady", coefficients=(-0.2, 0.03, 0.001, -0.002))
+BARREL = lens_parameters("brown_conrady", coefficients=(-0.2, 0.03, 0.001, -0.002))
 LENSES = {
     "pinhole": Intrinsics(**WIDE, fx=70, fy=60),
     "skew": Intrinsics(**WIDE, fx=70, fy=60, skew=9.0),
     "barrel": Intrinsics(**WIDE, fx=70, fy=60, distortion=BARREL),
     "fisheye 90": Intrinsics(
-        **WIDE, fx=50, fy=50, distortion=Distortion(model="fisheye", coefficients=(0.03, -0.004, 0.0, 0.0))
+        **WIDE, fx=50, fy=50, distortion=lens_parameters("fisheye", coefficients=(0.03, -0.004, 0.0, 0.0))
     ),
-    "fisheye 220": Intrinsics(**WIDE, fx=20, fy=20, distortion=Distortion(model="fisheye", coefficients=(0.0, 0.0, 0.0, 0.0))),
+    "fisheye 220": Intrinsics(**WIDE, fx=20, fy=20, distortion=lens_parameters("fisheye", coefficients=(0.0, 0.0, 0.0, 0.0))),
 }
 
 

@@ -13,7 +13,7 @@ from quick import quick
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import linear as linear_light
 from viewsphere.engines.raster.antialiasing.samples import differs_behind, edge_samples, layers
-from viewsphere.model.camera import Distortion
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.model.scene import Background, Finish, Scene, ViewTransform
 from viewsphere.truth.raster.visibility import rasterize
 
@@ -26,8 +26,8 @@ FILM = unlit(color=(0.1, 0.2, 0.4, 0.5), alpha_mode="BLEND")
 PANE = Material(base_color=(0.9, 0.95, 0.9, 1.0), transmission=1.0, roughness=0.3)
 LENSES = {
     "pinhole": None,
-    "barrel": Distortion(model="brown_conrady", coefficients=(-0.2, 0.05, 0.001, -0.002)),
-    "fisheye": Distortion(model="fisheye", coefficients=(0.02, -0.01, 0.0, 0.0)),
+    "barrel": lens_parameters("brown_conrady", coefficients=(-0.2, 0.05, 0.001, -0.002)),
+    "fisheye": lens_parameters("fisheye", coefficients=(0.02, -0.01, 0.0, 0.0)),
 }
 
 NAMES = ("box", "open", "sheet", "hole", "decal")

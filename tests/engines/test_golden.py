@@ -17,7 +17,8 @@ from PIL import Image
 
 from quick import quick
 from shots import still_shot
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.geometry.lenses import lens_parameters
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
@@ -40,7 +41,7 @@ from viewsphere.run.shots.stages import Stages
 GOLDEN = Path(__file__).parent / "golden"
 WIDTH, HEIGHT = 160, 120
 DIM = Sky(zenith=(0.06, 0.06, 0.07), horizon=(0.06, 0.06, 0.07))
-FISHEYE = Distortion(model="fisheye", coefficients=(0.02, -0.01, 0.0, 0.0))
+FISHEYE = lens_parameters("fisheye", coefficients=(0.02, -0.01, 0.0, 0.0))
 
 SCENES = {
     "car": ("zoo:car", 4, (35, 14, 7.5), None, Scene(sun=Sun(angle_deg=1.5), ground=Ground())),

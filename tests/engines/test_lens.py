@@ -16,8 +16,9 @@ from viewsphere.assets.mesh import Material
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster
 from viewsphere.geometry.camera import pixel_rays, project
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.labels import observe
-from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Scene, ViewTransform
 from viewsphere.model.thing import Motion, Thing
@@ -27,12 +28,12 @@ pytest.importorskip("embreex")
 
 WIDTH, HEIGHT = 240, 200
 LENSES = {
-    "barrel": (60, Distortion(model="brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))),
-    "pincushion": (60, Distortion(model="brown_conrady", coefficients=(0.3, 0.1, -0.002, 0.001))),
-    "rational": (60, Distortion(model="brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.6, 0.12, 0.02))),
-    "fisheye 170": (170, Distortion(model="fisheye", coefficients=(0.03, -0.004, 0.0007, -0.0001))),
-    "fisheye 220": (220, Distortion(model="fisheye", coefficients=(0.01, -0.002, 0.0, 0.0))),
-    "fisheye 300": (300, Distortion(model="fisheye", coefficients=(0.0, 0.0, 0.0, 0.0))),
+    "barrel": (60, lens_parameters("brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))),
+    "pincushion": (60, lens_parameters("brown_conrady", coefficients=(0.3, 0.1, -0.002, 0.001))),
+    "rational": (60, lens_parameters("brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.6, 0.12, 0.02))),
+    "fisheye 170": (170, lens_parameters("fisheye", coefficients=(0.03, -0.004, 0.0007, -0.0001))),
+    "fisheye 220": (220, lens_parameters("fisheye", coefficients=(0.01, -0.002, 0.0, 0.0))),
+    "fisheye 300": (300, lens_parameters("fisheye", coefficients=(0.0, 0.0, 0.0, 0.0))),
 }
 
 

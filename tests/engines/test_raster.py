@@ -15,7 +15,8 @@ from viewsphere.assets.srgb import linear as linear_light
 from viewsphere.engines import raster
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
-from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.geometry.lenses import LensParameters, lens_parameters
+from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, ViewTransform
 from viewsphere.model.thing import Thing
@@ -82,7 +83,7 @@ def camera(
     elevation: float = 0.0,
     distance: float = 1.0,
     target=(0, 0, 0),
-    distortion: Distortion | None = None,
+    distortion: LensParameters | None = None,
 ) -> Camera:
     intrinsics = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=width / 2, cy=height / 2, distortion=distortion)
     a, e = math.radians(azimuth), math.radians(elevation)
@@ -377,8 +378,8 @@ def test_two_runs_are_equal_byte_for_byte():
 @pytest.mark.parametrize(
     "lens",
     [
-        Distortion(model="brown_conrady", coefficients=(-0.2, 0.05, 0.001, -0.002)),
-        Distortion(model="fisheye", coefficients=(0.02, -0.01, 0.0, 0.0)),
+        lens_parameters("brown_conrady", coefficients=(-0.2, 0.05, 0.001, -0.002)),
+        lens_parameters("fisheye", coefficients=(0.02, -0.01, 0.0, 0.0)),
     ],
 )
 def test_distorted_colour_follows_the_labels(lens):
@@ -400,7 +401,7 @@ def test_distorted_texture_is_sampled_along_the_same_rays():
     ramp[..., 0], ramp[..., 1], ramp[..., 3] = np.arange(256), np.arange(256)[:, None], 255
     material = unlit(Texture(0, wrap_s="clamp", wrap_t="clamp"))
     mesh = mesh_of(card(2, 2), material, uv0=CARD_UV, images=(Image("ramp", ramp),))
-    lens = Distortion(model="brown_conrady", coefficients=(-0.2, 0.05, 0.001, -0.002))
+    lens = lens_parameters("brown_conrady", coefficients=(-0.2, 0.05, 0.001, -0.002))
     view = camera(64, 64, 64.0, distance=1.0, distortion=lens)
     from viewsphere.geometry.camera import pixel_rays
 

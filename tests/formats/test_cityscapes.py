@@ -17,7 +17,7 @@ from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats.cityscapes.classes import COLORS, INSTANCES, LABELS, label_of
 from viewsphere.formats.cityscapes.instances import regions
-from viewsphere.model.camera import Distortion
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.model.classes import SemanticClass
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
@@ -213,7 +213,7 @@ def apart(scope):
         ({}, lambda scope: replace(scope, most_objects=1001), "expected at most 1,000 objects in a picture; found 1,001"),
         (
             {},
-            lambda scope: bent(scope, distortion=Distortion(model="brown_conrady", coefficients=(0.1, 0, 0, 0, 0))),
+            lambda scope: bent(scope, distortion=lens_parameters("brown_conrady", coefficients=(0.1, 0, 0, 0, 0))),
             "pinhole",
         ),
         ({}, lambda scope: bent(scope, skew=1.0), "expected cameras without skew; found 1 of camera"),

@@ -15,7 +15,7 @@ from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats.pointcloud import Options, verify
 from viewsphere.geometry.camera import project
-from viewsphere.model.camera import Distortion
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import write
 
@@ -66,7 +66,7 @@ def test_what_is_not_kept_is_not_there():
         sample.point_cloud(surface="all")
 
 
-FISHEYE = LENS.model_copy(update={"distortion": Distortion(model="fisheye", coefficients=(0.02, 0.05, 0.001, 0.0))})
+FISHEYE = LENS.model_copy(update={"distortion": lens_parameters("fisheye", coefficients=(0.02, 0.05, 0.001, 0.0))})
 
 
 @pytest.fixture(scope="module", params=[LENS, FISHEYE], ids=["pinhole", "fisheye"])

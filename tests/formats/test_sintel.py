@@ -11,13 +11,14 @@ from torchvision_readers import torchvision_datasets
 from proven import close, equal
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope, sintel
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.geometry.lenses import lens_parameters
+from viewsphere.model.camera import Intrinsics
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 
 FRAMES = 6
 BENT = Intrinsics(
-    width=160, height=120, fx=170, fy=170, cx=80, cy=60, distortion=Distortion(model="fisheye", coefficients=(0.1, 0, 0, 0))
+    width=160, height=120, fx=170, fy=170, cx=80, cy=60, distortion=lens_parameters("fisheye", coefficients=(0.1, 0, 0, 0))
 )
 
 

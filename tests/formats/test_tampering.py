@@ -24,7 +24,7 @@ from PIL import Image
 
 from cube_dataset import LENS, make
 from viewsphere import Dataset, plugins
-from viewsphere.model.camera import Distortion
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.model.instant import Moment
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
@@ -51,7 +51,7 @@ FLIPS = 4
 
 def moving(root: Path) -> Dataset:
     """Three boxes seen through a lens, with times and tracks."""
-    lens = LENS.model_copy(update={"distortion": Distortion(model="fisheye", coefficients=(0.02, 0.05, 0.001, 0.0))})
+    lens = LENS.model_copy(update={"distortion": lens_parameters("fisheye", coefficients=(0.02, 0.05, 0.001, 0.0))})
     still = make(root / "still", several=True, intrinsics=lens)
     dataset = Dataset(shutil.copytree(still.root, root / "moving"))
     for key, places in still.shots():

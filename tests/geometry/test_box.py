@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from lens_limits import lens_limit
 from quick import quick
 from viewsphere.geometry.box import (
     EDGES,
@@ -13,9 +14,10 @@ from viewsphere.geometry.box import (
     overlap,
     projected_bounds,
 )
-from viewsphere.geometry.camera import lens_limit, orbit_center, orbit_rotation, project
+from viewsphere.geometry.camera import orbit_center, orbit_rotation, project
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.pose_category import SIDES, pose_category
-from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.camera import Camera, Intrinsics
 
 CUBE_TRIANGLES = np.array([(f[a], f[b], f[c]) for f in FACES.values() for a, b, c in ((0, 1, 2), (0, 2, 3))], np.int32)
 
@@ -27,7 +29,7 @@ def camera_at(azimuth=0.0, elevation=0.0, distance=4.0, lens=None, size=(640, 48
 
 
 def bounds_of(camera, vertices, triangles=CUBE_TRIANGLES):
-    return projected_bounds(camera, vertices, triangles, (0, len(triangles)), (0, len(vertices)))
+    return projected_bounds(camera, vertices, triangles)
 
 
 def test_vertices_and_faces_are_those_of_the_design():
@@ -113,12 +115,12 @@ def test_cutting_agrees_with_a_finely_divided_model():
 
 
 LENSES = {
-    "barrel": Distortion(model="brown_conrady", coefficients=(-0.45, 0.25, 0.01, -0.015, -0.02)),
-    "folding": Distortion(model="brown_conrady", coefficients=(-0.3, 0.0, 0.0, 0.0)),
-    "pincushion": Distortion(model="brown_conrady", coefficients=(0.6, 0.4, -0.03, 0.02)),
-    "rational": Distortion(model="brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.9, 0.32, 0.02)),
-    "equidistant": Distortion(model="fisheye", coefficients=(0.0, 0.0, 0.0, 0.0)),
-    "fisheye": Distortion(model="fisheye", coefficients=(-0.12, 0.03, -0.02, 0.003)),
+    "barrel": lens_parameters("brown_conrady", coefficients=(-0.45, 0.25, 0.01, -0.015, -0.02)),
+    "folding": lens_parameters("brown_conrady", coefficients=(-0.3, 0.0, 0.0, 0.0)),
+    "pincushion": lens_parameters("brown_conrady", coefficients=(0.6, 0.4, -0.03, 0.02)),
+    "rational": lens_parameters("brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.9, 0.32, 0.02)),
+    "equidistant": lens_parameters("fisheye", coefficients=(0.0, 0.0, 0.0, 0.0)),
+    "fisheye": lens_parameters("fisheye", coefficients=(-0.12, 0.03, -0.02, 0.003)),
 }
 
 
@@ -207,8 +209,8 @@ def test_boxes_of_triangles_that_leave_the_field_are_exact(name):
 
 def test_an_edge_that_reaches_behind_and_back_is_cut_twice():
     """Both ends are in a fisheye's field, the middle is not; and an edge of which only the middle is."""
-    narrow = Distortion(model="fisheye", coefficients=(-0.2, 0.0, 0.0, 0.0))  # folds at 74 degrees
-    wide = Distortion(model="fisheye", coefficients=(-0.04, 0.0, 0.0, 0.0))  # at 165
+    narrow = lens_parameters("fisheye", coefficients=(-0.2, 0.0, 0.0, 0.0))  # folds at 74 degrees
+    wide = lens_parameters("fisheye", coefficients=(-0.04, 0.0, 0.0, 0.0))  # at 165
     for lens, corners in ((narrow, [[-9, 0.1, 1], [9, 0.1, 1], [0, 9, 1]]), (wide, [[-2, 0.1, -5], [2, 0.1, -5], [0, 5, -5]])):
         intrinsics = Intrinsics(width=640, height=480, fx=150.0, fy=150.0, cx=320.0, cy=240.0, distortion=lens)
         camera, triangle = Camera(intrinsics, np.eye(3), np.zeros(3)), np.array(corners, float)
@@ -221,7 +223,7 @@ def test_an_edge_that_reaches_behind_and_back_is_cut_twice():
 @pytest.mark.parametrize("limit_folds", [False, True])
 def test_what_surrounds_the_camera_fills_a_fisheye(limit_folds):
     """All corners of a cube around the camera may be seen though the middle of its back is not."""
-    lens = Distortion(model="fisheye", coefficients=(-0.04 if limit_folds else 0.0, 0.0, 0.0, 0.0))
+    lens = lens_parameters("fisheye", coefficients=(-0.04 if limit_folds else 0.0, 0.0, 0.0, 0.0))
     intrinsics = Intrinsics(width=640, height=640, fx=90.0, fy=90.0, cx=320.0, cy=320.0, distortion=lens)
     camera = Camera(intrinsics, np.eye(3), np.zeros(3))
     bounds, whole = bounds_of(camera, box_vertices((-1.0,) * 3, (1.1,) * 3))

@@ -5,17 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lens_limits import lens_limit
 from viewsphere.geometry.camera import (
-    focal_from_fov,
     focal_from_sensor,
     inverse_camera_matrix,
-    lens_limit,
     orbit_center,
     orbit_rotation,
     pixel_rays,
     project,
 )
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.geometry.lenses import focal_from_fov, lens_parameters
+from viewsphere.model.camera import Intrinsics
 
 PROFILE = settings(max_examples=25, derandomize=True, deadline=None, database=None)
 
@@ -26,11 +26,11 @@ def intrinsics(distortion=None, width=48, height=36, **fields):
 
 
 def brown(*k):
-    return Distortion(model="brown_conrady", coefficients=k)
+    return lens_parameters("brown_conrady", coefficients=k)
 
 
 def fisheye(*k):
-    return Distortion(model="fisheye", coefficients=k)
+    return lens_parameters("fisheye", coefficients=k)
 
 
 def opencv_brown(k, x, y):
@@ -50,10 +50,10 @@ def test_pinhole_rays_and_projection_by_hand():
     j, k = np.mgrid[:36, :48] + 0.5
     np.testing.assert_allclose(rays, np.stack([k, j, np.ones_like(k)], -1) @ inverse_camera_matrix(i).T, atol=1e-14)
     np.testing.assert_allclose(inverse_camera_matrix(i) @ i.K, np.eye(3), atol=1e-15)
-    pixels, in_front = project(i, [[0.2, -0.1, 2.0], [0.2, -0.1, -2.0], [0.2, 0.1, 0.0]])
+    pixels, is_shown = project(i, [[0.2, -0.1, 2.0], [0.2, -0.1, -2.0], [0.2, 0.1, 0.0]])
     np.testing.assert_allclose(pixels[0], [40 * 0.1 + 1.5 * -0.05 + 23, 42 * -0.05 + 19.5])
     assert np.isnan(pixels[1:]).all()
-    assert in_front.tolist() == [True, False, False]
+    assert is_shown.tolist() == [True, False, False]
 
 
 @pytest.mark.parametrize("lens", [None, brown(-0.2, 0.05, 0.001, -0.002), fisheye(0.03, -0.004, 0.0, 0.0)])
@@ -66,10 +66,10 @@ def test_windows_and_subdivision_continue_the_image(lens):
     np.testing.assert_array_equal(beyond[4:40, 3:51], whole)
     np.testing.assert_allclose(pixel_rays(i, 3)[1::3, 1::3], whole, rtol=1e-12)
     points = whole * 3.7
-    pixels, in_front = project(i, points)
+    pixels, is_shown = project(i, points)
     j, k = np.mgrid[:36, :48] + 0.5
     np.testing.assert_allclose(pixels, np.stack([k, j], -1), atol=1e-9)
-    assert in_front.all()
+    assert is_shown.all()
 
 
 @PROFILE
@@ -120,10 +120,10 @@ def test_folded_rays_are_refused():
     i = intrinsics(lens, 400, 1, fx=200.0, fy=200.0, cx=200.0, cy=0.5, skew=0.0)
     real = np.isfinite(pixel_rays(i)[0, :, 0])
     assert np.array_equal(real, np.abs(np.arange(400) + 0.5 - 200) / 200 < 2 / 3)
-    pixels, in_front = project(i, [[0.99, 0, 1], [1.01, 0, 1], [-5.0, 0, 1]])
+    pixels, is_shown = project(i, [[0.99, 0, 1], [1.01, 0, 1], [-5.0, 0, 1]])
     assert np.isfinite(pixels[0]).all()
     assert np.isnan(pixels[1:]).all()
-    assert in_front.all()
+    assert is_shown.tolist() == [True, False, False]
     assert lens_limit(brown(0.1, 0.02, 0.0, 0.0)) == math.inf
 
 
@@ -139,12 +139,12 @@ def test_fisheye_round_trip(k1, k2, k3, k4):
     assert theta.max() <= lens_limit(lens) + 1e-12
     if lens_limit(lens) > 2:
         assert theta.max() > math.pi / 2
-    pixels, in_front = project(i, rays * 5)
+    pixels, is_shown = project(i, rays * 5)
     j, k = np.mgrid[:36, :48] + 0.5
     inner = real.copy()
     inner[real] = theta < lens_limit(lens) - 1e-6
     np.testing.assert_allclose(pixels[inner], np.stack([k, j], -1)[inner], atol=1e-9)
-    assert np.array_equal(in_front, rays[..., 2] > 0)
+    assert is_shown[inner].all() and not is_shown[~real].any()
 
 
 def test_equidistant_fisheye_in_closed_form():
@@ -152,22 +152,22 @@ def test_equidistant_fisheye_in_closed_form():
     angle = (np.arange(401) - 200) / 100
     expected = np.stack([np.sin(angle), np.zeros(401), np.cos(angle)], axis=-1)
     np.testing.assert_allclose(pixel_rays(i)[0], expected, atol=1e-14)
-    pixels, in_front = project(i, [[0, 0, 2], [1, 0, 0], [0, 0, -1], [0, 0, 0], [1, 0, -1]])
+    pixels, is_shown = project(i, [[0, 0, 2], [1, 0, 0], [0, 0, -1], [0, 0, 0], [1, 0, -1]])
     np.testing.assert_allclose(pixels[:2], [[200.5, 0.5], [200.5 + 50 * math.pi, 0.5]])
     assert np.isnan(pixels[2:4]).all()
     np.testing.assert_allclose(pixels[4], [200.5 + 75 * math.pi, 0.5])
-    assert in_front.tolist() == [True, False, False, False, False]
+    assert is_shown.tolist() == [True, True, False, False, True]
 
 
 @pytest.mark.parametrize("model, count", [("brown_conrady", 3), ("brown_conrady", 6), ("fisheye", 3), ("fisheye", 5)])
 def test_number_of_coefficients(model, count):
     with pytest.raises(ValueError, match=f"expected .* coefficients, got {count}"):
-        Distortion(model=model, coefficients=(0.0,) * count)
+        lens_parameters(model, coefficients=(0.0,) * count)
 
 
 def test_focal_lengths():
     assert focal_from_fov(math.pi / 2, 640) == pytest.approx(320)
-    assert focal_from_fov(math.pi, 640, fisheye=True) == pytest.approx(640 / math.pi)
+    assert focal_from_fov(math.pi, 640, fisheye(0, 0, 0, 0)) == pytest.approx(640 / math.pi)
     assert focal_from_sensor(50.0, 36.0, 720) == pytest.approx(1000)
 
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from quick import quick
 from viewsphere.geometry.box import projected_bounds
 from viewsphere.geometry.camera import orbit_rotation, pixel_rays, project
-from viewsphere.model.camera import Camera, Scan
+from viewsphere.geometry.lenses.scan import Scan
+from viewsphere.model.camera import Camera
 from viewsphere.recipe.lidar import LidarEntry
 
 
@@ -76,7 +77,7 @@ def test_the_box_of_triangles_is_that_of_their_points(name, seed):
     own = SCANS[name]
     corners = rng.normal(size=(3, 3)) + rng.normal(size=3) * rng.choice([0.3, 2.0])
     camera = Camera(own, orbit_rotation(*rng.uniform(-1, 1, 3)), rng.normal(size=3) * 0.2)
-    bounds, whole = projected_bounds(camera, corners, np.array([[0, 1, 2]], np.int32), (0, 1), (0, 3))
+    bounds, whole = projected_bounds(camera, corners, np.array([[0, 1, 2]], np.int32))
     share = np.linspace(0, 1, 401)[:, None, None]
     edges = (1 - share) * corners + share * np.roll(corners, 1, axis=0)
     inner = rng.dirichlet([1, 1, 1], 2000) @ corners
@@ -97,7 +98,7 @@ def test_the_box_of_triangles_is_that_of_their_points(name, seed):
 def test_a_triangle_overhead_lies_all_around():
     camera = Camera(SCANS["turn"], np.eye(3), np.zeros(3))
     overhead = np.array([[-1.0, -1, -1], [1, -1, -1], [0, -1, 2]])
-    (x0, y0, x1, y1), _ = projected_bounds(camera, overhead, np.array([[0, 1, 2]], np.int32), (0, 1), (0, 3))
+    (x0, y0, x1, y1), _ = projected_bounds(camera, overhead, np.array([[0, 1, 2]], np.int32))
     up = (3 - 90) / 4 + 0.5  # rows are four degrees apart
     np.testing.assert_allclose((x0, x1, y0), (0, SCANS["turn"].width, up), atol=1e-9)
     assert y1 < 0

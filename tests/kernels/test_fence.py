@@ -24,7 +24,7 @@ numba = sys.argv[1]
 found = importlib.metadata.version
 importlib.metadata.version = lambda name: numba if name == "numba" else found(name)
 import numpy as np
-from viewsphere.geometry.kernels_lens import radial_fisheye
+from viewsphere.geometry.lenses.shared.kernels_lens import radial_fisheye
 assert radial_fisheye(np.zeros(4), 0.5)[0] == 0.5
 print(*(name for name in ("compiler", "stock") if f"viewsphere.kernels.{name}" in sys.modules))
 """

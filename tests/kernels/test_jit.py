@@ -62,7 +62,7 @@ def of_outer(outer):
 LOOK = """
 import sys
 import numpy as np
-from viewsphere.geometry.kernels_lens import radial_fisheye
+from viewsphere.geometry.lenses.shared.kernels_lens import radial_fisheye
 assert radial_fisheye(np.zeros(4), 0.5)[0] == 0.5
 print("numba.np.arraymath" in sys.modules)
 """

@@ -167,7 +167,7 @@ def test_what_killed_processes_left_goes(root):
 
 USE = """
 import sys, numpy as np
-from viewsphere.geometry.kernels_lens import radial_fisheye
+from viewsphere.geometry.lenses.shared.kernels_lens import radial_fisheye
 assert radial_fisheye(np.zeros(4), 0.5)[0] == 0.5
 print(sum(radial_fisheye.stats.cache_misses.values()))
 """
@@ -192,7 +192,7 @@ def test_a_kernel_is_compiled_once_wherever_its_source_lies(tmp_path, root):
     for source in (tmp_path / "moved").rglob("*.py"):
         os.utime(source, (1, 1))
     assert compiled(tmp_path, tmp_path / "moved")[0] == 0
-    lens = tmp_path / "moved" / "viewsphere" / "geometry" / "kernels_lens.py"
+    lens = tmp_path / "moved" / "viewsphere" / "geometry" / "lenses" / "shared" / "kernels_lens.py"
     lens.write_text(lens.read_text() + "\n# another\n")
     assert compiled(tmp_path, tmp_path / "moved")[0] == 1
 

@@ -81,7 +81,8 @@ def test_a_written_table_is_read_again(tmp_path, monkeypatch):
     overloads.table.cache_clear()
 
 
-LENS = Overload("viewsphere.geometry.kernels_lens", "radial_fisheye", '[["float64", 1, "C"], "float64"]')
+LENS_KERNELS = "viewsphere.geometry.lenses.shared.kernels_lens"
+LENS = Overload(LENS_KERNELS, "radial_fisheye", '[["float64", 1, "C"], "float64"]')
 
 
 def test_one_that_cannot_be_compiled_is_left_to_its_callers():
@@ -99,7 +100,10 @@ def test_one_that_cannot_be_compiled_is_left_to_its_callers():
 @pytest.mark.slow
 def test_kernels_are_compiled_by_processes_of_their_own(tmp_path, monkeypatch):
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
-    some = [LENS, Overload("viewsphere.geometry.kernels_lens", "radial_fisheye", '[["float64", 1, "C"], "int64"]')]
+    some = [
+        LENS,
+        Overload(LENS_KERNELS, "radial_fisheye", '[["float64", 1, "C"], "int64"]'),
+    ]
     told = []
     assert set(compile_all(some, lambda done, total: told.append((done, total)), 2)) == set(some)
     assert told[0] == (0, 2) and told[-1] == (2, 2) and told == sorted(told)

@@ -19,7 +19,7 @@ def tripled(x):
 USE = """
 import numba
 import numpy as np
-from viewsphere.geometry.kernels_lens import radial_fisheye
+from viewsphere.geometry.lenses.shared.kernels_lens import radial_fisheye
 assert radial_fisheye(np.zeros(4), 0.5)[0] == 0.5
 from theirs import tripled
 assert tripled(2) == 6

@@ -13,9 +13,9 @@ import viewsphere as vs
 from proven import close, equal, told
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import pixel_rays
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.labels import object_labels, on_request
-from viewsphere.model.camera import Distortion
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import Sample
 from viewsphere.store.shots.sample_records import from_whole_sample, whole_sample
@@ -23,9 +23,7 @@ from viewsphere.store.shots.sample_records import from_whole_sample, whole_sampl
 ASKED = ("amodal", "occluders", "depth_order", "occlusion_level", "truncation_level", "obb", "contour", "birds_eye")
 LENSES = {
     "pinhole": LENS,
-    "fisheye": LENS.model_copy(
-        update={"distortion": Distortion(model="fisheye", coefficients=(0.03, -0.004, 0.0007, -0.0001))}
-    ),
+    "fisheye": LENS.model_copy(update={"distortion": lens_parameters("fisheye", coefficients=(0.03, -0.004, 0.0007, -0.0001))}),
 }
 
 

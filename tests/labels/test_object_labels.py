@@ -13,10 +13,11 @@ from shots import still_shot
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices, clip_to_image
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
 from viewsphere.labels import REGULAR, annotated, context_of, labels_of, object_labels
 from viewsphere.labels.shared.placement import view_of
-from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -263,7 +264,7 @@ def test_the_ground_hides_only_from_below(elevation):
 
 
 def test_lens_distortion_is_followed():
-    lens = Distortion(model="brown_conrady", coefficients=(-0.3, 0.1, 0.0, 0.0))
+    lens = lens_parameters("brown_conrady", coefficients=(-0.3, 0.1, 0.0, 0.0))
     (cube,), *_ = scene([UNIT], [at(x=1.0)], intrinsics=LENS.model_copy(update={"distortion": lens}))
     corners = cube.box3d_camera[[0, 1, 4, 5]]
     r2 = ((corners[:, :2] / corners[:, 2:]) ** 2).sum(axis=1)
@@ -281,7 +282,7 @@ def test_wrong_numbers_of_models_are_refused():
 
 def test_a_record_gives_back_every_bit():
     tilted = Viewpoint(index=3, azimuth_deg=0.1, elevation_deg=1 / 3, distance=4, tilt_deg=7, target=(0, 0, 0.1))
-    lens = LENS.model_copy(update={"distortion": Distortion(model="fisheye", coefficients=(0.1, 0, 0, 0))})
+    lens = LENS.model_copy(update={"distortion": lens_parameters("fisheye", coefficients=(0.1, 0, 0, 0))})
     motions = [at(turn=0.3), at(y=-9), at(x=3)]
     objects, camera, _, visibility, pose = scene([UNIT] * 3, motions, tilted, lens)
     channels = {"instances": visibility.triangle}
@@ -306,7 +307,7 @@ def test_a_record_gives_back_every_bit():
 
 
 def test_an_object_that_fills_the_whole_field_of_a_lens():
-    narrow = LENS.model_copy(update={"distortion": Distortion(model="brown_conrady", coefficients=(-50, 0, 0, 0))})
+    narrow = LENS.model_copy(update={"distortion": lens_parameters("brown_conrady", coefficients=(-50, 0, 0, 0))})
     pose = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1.5)
     (cube,), *_ = scene([UNIT], [at()], pose, narrow)  # no edge of it is where the lens sees
     assert cube.area > 100

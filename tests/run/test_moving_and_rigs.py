@@ -10,7 +10,8 @@ import pytest
 
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.geometry.lenses import lens_parameters
+from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig, Sensor
@@ -49,7 +50,7 @@ def moving_shot(engine="raster") -> Shot:
 
 def rig_shot(engine="raster") -> Shot:
     """Two cameras, the second wider, smaller, bent, and mounted to the right of the first, turned inwards."""
-    bent = Distortion(model="brown_conrady", coefficients=(-0.2, 0.05, 0.001, -0.002))
+    bent = lens_parameters("brown_conrady", coefficients=(-0.2, 0.05, 0.001, -0.002))
     wide = Intrinsics(width=80, height=60, fx=50, fy=52, cx=39, cy=31, distortion=bent if engine == "raster" else None)
     c, s = math.cos(-0.12), math.sin(-0.12)
     mounted = ((c, 0.0, s, 0.5), (0.0, 1.0, 0.0, 0.05), (-s, 0.0, c, -0.1), (0.0, 0.0, 0.0, 1.0))

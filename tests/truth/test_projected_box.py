@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from quick import quick
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 from viewsphere.geometry.box import projected_bounds
-from viewsphere.model.camera import Distortion
+from viewsphere.geometry.lenses import lens_parameters
 
 STRONG = {
     **LENSES,
-    "folding": Distortion(model="brown_conrady", coefficients=(-0.3, 0.0, 0.0, 0.0)),
-    "shifted": Distortion(model="brown_conrady", coefficients=(-0.45, 0.25, 0.01, -0.015, -0.02)),
-    "equidistant": Distortion(model="fisheye", coefficients=(0.0, 0.0, 0.0, 0.0)),
-    "folding fisheye": Distortion(model="fisheye", coefficients=(-0.12, 0.03, -0.02, 0.003)),
+    "folding": lens_parameters("brown_conrady", coefficients=(-0.3, 0.0, 0.0, 0.0)),
+    "shifted": lens_parameters("brown_conrady", coefficients=(-0.45, 0.25, 0.01, -0.015, -0.02)),
+    "equidistant": lens_parameters("fisheye", coefficients=(0.0, 0.0, 0.0, 0.0)),
+    "folding fisheye": lens_parameters("fisheye", coefficients=(-0.12, 0.03, -0.02, 0.003)),
 }
 ROUNDING = 1e-5
 
@@ -51,8 +51,7 @@ def test_no_pixel_of_a_model_lies_outside_its_box(name, seed, model):
     camera = orbit_camera(intrinsics, *rng.uniform(-3, 3, 2), 10 ** rng.uniform(-1, 1), tilt=rng.uniform(-1, 1))
     window = (-96, -72, 192, 144)
     rows, columns = np.nonzero(silhouette(geometry, camera, 1, window))
-    bounds, whole = projected_bounds(camera, geometry.vertices, geometry.triangles, (0, len(geometry.triangles)),
-                                     (0, len(geometry.vertices)))  # fmt: skip
+    bounds, whole = projected_bounds(camera, geometry.vertices, geometry.triangles)
     if not len(rows):
         return
     assert bounds is not None

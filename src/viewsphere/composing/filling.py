@@ -108,10 +108,7 @@ def share_filled(camera: Camera, placed: Sequence[Shape]) -> float:
     """The larger of box width / picture width and box height / picture height, of the box around all shapes, which stand in
     the world, as the camera projects them: that of the label `box2d_unclipped`. Infinite where it does not show all of them.
     """
-    boxes = [
-        projected_bounds(camera, s.vertices, s.triangles, (0, len(s.triangles)), (0, len(s.vertices)), s.is_used)
-        for s in placed
-    ]
+    boxes = [projected_bounds(camera, s.vertices, s.triangles, s.is_used) for s in placed]
     if not all(whole and bounds for bounds, whole in boxes):
         return math.inf
     corners = np.array([bounds for bounds, _ in boxes])

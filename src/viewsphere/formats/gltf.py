@@ -34,7 +34,6 @@ from viewsphere.formats import Scope
 from viewsphere.formats.shared.cameras import opengl_pose
 from viewsphere.formats.shared.writing.export_files import check_files
 from viewsphere.formats.shared.writing.refusals import any_camera
-from viewsphere.model.camera import Distortion
 from viewsphere.model.classes import thing_class
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec, Remark
@@ -150,7 +149,7 @@ def _known(sample: Sample) -> list[ObjectAnnotation]:
 def _looking(sample: Sample) -> Looking | None:
     """A sample's camera, None where it is not known, or is a LiDAR."""
     camera = sample.known_camera
-    if camera is None or not isinstance(camera.distortion, Distortion | None):
+    if camera is None or camera.lens.is_scan:
         return None
     lens = camera.intrinsics
     extras = {
@@ -161,7 +160,7 @@ def _looking(sample: Sample) -> Looking | None:
         "width": lens.width,
         "height": lens.height,
         "K": lens.K.tolist(),
-        "distortion": lens.distortion and lens.distortion.model_dump(mode="json"),
+        "distortion": camera.lens.record,
     }
     yfov, aspect = 2 * math.atan(lens.height / 2 / lens.fy), (lens.width / lens.fx) / (lens.height / lens.fy)
     return Looking(f"{sample.index:08d} {sample.sensor}", opengl_pose(camera), yfov, aspect, extras)

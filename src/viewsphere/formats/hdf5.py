@@ -163,12 +163,10 @@ def _state(o: ObjectAnnotation) -> dict[str, Any]:
 
 
 def _camera(sample: Sample) -> dict[str, Any]:
-    camera, lens = sample.camera, sample.camera.distortion
+    camera, bent = sample.camera, sample.camera.lens.flat_record
     matrix = camera.K - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
     told = {"cam_K": matrix, "cam_R_w2c": camera.R, "cam_t_w2c": camera.t}
-    return {key: value.ravel().tolist() for key, value in told.items()} | (
-        {} if lens is None else {"distortion": {"model": lens.model, "coefficients": lens.coefficients}}
-    )
+    return {key: value.ravel().tolist() for key, value in told.items()} | ({"distortion": bent} if bent else {})
 
 
 def _library() -> Any:

@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.cameras import Rigs
-from viewsphere.formats.shared.writing.refusals import known_cameras, no_skew
+from viewsphere.formats.shared.writing.refusals import known_cameras, no_skew, opencv_lenses
 from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.geometry.rotation import product, rotation_vector, transform
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
@@ -41,9 +41,10 @@ Value = int | str | NDArray[np.float64]
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Cameras that nobody knows, and skew."""
+    """Cameras that nobody knows, skew, and lenses that OpenCV does not have."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
+    yield from opencv_lenses(scope)
 
 
 class Opencv(Tree):
@@ -56,9 +57,9 @@ class Opencv(Tree):
     def of(self, sample: Sample) -> Iterator[File]:
         """A picture's camera, with its pose."""
         camera = sample.camera
-        if isinstance(camera.distortion, Distortion | None):
-            if camera.intrinsics.skew:
-                raise UserError(f"opencv: frame {sample.index}: expected a camera without skew; found another")
+        if not camera.lens.is_scan:
+            if camera.intrinsics.skew or camera.lens.opencv is None:
+                raise UserError(f"opencv: frame {sample.index}: expected a camera of OpenCV's without skew; found another")
             pose = {"R": camera.R, "tvec": camera.t[:, None], "rvec": rotation_vector(camera.R)[:, None]}
             yield File(f"pictures/{self.stem(sample)}.yaml", _yaml({**_lens(camera.intrinsics), **pose}))
 
@@ -91,11 +92,12 @@ def _matrix(lens: Intrinsics) -> NDArray[np.float64]:
 
 def _bent(lens: Intrinsics) -> NDArray[np.float64]:
     """The coefficients, (1, N)."""
-    return np.array([lens.distortion.coefficients if isinstance(lens.distortion, Distortion) else [0.0] * 5])
+    own = lens.lens.opencv
+    return np.array([own.coefficients if own and own.coefficients else [0.0] * 5])
 
 
 def _is_fisheye(lens: Intrinsics) -> bool:
-    return isinstance(lens.distortion, Distortion) and lens.distortion.model == "fisheye"
+    return lens.lens.opencv is not None and lens.lens.opencv.is_fisheye
 
 
 def _lens(lens: Intrinsics) -> dict[str, Value]:

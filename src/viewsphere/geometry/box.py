@@ -6,15 +6,13 @@ pixel corners (x0, y0, x1, y1).
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from viewsphere.geometry.lens import Camera, Distortion
+    from viewsphere.geometry.lens import Camera
 
 Float = NDArray[np.float64]
 Bounds = tuple[float, float, float, float]
@@ -49,12 +47,6 @@ NEAR = 1e-6
 
 ROUNDING = 1e-9
 """By how much, in metres a metre, a sum of coordinates may miss the depth that it stands for: generously."""
-
-KNOTS = 1024
-"""Steps, from its axis to its limit, of the table that says how much the lens bends lines."""
-
-RIM = 1 << 14
-"""Number of directions along a lens' limit at which its rim is searched."""
 
 
 def box_vertices(low: ArrayLike, high: ArrayLike) -> Float:
@@ -91,88 +83,14 @@ def is_behind(camera: Camera, bounds: Float) -> bool:
 
 
 def projected_bounds(
-    camera: Camera,
-    vertices: Float,
-    triangles: NDArray[np.int32],
-    faces: tuple[int, int],
-    points: tuple[int, int],
-    is_used: NDArray[np.bool_] | None = None,
+    camera: Camera, vertices: Float, triangles: NDArray[np.int32], is_used: NDArray[np.bool_] | None = None
 ) -> tuple[Bounds | None, bool]:
-    """The 2D box (x0, y0, x1, y1) in pixels of triangles [faces) whose corners are world vertices [points), and whether the
-    camera sees all of the triangles. `is_used`, if given: a mask of the vertices that triangles use. In a scan, the box spans
-    the full circle if the triangles do, or if they cross its first and last column.
-
-    Triangles that cross the plane z = NEAR of the camera (or the limit of a distorted lens) are cut there.
-    None if no part of them is in front of the camera. Under lens distortion straight edges bend; the box is
-    that of the bent edges, to 1e-5 px.
+    """The 2D box (x0, y0, x1, y1) in pixels of triangles (n, 3) whose corners are world vertices (v, 3), None if the camera
+    sees none of them; and whether it sees all. `is_used`, if given: a mask of the vertices that triangles use.
     """
-    from viewsphere.geometry import kernels_bent
-    from viewsphere.geometry import kernels_box as kernels
-
-    if faces[0] == faces[1]:
+    if not len(triangles):
         return None, True
     if is_used is None:
         is_used = np.zeros(len(vertices), np.bool_)
-        is_used[triangles[faces[0] : faces[1]]] = True
-    base, stop = points
-    used = is_used[base:stop]
-    if camera.distortion is not None and camera.distortion.model == "scan":
-        return _scanned(camera, vertices[base:stop], used, triangles[faces[0] : faces[1]] - np.int32(base)), True
-    if camera.distortion is not None:
-        lens, rim = _bent_lens(camera.distortion, camera.K)
-        room = np.empty((stop - base, 6))
-        box, whole = kernels_bent.bent_bounds(vertices, used, base, triangles, *faces, camera.R, camera.t, lens, rim, room)
-        return (box if box[0] <= box[2] else None), whole
-    x0, y0, x1, y1, front = kernels.whole_bounds(vertices, used, base, camera.K, camera.R, camera.t, NEAR)
-    if front:
-        return (x0, y0, x1, y1), True
-    x0, y0, x1, y1, whole = kernels.cut_bounds(vertices, triangles, *faces, *points, camera.K, camera.R, camera.t, NEAR)
-    return ((x0, y0, x1, y1) if x0 <= x1 else None), bool(whole)
-
-
-def _scanned(camera: Camera, vertices: Float, used: NDArray[np.bool_], triangles: NDArray[np.int32]) -> Bounds:
-    """The 2D box of triangles (n, 3) of vertices (v, 3) in a scan."""
-    from viewsphere.geometry import kernels_scan
-    from viewsphere.geometry.camera import coefficients
-
-    assert camera.distortion is not None
-    room = np.empty((len(vertices), 5))
-    u0, v0, u1, v1 = kernels_scan.bounds(vertices, used, triangles, camera.R, camera.t, coefficients(camera.distortion), room)
-    (fx, skew, cx), (_, fy, cy), _ = camera.K.tolist()
-    assert skew == 0
-    return fx * u0 + cx, fy * v0 + cy, fx * u1 + cx, fy * v1 + cy
-
-
-def _bent_lens(lens: Distortion, matrix: Float) -> tuple[tuple[Any, ...], Float]:
-    """A lens as `kernels_bent` takes it, and its rim: the directions (M, 3) at its limit where u or v is extreme."""
-    from viewsphere.geometry.camera import coefficients, lens_limit
-
-    fisheye, k = lens.model == "fisheye", coefficients(lens)
-    limit = lens_limit(lens) if fisheye else min(float(np.nextafter(lens_limit(lens), 0)), 1 / NEAR)
-    skew = float(matrix[0, 1] / matrix[0, 0])
-    return (fisheye, k, limit, matrix, _bends(fisheye, tuple(k.tolist()), limit)), _rim(fisheye, tuple(k.tolist()), limit, skew)
-
-
-@lru_cache(maxsize=64)
-def _bends(fisheye: bool, k: tuple[float, ...], limit: float) -> Float:
-    from viewsphere.geometry import kernels_bent
-
-    table = np.empty(KNOTS + 1)
-    kernels_bent.tabulate(fisheye, np.array(k), limit, table)
-    return table
-
-
-@lru_cache(maxsize=64)
-def _rim(fisheye: bool, k: tuple[float, ...], limit: float, skew: float) -> Float:
-    """Directions (M, 3) along a lens' limit whose pixels are locally farthest left, right, up or down."""
-    from viewsphere.geometry import kernels_lens as kernels
-
-    turn, within = np.linspace(0, 2 * np.pi, RIM, endpoint=False), limit * (1 - 1e-12)
-    r, z = (math.sin(within), math.cos(within)) if fisheye else (within, 1.0)
-    directions = np.stack([r * np.cos(turn), r * np.sin(turn), np.full(RIM, z)], axis=1)
-    seen = np.empty((RIM, 2))
-    (kernels.distort_fisheye if fisheye else kernels.distort_brown)(np.array(k), limit, directions, seen)
-    turns = np.zeros(RIM, np.bool_)
-    for along in (seen[:, 0] + skew * seen[:, 1], seen[:, 1]):
-        turns |= (along > np.roll(along, 1)) != (np.roll(along, -1) > along)
-    return directions[turns]
+        is_used[triangles] = True
+    return camera.lens.bounds(camera.R, camera.t, vertices, is_used, triangles)

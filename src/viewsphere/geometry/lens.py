@@ -4,27 +4,19 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+if TYPE_CHECKING:
+    from viewsphere.geometry.lenses import Lens, LensParameters
+
 Float = NDArray[np.float64]
 
 
-class Distortion(Protocol):
-    """OpenCV's standard model (Brown and Conrady) or its fisheye model, and their coefficients in OpenCV's order; or a scan,
-    whose coefficients are the azimuth of its middle and the elevations of its rings, degrees.
-    """
-
-    @property
-    def model(self) -> Literal["brown_conrady", "fisheye", "scan"]: ...
-    @property
-    def coefficients(self) -> tuple[float, ...]: ...
-
-
 class Intrinsics(Protocol):
-    """Image size in pixels, the pinhole matrix K (3, 3), and its numbers; None for `distortion` means there is none."""
+    """Image size in pixels, the camera matrix K (3, 3), its numbers, and the lens; None for `distortion` means a pinhole."""
 
     @property
     def width(self) -> int: ...
@@ -41,9 +33,11 @@ class Intrinsics(Protocol):
     @property
     def skew(self) -> float: ...
     @property
-    def distortion(self) -> Distortion | None: ...
+    def distortion(self) -> LensParameters | None: ...
     @property
     def K(self) -> Float: ...
+    @property
+    def lens(self) -> Lens: ...
 
 
 class Camera(Protocol):
@@ -64,4 +58,4 @@ class Camera(Protocol):
     @property
     def height(self) -> int: ...
     @property
-    def distortion(self) -> Distortion | None: ...
+    def lens(self) -> Lens: ...

@@ -26,13 +26,13 @@ def of(placement: Placement) -> Mapping[str, Any]:
     """The model's box, moved to the world, to the camera and projected."""
     in_world = transform(placement.world_from_object, placement.box)
     in_camera = transform(placement.camera_from_world, in_world)
-    pixels, in_front = project(placement.camera.intrinsics, in_camera)
+    pixels, _ = project(placement.camera.intrinsics, in_camera)
     return {
         "box3d_object": np.array(placement.box, np.float64),
         "box3d": in_world,
         "box3d_camera": in_camera,
         "box3d_pixels": pixels,
-        "box3d_in_front": in_front,
+        "box3d_in_front": in_camera[:, 2] > 0,
     }
 
 
@@ -60,7 +60,7 @@ def _projected(sample: Sample, o: ObjectAnnotation) -> Iterator[str]:
     if not np.array_equal(in_front, o.box3d_in_front):
         yield f"object {o.id}: expected vertices in front {in_front.tolist()}, found {o.box3d_in_front.tolist()}"
         return
-    if camera.distortion is None:
+    if camera.lens.is_linear:
         expected = np.full((8, 2), np.nan)
         expected[in_front] = homogeneous[in_front, :2] / homogeneous[in_front, 2:]
     else:

@@ -36,8 +36,9 @@ def _projected(context: LabelContext, i: int) -> Any:
     g, camera = context.geometry, context.camera
     own = slice(g.vertex_start[i], g.vertex_start[i + 1])
     vertices = g.places(i)[g.is_used[own]]
-    pixels, in_front = project(camera.intrinsics, transform(rigid(camera.R, camera.t), vertices))
-    if not len(pixels) or not in_front.all() or not np.isfinite(pixels).all():
+    in_camera = transform(rigid(camera.R, camera.t), vertices)
+    pixels, _ = project(camera.intrinsics, in_camera)
+    if not len(pixels) or not (in_camera[:, 2] > 0).all() or not np.isfinite(pixels).all():
         return None
     return smallest_rectangle(convex_hull(pixels))
 

@@ -30,7 +30,6 @@ from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.ids import in_attributes
 from viewsphere.labels.shared.needs import ShotAppearance
 from viewsphere.labels.shared.spec import Drawing, Models, SampleLabel
-from viewsphere.model.camera import Scan
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Portion
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -211,7 +210,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         text = _text(one, {o.id: o for o in visible})
         if text != one.text:
             yield f"object {one.object}: expected {text!r}, by the parts of the expression; found {one.text!r:.80}"
-    if "looks" in sample.requested and not isinstance(sample.camera.distortion, Scan):
+    if "looks" in sample.requested and not sample.camera.lens.is_scan:
         options = Referring.model_validate(sample.options.get("referring", {}))
         words = {o.id: (o.color or "", o.material or "") for o in visible}
         scene = Scene(visible, words, (sample.width, sample.height))

@@ -12,7 +12,7 @@ import xxhash
 from numpy.typing import NDArray
 
 from viewsphere.geometry import voxels
-from viewsphere.geometry.camera import has_unit_rays, pixel_rays, project
+from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels.shared.class_maps import KEY, with_classes
 from viewsphere.labels.shared.drawing.voxel_view import drawn
@@ -167,7 +167,7 @@ def _slabs(camera: Camera, grid: Grid) -> Iterator[tuple[tuple[slice, slice], Fl
 def _along(camera: Camera, points: Float) -> Float:
     """Return the lengths whose inverse is the 1/s of `truth.raster.visibility`."""
     x, y, z = points.T
-    return np.sqrt(x * x + y * y + z * z) if has_unit_rays(camera.distortion) else np.ascontiguousarray(z)
+    return np.sqrt(x * x + y * y + z * z) if camera.lens.has_unit_rays else np.ascontiguousarray(z)
 
 
 def _seen_cells(context: LabelContext, grid: Grid) -> tuple[Rows, tuple[Rows, Rows]]:

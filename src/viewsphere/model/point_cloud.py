@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError, UserError
-from viewsphere.geometry.camera import has_unit_rays, pixel_rays
+from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import Sample
@@ -60,10 +60,10 @@ class PointCloud:
 
 def _visible(sample: Sample) -> PointCloud:
     """A point for each pixel that shows something, row by row."""
-    rays, lens = pixel_rays(sample.camera.intrinsics), sample.camera.distortion
+    rays = pixel_rays(sample.camera.intrinsics)
     if "depth_ray" in sample.channels:
         lengths = _needed(sample, "depth_ray").astype(np.float64)
-        if not has_unit_rays(lens):
+        if not sample.camera.lens.has_unit_rays:
             lengths = lengths / np.sqrt((rays * rays).sum(axis=-1))
     else:
         with np.errstate(divide="ignore"):

@@ -14,11 +14,10 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import os
 import pkgutil
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib import metadata
 from operator import attrgetter
@@ -26,12 +25,14 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 from viewsphere.errors import PluginError, UserError
+from viewsphere.plugin_modules import Changes, changes, entry_points, of_group
 
 Kind = Literal[
     "engines",
     "families",
     "formats",
     "labels",
+    "lenses",
     "lights",
     "materials",
     "motions",
@@ -67,6 +68,7 @@ SEAMS: dict[Kind, Seam] = {
     "families": Seam("", "FAMILY"),
     "formats": Seam("viewsphere.formats", "FORMAT"),
     "labels": Seam("viewsphere.labels", "LABEL", "LABELS"),
+    "lenses": Seam("viewsphere.geometry.lenses", "LENS"),
     "lights": Seam("viewsphere.recipe.lights", "LIGHT"),
     "materials": Seam("viewsphere.materials", "MATERIAL"),
     "motions": Seam("viewsphere.composing.motion", "MOTION"),
@@ -84,9 +86,6 @@ PACKAGES = "viewsphere.packages"
 
 OWN = "viewsphere"
 """The distribution of the built-in plug-ins."""
-
-Changes = tuple[tuple[str, int], ...]
-"""Folders, and when each was last changed."""
 
 
 def names(kind: Kind) -> tuple[str, ...]:
@@ -157,7 +156,7 @@ def shipped(kind: Kind) -> Mapping[str, str]:
 
 def _found(kind: Kind) -> Mapping[str, _Found]:
     """The plug-ins of a kind by name; listed again after a package was installed or a folder of plug-ins was changed."""
-    installed = _changes(sys.path)
+    installed = changes(sys.path)
     packages = _packages(installed, kind)
     return _table(installed, kind, tuple((package, _folders(package.module)) for package in packages))
 
@@ -166,13 +165,13 @@ def _found(kind: Kind) -> Mapping[str, _Found]:
 def _packages(installed: Changes, kind: Kind) -> tuple[_Found, ...]:
     """The packages with a plug-in of the kind in each module: our own, and those that entry points name."""
     own = (_Found(SEAMS[kind].package),) if SEAMS[kind].package else ()
-    return *own, *(_entered(entry) for entry in _of_group(installed, PACKAGES) if entry.name == kind)
+    return *own, *(_entered(entry) for entry in of_group(installed, PACKAGES) if entry.name == kind)
 
 
 def _folders(package: str) -> Changes:
     """The folders of a package; none for one that cannot be imported."""
     try:
-        return _changes(importlib.import_module(package).__path__)
+        return changes(importlib.import_module(package).__path__)
     except Exception:
         return ()
 
@@ -186,7 +185,7 @@ def _table(installed: Changes, kind: Kind, packages: tuple[tuple[_Found, Changes
     for package, folders in packages:
         held = _plugins_in(folders, package.module, SEAMS[kind]) if folders else {package.module: package.module}
         found |= {name: package._replace(module=module) for name, module in held.items()}
-    return found | {entry.name: _entered(entry) for entry in _of_group(installed, f"viewsphere.{kind}")}
+    return found | {entry.name: _entered(entry) for entry in of_group(installed, f"viewsphere.{kind}")}
 
 
 def _entered(entry: metadata.EntryPoint) -> _Found:
@@ -263,38 +262,6 @@ def _file(module: str) -> str:
     except Exception:  # its package may be what cannot be imported
         return module
     return module if found is None or found.origin is None else found.origin
-
-
-def entry_points(group: str) -> metadata.EntryPoints:
-    """The installed entry points of this group.
-
-    Those of all packages are read once, and again after one was installed or removed: reading them takes 10 ms.
-    """
-    return _of_group(_changes(sys.path), group)
-
-
-@lru_cache(maxsize=2 * len(SEAMS))
-def _of_group(paths: Changes, group: str) -> metadata.EntryPoints:
-    return _installed(paths).select(group=group)
-
-
-@lru_cache(maxsize=1)
-def _installed(_paths: Changes) -> Any:
-    """Entry points of the packages in these folders, as they were last changed at these times."""
-    return metadata.entry_points()
-
-
-def _changes(paths: Iterable[str]) -> Changes:
-    return tuple((path, _changed(path)) for path in paths)
-
-
-def _changed(path: str) -> int:
-    """Return the time at which a folder was last changed, ns; 0 if there is no folder."""
-    try:
-        # Asked a thousand times a run: making a Path takes longer than the system's answer.
-        return os.stat(path or ".").st_mtime_ns  # noqa: PTH116
-    except OSError:
-        return 0
 
 
 def attribute(path: str) -> Any:

@@ -8,7 +8,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, model_validator
 
-from viewsphere.model.camera import Intrinsics, Scan
+from viewsphere.geometry.lenses import lens_parameters
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.lidar import Lidar
 from viewsphere.model.numbers import Count, Length, Metres, Number, Portion, Positive
@@ -114,7 +115,7 @@ class LidarEntry(Frozen):
     def intrinsics(self) -> Intrinsics:
         """The rays, as a lens: a row a ring from the highest, a column an azimuth from the left."""
         rings, width = self._rings, round((self.azimuth[1] - self.azimuth[0]) / self.azimuth_step)
-        scan = Scan(elevations_deg=rings, turn_deg=-sum(self.azimuth) / 2 + 0.0)
+        scan = lens_parameters("scan", elevations_deg=rings, turn_deg=-sum(self.azimuth) / 2 + 0.0)
         across = math.radians(self.azimuth[1] - self.azimuth[0])
         return Intrinsics(width=width, height=len(rings), fx=width / across, fy=1, cx=width / 2, cy=0, distortion=scan)
 

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
 
-from viewsphere.model.camera import Distortion
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Length, Metres, Number, Positive
 from viewsphere.model.validation_errors import shown
+from viewsphere.recipe.lens import DistortionField
 from viewsphere.recipe.lidar import LidarEntry
 from viewsphere.recipe.scene import CameraEntry, CameraMatrix, PictureSize, Row
 from viewsphere.recipe.values import OrShort, pair
@@ -51,7 +51,7 @@ class SensorEntry(Frozen):
         default=None, description="as in camera"
     )
     K: CameraMatrix | None = Field(default=None, description="as in camera")
-    distortion: Distortion | None = Field(
+    distortion: DistortionField | None = Field(
         default=None, description="as in camera; a sensor with its own lens does not inherit the camera's"
     )
     lidar: LidarEntry | None = Field(default=None, description="instead of a lens: a LiDAR, with its rings, columns and noise")

@@ -18,8 +18,9 @@ from pydantic import (
     model_validator,
 )
 
-from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.geometry.camera import focal_from_sensor
+from viewsphere.geometry.lenses import focal_from_fov
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Number, Positive
 from viewsphere.model.scene import WEATHER
@@ -38,6 +39,7 @@ from viewsphere.recipe.finish import (
     ViewField,
     once_a_sequence,
 )
+from viewsphere.recipe.lens import DistortionField
 from viewsphere.recipe.light import SKY_SUFFIXES, GradientEntry, HdriSky, SkyField, SunField
 from viewsphere.recipe.lights import LightsField, spec_of
 from viewsphere.recipe.scenery import CompanyEntry, CompanyField, Draw, PlaceEntry, PlaceField, PlaneEntry, PlanesField
@@ -115,7 +117,9 @@ class CameraEntry(Frozen):
         description="[cx, cy] in pixels, origin at the image's corner, each a number or a distribution; by default the "
         "centre, or from K",
     )
-    distortion: Distortion | None = Field(default=None, description="lens distortion with OpenCV's coefficients")
+    distortion: DistortionField | None = Field(
+        default=None, description="lens model and its parameters: {model: fisheye, coefficients: [k1, k2, k3, k4]}"
+    )
     of_viewpoints: Literal[True] | None = Field(
         default=None, description="true: size and lens from the viewpoints' file (nerfstudio, COLMAP)"
     )
@@ -170,8 +174,7 @@ class CameraEntry(Frozen):
         else:
             assert self.fov_deg is not None
             across = width if self.fov_axis == "horizontal" else height
-            is_fisheye = self.distortion is not None and self.distortion.model == "fisheye"
-            fx = fy = focal_from_fov(math.radians(self.fov_deg), across, is_fisheye)
+            fx = fy = focal_from_fov(math.radians(self.fov_deg), across, self.distortion)
         with told_of("camera"):
             return Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=self.distortion)
 

@@ -47,7 +47,7 @@ def _pose_data(pose: Viewpoint) -> dict[str, Any]:
 def _camera_data(camera: Camera) -> dict[str, Any]:
     return {
         "K": [numbers(row) for row in camera.K],
-        "distortion": None if camera.distortion is None else camera.distortion.model,
+        "distortion": None if camera.lens.is_linear else camera.lens.name,
         "center": numbers(camera.center),
     }
 

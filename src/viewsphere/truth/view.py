@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.camera import has_unit_rays, inverse_camera_matrix
+from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.geometry.rotation import inverse, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.thing import Thing
@@ -129,12 +129,12 @@ class View:
     @property
     def is_pinhole(self) -> bool:
         """Return whether the lens has no distortion."""
-        return self.camera.distortion is None
+        return self.camera.lens.is_linear
 
     @property
     def has_unit_rays(self) -> bool:
         """Return whether s is measured along rays of length 1, see `truth.raster.visibility.Visibility`."""
-        return has_unit_rays(self.camera.distortion)
+        return self.camera.lens.has_unit_rays
 
     @property
     def owners(self) -> NDArray[np.int32]:

@@ -125,7 +125,7 @@ def trajectory(entry: PoseList, folder: Path) -> FileTrajectory:
     """The motion that an entry of a recipe means; of a 3D file's camera at all of its frames, unless the entry names some."""
     whole = entry if entry.frames is not None or not _is_3d(entry) else entry.model_copy(update={"frames": "all"})
     found = pose_file(folder / Path(entry.path).expanduser(), whole, zooms=True)
-    if len({(lens.width, lens.height, lens.distortion) for lens in found.lenses}) > 1:
+    if len({(lens.width, lens.height, lens.lens.parameters) for lens in found.lenses}) > 1:
         raise RecipeError("viewpoints.path: expected lenses of one size and distortion along a motion; found several")
     return FileTrajectory(entry, found)
 

@@ -32,7 +32,6 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.refusals import any_view
 from viewsphere.geometry.rotation import compose, rigid
-from viewsphere.model.camera import Scan
 from viewsphere.model.files import Files
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
@@ -90,7 +89,7 @@ def is_camera_view(sample: Sample) -> bool:
     """
     if not (sample.known_camera and sample.known_pose and sample.objects):
         return False
-    return not isinstance(sample.known_camera.distortion, Scan) and all(o.model for o in sample.objects)
+    return not sample.known_camera.lens.is_scan and all(o.model for o in sample.objects)
 
 
 def _left_out(dataset: Dataset, groups: Collection[_Group]) -> Iterator[str]:

@@ -267,7 +267,6 @@ def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
         return {**source, **named, "id": sample.index + 1, "file_name": _image_file(dataset, sample), **size}
     camera, pose = sample.camera, sample.pose
     keys = [o.key for o in sample.objects]
-    lens = camera.distortion
     return {
         "id": sample.index + 1,
         "file_name": _image_file(dataset, sample),
@@ -284,7 +283,7 @@ def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
         "azimuth": pose.azimuth_deg,
         "tilt": pose.tilt_deg,
         "transformation_matrix": {**transformation_matrix(camera), "P": camera.P.tolist()},
-        "distortion": None if lens is None else lens.model_dump(mode="json"),
+        "distortion": camera.lens.record,
     }
 
 

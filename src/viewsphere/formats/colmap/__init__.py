@@ -39,7 +39,7 @@ from viewsphere.formats.colmap.reading import read
 from viewsphere.formats.colmap.records import KINDS, Camera, Frame, Image, Record, Rig, pose_of
 from viewsphere.formats.shared.cameras import Moment, Rigs, world_of
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of
-from viewsphere.formats.shared.writing.refusals import known_cameras, no_skew
+from viewsphere.formats.shared.writing.refusals import known_cameras, no_skew, opencv_lenses
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
@@ -58,9 +58,10 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Cameras that nobody knows, skew, and splits that are called like a model's files."""
+    """Cameras that nobody knows, skew, lenses that OpenCV does not have, and splits that are called like a model's files."""
     yield from known_cameras(scope)
     yield from no_skew(scope)
+    yield from opencv_lenses(scope)
     for name in (name for name in scope.splits if name in KINDS):
         yield f"expected splits of other names than {', '.join(KINDS)}; found {name}"
 

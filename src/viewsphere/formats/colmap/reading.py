@@ -22,8 +22,9 @@ from viewsphere.formats.shared.reading.posed_pictures import (
     posed_dataset,
     without_world,
 )
+from viewsphere.geometry.lenses import LensParameters, opencv_parameters
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.camera import Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import is_name
 
@@ -135,12 +136,12 @@ def _lens(model: str, size: tuple[int, int], values: Sequence[float]) -> Intrins
         raise ValueError(f"expected one of {', '.join(PARAMETERS)} with its parameters; found {model} with {len(values)}")
     p = dict(zip(names, values, strict=True))
     k1, k2, k3, k4, k5, k6, p1, p2 = (p.get(name, 0.0) for name in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"))
-    bent: Distortion | None = None
+    bent: LensParameters | None = None
     if model.endswith("FISHEYE"):
-        bent = Distortion(model="fisheye", coefficients=(k1, k2, k3, k4))
+        bent = opencv_parameters((k1, k2, k3, k4), is_fisheye=True)
     elif any((k1, k2, k3, k4, k5, k6, p1, p2)):
         count = 8 if any((k4, k5, k6)) else 5 if k3 else 4
-        bent = Distortion(model="brown_conrady", coefficients=(k1, k2, p1, p2, k3, k4, k5, k6)[:count])
+        bent = opencv_parameters((k1, k2, p1, p2, k3, k4, k5, k6)[:count])
     fx = p.get("fx", p.get("f", 0.0))
     return Intrinsics(width=size[0], height=size[1], fx=fx, fy=p.get("fy", fx), cx=p["cx"], cy=p["cy"], distortion=bent)
 

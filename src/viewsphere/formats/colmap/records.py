@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
 from viewsphere.geometry.rotation import quaternion_from_matrix
-from viewsphere.model.camera import Intrinsics, Scan
+from viewsphere.model.camera import Intrinsics
 
 Float = NDArray[np.float64]
 Pose = tuple[float, ...]
@@ -30,13 +30,15 @@ def pose_of(R: Float, t: Float) -> Pose:
 
 def lens_of(lens: Intrinsics) -> tuple[str, list[float]]:
     """The name of a lens' model, and its parameters. Raises UserError for one that has no model."""
-    if lens.skew or isinstance(lens.distortion, Scan):
-        raise UserError(f"colmap: expected cameras without skew, found {lens.skew:g}")
+    opencv = lens.lens.opencv
+    if lens.skew or opencv is None:
+        found = f"{lens.skew:g}" if lens.skew else lens.lens.name
+        raise UserError(f"colmap: expected cameras without skew and with a lens of OpenCV's, found {found}")
     shape = [lens.fx, lens.fy, lens.cx, lens.cy]
-    if lens.distortion is None:
+    own = list(opencv.coefficients)
+    if not own:
         return "PINHOLE", shape
-    own = list(lens.distortion.coefficients)
-    if lens.distortion.model == "fisheye":
+    if opencv.is_fisheye:
         return "OPENCV_FISHEYE", shape + own
     return ("OPENCV", shape + own) if len(own) == 4 else ("FULL_OPENCV", shape + own + [0.0] * (8 - len(own)))
 

@@ -123,9 +123,7 @@ def _camera(sample: Sample) -> dict[str, Any] | None:
     camera = sample.known_camera
     if camera is None:
         return None
-    lens = camera.distortion
-    bent = lens and {"model": lens.model, "coefficients": list(lens.coefficients)}
-    return {"K": camera.K.tolist(), "R": camera.R.tolist(), "t": camera.t.tolist(), "distortion": bent}
+    return {"K": camera.K.tolist(), "R": camera.R.tolist(), "t": camera.t.tolist(), "distortion": camera.lens.flat_record}
 
 
 def arrow_type(feature: Feature) -> Any:

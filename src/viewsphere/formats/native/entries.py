@@ -120,7 +120,7 @@ def _viewpoint(sample: Sample) -> dict[str, Any]:
 
 def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str, str]) -> dict[str, Any]:
     """An object's entry; all objects of a frame share the files of its first one, but for the mask."""
-    lens = sample.camera.distortion
+    bent = sample.camera.lens.record
     return {
         "path_rgb": files.get(picture_of(files) or ""),
         "path_mask": mask,
@@ -136,5 +136,5 @@ def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str
         **({"id_track": o.track} if o.track else {}),
         "split": sample.split,
         "transformation_matrix": transformation_matrix(sample.camera),
-        **({"distortion": lens.model_dump(mode="json")} if lens else {}),
+        **({"distortion": bent} if bent else {}),
     }

@@ -19,9 +19,10 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.geometry.box import box_size
+from viewsphere.geometry.lenses import read_parameters
 from viewsphere.geometry.mask import encode_rle, mask_box, mask_polygons
 from viewsphere.labels import channels
-from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.credit import Credit
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -251,8 +252,7 @@ def _camera(matrix: Mapping[str, Any], resolution: list[int], distortion: dict[s
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > RIGHT_ANGLES or np.linalg.det(rotation) < 0:
         raise ValueError("found an RT without a rotation")
     width, height = resolution
-    bent = Distortion.model_validate(distortion) if distortion else None
-    size = {"width": width, "height": height}
+    size, bent = {"width": width, "height": height}, read_parameters(distortion or None)
     lens = Intrinsics(**size, fx=k[0, 0], fy=k[1, 1], cx=k[0, 2], cy=k[1, 2], skew=k[0, 1], distortion=bent)
     return Camera(lens, rotation, motion[:, 3])
 

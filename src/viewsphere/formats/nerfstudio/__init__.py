@@ -52,7 +52,7 @@ from viewsphere.formats.shared.writing import refusals
 from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, item
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.listed import ListedShot
 from viewsphere.model.sample import Sample
@@ -61,7 +61,9 @@ from viewsphere.store import Dataset
 from viewsphere.store.source_cameras import SourceCameras, refuse_any
 
 SYNTHETIC = "nerf-synthetic"
-NAMES = {"brown_conrady": ("k1", "k2", "p1", "p2", "k3"), "fisheye": ("k1", "k2", "k3", "k4")}
+FISHEYE, STANDARD = ("k1", "k2", "k3", "k4"), ("k1", "k2", "p1", "p2", "k3")
+"""Names of coefficients, in OpenCV's order."""
+
 MOST = {"nerfstudio": 5, "instant-ngp": 4, SYNTHETIC: 0}
 """Coefficients of a lens, by whose files they are."""
 
@@ -220,7 +222,9 @@ FORMAT = FormatSpec(
 
 def _lens_problem(lens: Intrinsics, kind: str) -> str | None:
     """Return the part of a lens that files of this kind cannot express; None for a lens that they can."""
-    own = lens.distortion.coefficients if isinstance(lens.distortion, Distortion) else ()
+    if lens.lens.opencv is None:
+        return f"expected lenses of OpenCV's models; found {lens.lens.name}"
+    own = lens.lens.opencv.coefficients
     if own and not MOST[kind]:
         return f"expected pinhole cameras; found {len(own)} coefficients"
     if any(own[MOST[kind] :]):
@@ -235,15 +239,15 @@ def _lens_problem(lens: Intrinsics, kind: str) -> str | None:
 
 def _model_of(lens: Intrinsics) -> str:
     """The name of its model."""
-    fisheye = lens.distortion is not None and lens.distortion.model == "fisheye"
-    return "OPENCV_FISHEYE" if fisheye else "OPENCV"
+    own = lens.lens.opencv
+    return "OPENCV_FISHEYE" if own and own.is_fisheye else "OPENCV"
 
 
 def _said_of(lens: Intrinsics, kind: str) -> dict[str, Any]:
     """Its numbers by their names: sizes and K in pixels from the corner, and coefficients."""
     said: dict[str, Any] = {"w": lens.width, "h": lens.height, "fl_x": lens.fx, "fl_y": lens.fy, "cx": lens.cx, "cy": lens.cy}
-    if isinstance(lens.distortion, Distortion):
-        said |= dict(zip(NAMES[lens.distortion.model], lens.distortion.coefficients[: MOST[kind]], strict=False))
-        if kind == "instant-ngp" and lens.distortion.model == "fisheye":
+    if own := lens.lens.opencv:
+        said |= dict(zip(FISHEYE if own.is_fisheye else STANDARD, own.coefficients[: MOST[kind]], strict=False))
+        if kind == "instant-ngp" and own.is_fisheye:
             said["is_fisheye"] = True
     return said

@@ -22,7 +22,8 @@ from viewsphere.formats.shared.reading.posed_pictures import (
     posed_dataset,
     without_world,
 )
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.geometry.lenses import LensParameters, opencv_parameters
+from viewsphere.model.camera import Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.store.texts import parsed
@@ -161,12 +162,12 @@ def lens_of(said: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics:
     if model not in MODELS:
         raise ValueError(f"expected a camera_model of {', '.join(MODELS)}; found {model!r:.60}")
     k1, k2, k3, k4, p1, p2 = (_number(said, name, 0.0) for name in ("k1", "k2", "k3", "k4", "p1", "p2"))
-    bent: Distortion | None = None
+    bent: LensParameters | None = None
     if model == "OPENCV_FISHEYE":
-        bent = Distortion(model="fisheye", coefficients=(k1, k2, k3, k4))
+        bent = opencv_parameters((k1, k2, k3, k4), is_fisheye=True)
     elif k4:
         raise ValueError(f"expected lenses without k4; found {k4:g}: undistort the pictures first")
     elif any((k1, k2, k3, p1, p2)):
-        bent = Distortion(model="brown_conrady", coefficients=(k1, k2, p1, p2, k3) if k3 else (k1, k2, p1, p2))
+        bent = opencv_parameters((k1, k2, p1, p2, k3) if k3 else (k1, k2, p1, p2))
     size_of = {"width": width, "height": height}
     return Intrinsics(**size_of, fx=fx, fy=_number(said, "fl_y", 0.0) or fx, cx=cx, cy=cy, distortion=bent)

@@ -134,7 +134,7 @@ class Cads:
     def record(self, sample: Sample, objects: Iterable[ObjectAnnotation], filename: str, *, masks: bool) -> bytes:
         """The file of a picture. Raises UserError for a lens that is no pinhole with square pixels, as of merged data sets."""
         lens = sample.known_camera and sample.known_camera.intrinsics
-        if lens and (lens.distortion is not None or _oblong(lens)):
+        if lens and (not lens.lens.is_linear or _oblong(lens)):
             found = _oblong(lens) or "a lens that distorts"
             raise UserError(f"frame {sample.index}: expected a pinhole with square pixels; found {found}")
         return mat(

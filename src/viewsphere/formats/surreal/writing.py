@@ -133,7 +133,7 @@ class Surreal(Tree):
             return "one sensor; found several"
         if len(sample.objects) != 1:
             return f"one person; found {len(sample.objects)} objects"
-        if now.distortion is not None:
+        if not now.lens.is_linear:
             return "a pinhole camera; found a lens that distorts"
         if now.intrinsics != then.intrinsics or not (np.array_equal(now.R, then.R) and np.array_equal(now.t, then.t)):
             return f"a camera that stays as it is all through a clip; found that it moves or zooms after frame {first.index}"

@@ -38,7 +38,7 @@ from viewsphere.formats.shared.writing.refusals import known_cameras, lenses, no
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, line
 from viewsphere.formats.tum.reading import read
 from viewsphere.geometry.rotation import quaternion_from_matrix
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
@@ -125,12 +125,12 @@ class Tum(Tree):
 
 
 def _is_held(lens: Intrinsics) -> bool:
-    own = lens.distortion
-    return own is None or (own.model == "brown_conrady" and not any(own.coefficients[MOST:]))
+    own = lens.lens.opencv
+    return own is not None and not own.is_fisheye and not any(own.coefficients[MOST:])
 
 
 def _numbers(lens: Intrinsics, up: int) -> str:
-    own = lens.distortion.coefficients[:MOST] if isinstance(lens.distortion, Distortion) else ()
+    own = lens.lens.opencv.coefficients[:MOST] if lens.lens.opencv else ()
     values = (lens.fx, up * lens.fy, lens.cx - 0.5, lens.cy - 0.5, *own, *[0.0] * (MOST - len(own)))
     return " ".join(map(str, values))
 

@@ -14,8 +14,9 @@ from viewsphere.errors import StoreError
 from viewsphere.files import read_text
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.formats.shared.reading.posed_pictures import Posed, camera_of, picture_inside, posed_dataset
+from viewsphere.geometry.lenses import opencv_parameters
 from viewsphere.geometry.rotation import matrix_from_quaternion
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.camera import Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import is_name
 
@@ -114,5 +115,5 @@ def _lens(values: Sequence[float], size: tuple[int, int]) -> Intrinsics:
     if len(bent) not in (0, 4, 5):
         raise ValueError(f"expected 4, 8 or 9 numbers in calibration.txt; found {len(values)}")
     own = bent if any(bent[4:]) else bent[:4]
-    lens = Distortion(model="brown_conrady", coefficients=tuple(own)) if any(own) else None
+    lens = opencv_parameters(tuple(own)) if any(own) else None
     return Intrinsics(width=size[0], height=size[1], fx=fx, fy=abs(fy), cx=cx + 0.5, cy=cy + 0.5, distortion=lens)

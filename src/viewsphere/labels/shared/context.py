@@ -157,7 +157,7 @@ class LabelContext:
     @_Shared
     def camera_from_ray(self) -> NDArray[np.float64]:
         """Matrix (3, 3) from rays to camera axes: K^-1 for a pinhole, whose rays are pixels (x, y, 1); else the identity."""
-        return inverse_camera_matrix(self.camera.intrinsics) if self.camera.distortion is None else np.eye(3)
+        return inverse_camera_matrix(self.camera.intrinsics) if self.camera.lens.is_linear else np.eye(3)
 
     @property
     def inverse_depth(self) -> NDArray[np.float64]:
@@ -177,11 +177,10 @@ class LabelContext:
     def _projected(self, i: int) -> tuple[Bounds | None, bool]:
         g = self.geometry
         (first, stop), (base, end) = g.triangle_start[i : i + 2], g.vertex_start[i : i + 2]
-        if first < stop and self.camera.distortion is None and is_behind(self.camera, g.bounds[i]):
+        if first < stop and self.camera.lens.is_linear and is_behind(self.camera, g.bounds[i]):
             return None, False
-        faces, points = (0, stop - first), (0, end - base)
         triangles = g.triangles[first:stop] - np.int32(base)
-        return projected_bounds(self.camera, g.places(i), triangles, faces, points, g.is_used[base:end])
+        return projected_bounds(self.camera, g.places(i), triangles, g.is_used[base:end])
 
     def is_unobstructed(self, i: int) -> bool:
         """Return whether nothing can hide any part of the object of id i + 1: its 2D box meets no other object's box, there

@@ -80,7 +80,7 @@ def out_of_view(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]
     How large the models are is not known yet: near ones may still be seen.
     """
     scene = recipe.scene
-    if lens.distortion is not None or not views.are_known:
+    if not lens.lens.is_linear or not views.are_known:
         return
     widest = math.hypot(max(lens.cx, lens.width - lens.cx) / lens.fx, max(lens.cy, lens.height - lens.cy) / lens.fy)
     chosen = _some(views)

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.lenses import LensParameters
 from viewsphere.geometry.rotation import compose, rigid
-from viewsphere.model.camera import Distortion
 from viewsphere.planning.rig_files.documents import matrix, size
 from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fisheye, inverse, pinhole, rotation
 
@@ -54,7 +54,7 @@ def _camera(path: Path, found: Mapping[str, Any], rectified: bool) -> Calibrated
     )
 
 
-def _distortion(found: Mapping[str, Any], path: Path) -> Distortion | None:
+def _distortion(found: Mapping[str, Any], path: Path) -> LensParameters | None:
     model, where = found.get("distortion_model", ""), f"{path}: distortion_coefficients"
     if model not in MODELS:
         raise RecipeError(f"{path}: distortion_model: expected {', '.join(MODELS[:4])}; found {model!r}")

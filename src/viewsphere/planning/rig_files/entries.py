@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from viewsphere.composing.viewpoints.pose_files.motions import nearest_rotation
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.lenses import LensParameters, opencv_parameters
 from viewsphere.geometry.rotation import rigid, transform
-from viewsphere.model.camera import Distortion
 from viewsphere.model.validation_errors import told_of
 
 Float = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Calibrated:
 
     name: str
     lens: dict[str, float]
-    distortion: Distortion | None
+    distortion: LensParameters | None
     rig_from_sensor: Float
     size: tuple[int, int] | None = None
 
@@ -44,7 +44,7 @@ def pinhole(camera: Float, where: str) -> dict[str, float]:
     return {"fx": fx, "fy": fy, "cx": float(camera[0, 2]) + CENTER, "cy": float(camera[1, 2]) + CENTER}
 
 
-def brown_conrady(numbers: Sequence[float], where: str) -> Distortion | None:
+def brown_conrady(numbers: Sequence[float], where: str) -> LensParameters | None:
     """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], of which those from s1 on have to be 0; None where all
     are.
     """
@@ -57,15 +57,15 @@ def brown_conrady(numbers: Sequence[float], where: str) -> Distortion | None:
     if not any(numbers):
         return None
     with told_of(where):
-        return Distortion(model="brown_conrady", coefficients=tuple(numbers[:8]))
+        return opencv_parameters(tuple(numbers[:8]))
 
 
-def fisheye(numbers: Sequence[float], where: str) -> Distortion:
+def fisheye(numbers: Sequence[float], where: str) -> LensParameters:
     """Four numbers of Kannala and Brandt; all 0 is the equidistant fisheye."""
     if len(numbers) != 4:
         raise RecipeError(f"{where}: expected 4 numbers; found {len(numbers)}")
     with told_of(where):
-        return Distortion(model="fisheye", coefficients=tuple(numbers))
+        return opencv_parameters(tuple(numbers), is_fisheye=True)
 
 
 def rotation(matrix: Float, where: str) -> Float:

@@ -11,8 +11,8 @@ from typing import Any, cast
 import numpy as np
 
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.lenses import LensParameters
 from viewsphere.geometry.rotation import compose
-from viewsphere.model.camera import Distortion
 from viewsphere.planning.rig_files.documents import matrix, row, size
 from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fisheye, inverse, pinhole, rotation
 
@@ -55,7 +55,7 @@ def _camera(name: str, entry: Mapping[str, Any], pose: np.ndarray[Any, np.dtype[
     return Calibrated(name, lens, _distortion(entry, at), pose, size(extent[0], extent[1], f"{at}: resolution"))
 
 
-def _distortion(entry: Mapping[str, Any], at: str) -> Distortion | None:
+def _distortion(entry: Mapping[str, Any], at: str) -> LensParameters | None:
     model = entry.get("distortion_model", "none")
     if model == "none":
         return None

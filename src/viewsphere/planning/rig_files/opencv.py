@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.lenses import LensParameters
 from viewsphere.geometry.rotation import rigid
-from viewsphere.model.camera import Distortion
 from viewsphere.planning.rig_files.documents import matrix, size
 from viewsphere.planning.rig_files.entries import Calibrated, brown_conrady, fisheye, inverse, pinhole, rotation
 
@@ -51,7 +51,7 @@ def _camera(found: Mapping[str, Any], number: int, where: str) -> Float:
     return matrix(found.get(name), f"{where}: {name}", (3, 3))
 
 
-def _distortion(found: Mapping[str, Any], number: int, where: str) -> Distortion | None:
+def _distortion(found: Mapping[str, Any], number: int, where: str) -> LensParameters | None:
     name = next((name for name in (f"D{number}", f"distCoeffs{number}") if name in found), f"D{number}")
     numbers = matrix(found[name], f"{where}: {name}").ravel().tolist() if name in found else []
     return (fisheye if found.get("model") == "fisheye" else brown_conrady)(numbers, f"{where}: {name}")

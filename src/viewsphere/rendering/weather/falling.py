@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.camera import has_unit_rays, pixel_rays, project
+from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Scene
 from viewsphere.model.weather import Falling, Rain
@@ -102,7 +102,7 @@ def _there(falling: Falling, kind: int, dense: float, moved: Float, camera: Came
 
 def _cone(camera: Camera) -> float:
     """Cosine of the angle between the camera's axis and what it sees farthest from it."""
-    if has_unit_rays(camera.distortion):
+    if camera.lens.has_unit_rays:
         return -1.0
     rays = pixel_rays(camera.intrinsics)
     return float((rays[..., 2] / np.linalg.norm(rays, axis=-1)).min())
@@ -122,7 +122,7 @@ def _streaks(camera: Camera, before: Float, after: Float, wide: Float) -> tuple[
     (first, _), (last, _) = project(camera.intrinsics, begin), project(camera.intrinsics, end)
     middle = (begin + end) / 2
     away = np.linalg.norm(middle, axis=1)
-    depth = away if has_unit_rays(camera.distortion) else middle[:, 2]
+    depth = away if camera.lens.has_unit_rays else middle[:, 2]
     focal = math.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = focal * wide / away

@@ -166,7 +166,7 @@ def _shown(dataset: Dataset) -> str:
     if len(lenses) != 1:
         return "an unknown one" if not lenses else "several"
     i = lenses[0]
-    bent = f", {i.distortion.model}" if i.distortion else ""
+    bent = "" if i.lens.is_linear else f", {i.lens.name}"
     return f"{i.width}x{i.height} fx {i.fx:.6g} fy {i.fy:.6g} cx {i.cx:.6g} cy {i.cy:.6g}{bent}"
 
 

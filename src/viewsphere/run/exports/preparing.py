@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.model.camera import Scan
 from viewsphere.model.channel import missing
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
@@ -125,7 +124,7 @@ class Target:
         """
         shown = self.view.shown(sample)
         absent = missing(self.spec.channels or (), {*shown.channels, *shown.requested})
-        is_exempt = self.spec.lidar and isinstance(sample.known_camera and sample.camera.distortion, Scan)
+        is_exempt = self.spec.lidar and sample.known_camera is not None and sample.camera.lens.is_scan
         if sample.sensor != CAMERA and absent and not is_exempt:
             raise UserError(
                 f"expected channel {absent[0]} of every frame, found none of sensor {sample.sensor} (frame {sample.index}): "

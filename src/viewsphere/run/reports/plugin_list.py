@@ -9,6 +9,7 @@ from viewsphere.labels import LabelSpec
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.format import FormatSpec
+from viewsphere.plugins.lens import LensSpec
 from viewsphere.plugins.light import LightSpec
 from viewsphere.plugins.material import MaterialSpec
 from viewsphere.plugins.motion import MotionSpec
@@ -20,10 +21,11 @@ from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.source import SourceSpec
 from viewsphere.plugins.spec import Spec
 
-SPECS: tuple[type[Spec], ...] = (
+SPECS: tuple[type[Spec | LensSpec], ...] = (
     EngineSpec,
     FormatSpec,
     LabelSpec,
+    LensSpec,
     LightSpec,
     MaterialSpec,
     MotionSpec,

@@ -14,7 +14,7 @@ from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.composing.viewpoints.sequence_poses import poses_of
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Intrinsics, Scan
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.quantity import quantity
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.planning.rigs import rig_of
@@ -82,31 +82,11 @@ def sensor_facts(rig: Rig) -> tuple[SensorFacts, ...]:
 def _facts(sensor: Sensor, color: str) -> SensorFacts:
     pose, own = np.array(sensor.rig_from_sensor), sensor.intrinsics
     x, y, z = (round(float(v), 9) + 0.0 for v in pose[:3, 3])
-    distortion = own.distortion and own.distortion.model
+    distortion = None if own.lens.is_linear else own.lens.name
     size = own.width, own.height
-    return SensorFacts(sensor.name, color, size, _fov(own), (x, y, z), _angles(pose), distortion, sensor.channels)
-
-
-def _fov(own: Intrinsics) -> tuple[float, float]:
-    """Angles of view across and down, degrees, through the principal point; of bent lenses between the outermost pixels;
-    of a LiDAR all columns, and from the lowest to the highest ring.
-    """
-    if own.distortion is None:
-        across = math.atan(own.cx / own.fx) + math.atan((own.width - own.cx) / own.fx)
-        return math.degrees(across), math.degrees(math.atan(own.cy / own.fy) + math.atan((own.height - own.cy) / own.fy))
-    if isinstance(own.distortion, Scan):
-        rings = own.distortion.elevations_deg
-        return math.degrees(own.width / own.fx), rings[0] - rings[-1]
-    column, row = (int(np.clip(v, 0, most - 1)) for v, most in ((own.cx, own.width), (own.cy, own.height)))
-    strips = (0, row, own.width, row + 1), (column, 0, column + 1, own.height)
-    angles = (_off_axis(pixel_rays(own, 1, strip).reshape(-1, 3)) for strip in strips)
-    first, second = (float(np.nanmax(a[: len(a) // 2]) + np.nanmax(a[len(a) // 2 :])) for a in angles)
-    return first, second
-
-
-def _off_axis(rays: Float) -> Float:
-    """Angles of rays (N, 3) to the optical axis, degrees."""
-    return np.degrees(np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2]))
+    return SensorFacts(
+        sensor.name, color, size, own.lens.field_of_view(), (x, y, z), _angles(pose), distortion, sensor.channels
+    )
 
 
 def _angles(pose: Float) -> tuple[float, float, float]:

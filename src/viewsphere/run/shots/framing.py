@@ -193,7 +193,7 @@ def _in_view(box_of: BoxOf, together: bool, shot: Shot, instant: int) -> float:
 def _may_show(camera: Camera, thing: Thing, box_of: BoxOf) -> bool:
     """Return whether a camera may show a thing; lenses other than a plain pinhole are taken to show all."""
     lens = camera.intrinsics
-    if lens.distortion is not None or lens.skew:
+    if not lens.lens.is_linear or lens.skew:
         return True
     corners = transform(thing.world_from_object, box_of(thing.model, thing.step))
     x, y, z = (transform(camera.R, corners) + camera.t).T

@@ -27,7 +27,6 @@ from viewsphere.kernels.garbage import pause_collection
 from viewsphere.kernels.overloads import needed, table
 from viewsphere.kernels.precompile import Told, compile_all
 from viewsphere.labels import channels
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.exposure import Exposure, Sweep
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.metadata import ModelMetadata
@@ -181,10 +180,9 @@ def load_kernels(shot: Shot) -> None:
 
 
 def _small(shot: Shot) -> Shot:
-    tiny = Intrinsics(width=SIZE, height=SIZE, fx=SIZE, fy=SIZE, cx=SIZE / 2, cy=SIZE / 2)
-    kinds = dict.fromkeys((sensor.intrinsics.distortion, sensor.lidar) for sensor in shot.rig.sensors)
-    bent = ((tiny.model_copy(update={"distortion": lens}), lidar) for lens, lidar in kinds)
-    sensors = [Sensor(name=f"{i}", intrinsics=lens, lidar=lidar) for i, (lens, lidar) in enumerate(bent)]
+    tiny = {"width": SIZE, "height": SIZE, "fx": SIZE, "fy": SIZE, "cx": SIZE / 2, "cy": SIZE / 2, "skew": 0.0}
+    kinds = dict.fromkeys((sensor.intrinsics.model_copy(update=tiny), sensor.lidar) for sensor in shot.rig.sensors)
+    sensors = [Sensor(name=f"{i}", intrinsics=lens, lidar=lidar) for i, (lens, lidar) in enumerate(kinds)]
     if len(shot.rig.sensors) > 1:
         sensors.append(Sensor(name="beside", intrinsics=sensors[0].intrinsics, rig_from_sensor=BESIDE))
     spec = ModelSpec(key="card", source="card", category="card", category_id=1)

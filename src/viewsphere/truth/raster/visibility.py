@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.camera import Window, has_unit_rays, pixel_rays
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.geometry.lenses import Window
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.truth.raster.geometry import Geometry, seen_from
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
-
-SCAN_CELLS = 128
-"""Cells along a side of the cube around a scan: smaller ones are slower, as rows of rays are sparse."""
 
 EDGE_ON = 1e-9
 """A camera's height above the ground, as a share of its distance from the origin and a metre, that is nothing but rounding."""
@@ -156,11 +154,11 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     vertices, those of things that lie outside of a pinhole's picture are left out: the first of them is `OUTSIDE`, the others
     are arbitrary. `in_picture` gives those that are not.
     """
-    k = camera.K if camera.distortion is None else np.eye(3)
+    k = camera.K if camera.lens.is_linear else np.eye(3)
     moved = np.empty((3, 4))
     moved[:, :3], moved[:, 3] = camera.R, camera.t
     m = k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2]
-    if base or stop is not None or camera.distortion is not None:
+    if base or stop is not None or not camera.lens.is_linear:
         return projected(geometry, m, base, stop)
     end, without = len(geometry.coordinates), outside(geometry, camera, m)
     q = geometry.spare.array((end, 4), np.float64)
@@ -258,7 +256,7 @@ def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int,
 def lens_rays(camera: Camera) -> NDArray[np.float64] | None:
     """The image's ray table, (H, W, 3), None for a pinhole; kept for the next frame, so it must not be written to."""
     image = (0, 0, camera.width, camera.height)
-    return None if camera.distortion is None else _ray_table(camera.intrinsics.model_dump_json(), 1, image).rays
+    return None if camera.lens.is_linear else _ray_table(camera.intrinsics.model_dump_json(), 1, image).rays
 
 
 def lens_table(camera: Camera) -> RayTable:
@@ -307,11 +305,9 @@ def index_rays(intrinsics: Intrinsics, rays: NDArray[np.float64], samples: int) 
 
     rays.setflags(write=False)
     levels = kernels.tree_levels(rays.shape[0], rays.shape[1])
-    lens = intrinsics.distortion
-    size = min(max(int(intrinsics.fx * samples), 16), 512)  # cells of about two pixels
-    if lens is not None and lens.model == "scan":
-        size = SCAN_CELLS
-    cells = kernels.build_faces(rays, 6 if has_unit_rays(lens) else 1, size)
+    lens = intrinsics.lens
+    size = lens.ray_cells or min(max(int(intrinsics.fx * samples), 16), 512)  # cells of about two pixels
+    cells = kernels.build_faces(rays, 6 if lens.has_unit_rays else 1, size)
     return RayTable(rays, levels, kernels.build_tree(rays, levels), cells)
 
 
@@ -338,11 +334,11 @@ def _draw(
     first, last, base, stop = part
     span = (first, last, base)
     cut = (seen_from(geometry, q, base).triangle_cutout, geometry.alpha_masks.arrays)
-    if camera.distortion is not None:
+    if not camera.lens.is_linear:
         canvas = _canvas(camera, window)
         t = _ray_table(camera.intrinsics.model_dump_json(), samples, canvas)
         origin = (x0 - samples * canvas[0], y0 - samples * canvas[1])
-        table, unit = t.arrays, has_unit_rays(camera.distortion)
+        table, unit = t.arrays, camera.lens.has_unit_rays
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
         return nearest, seen
     canvas, parts = (x0, y0, x1 - x0, y1 - y0), [(base, stop, first, last)]

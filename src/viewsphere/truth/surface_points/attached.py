@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.camera import coefficients, lens_limit
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.view import View
 
@@ -15,15 +14,8 @@ Whole = NDArray[np.int32]
 
 def rays_through(view: View, xy: Float) -> Float:
     """Rays (N, 3) through positions (N, 2): (x, y, 1) for a pinhole, else as `geometry.camera.pixel_rays`."""
-    from viewsphere.truth.surface_points import kernels_attached as kernels
-
-    lens = view.camera.distortion
-    if lens is None:
-        return np.column_stack((xy, np.ones(len(xy))))
-    rays = np.empty((len(xy), 3))
-    cast = {"fisheye": kernels.rays_fisheye, "scan": kernels.rays_scan, "brown_conrady": kernels.rays_brown}[lens.model]
-    cast(coefficients(lens), lens_limit(lens), view.camera.K, np.ascontiguousarray(xy), rays)
-    return rays
+    lens = view.camera.lens
+    return np.column_stack((xy, np.ones(len(xy)))) if lens.is_linear else lens.rays(xy).directions
 
 
 def weights_of(view: View, triangle: Whole, rays: Float) -> Float:

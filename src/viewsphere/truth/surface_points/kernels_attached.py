@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from viewsphere.geometry.kernels_lens import invert_radial, scan_ray, undistort_brown
 from viewsphere.kernels.jit import njit
 from viewsphere.truth.raster.kernels_channels import weights_at
 from viewsphere.truth.raster.kernels_draw import NEVER, hits_surface
@@ -45,34 +42,3 @@ def on_surface(chosen, barycentrics, cutout, alpha_masks, out):
     for i in range(chosen.shape[0]):
         row, b = cutout[chosen[i]], barycentrics[i]
         out[i] = row != NEVER and hits_surface(alpha_masks, row, b[0], b[1], b[2])
-
-
-@njit
-def rays_brown(k, limit, matrix, xy, out):
-    """Rays (N, 3), z = 1, through the pixels xy (N, 2) of a Brown-Conrady lens; NaN where it has none."""
-    for i in range(xy.shape[0]):
-        v = (xy[i, 1] - matrix[1, 2]) / matrix[1, 1]
-        u = (xy[i, 0] - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
-        x, y = undistort_brown(k, limit, u, v)
-        out[i, 0], out[i, 1], out[i, 2] = x, y, np.nan if math.isnan(x) else 1.0
-
-
-@njit
-def rays_fisheye(k, limit, matrix, xy, out):
-    """Unit rays (N, 3) through the pixels xy (N, 2) of a fisheye; NaN where it has none."""
-    for i in range(xy.shape[0]):
-        v = (xy[i, 1] - matrix[1, 2]) / matrix[1, 1]
-        u = (xy[i, 0] - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
-        radius = math.sqrt(u * u + v * v)
-        theta = invert_radial(k, True, radius, limit) if radius > 0.0 else 0.0
-        sine = math.sin(theta) / radius if radius > 0.0 else 0.0
-        out[i, 0], out[i, 1], out[i, 2] = u * sine, v * sine, math.cos(theta)
-
-
-@njit
-def rays_scan(k, limit, matrix, xy, out):
-    """Unit rays (N, 3) through the pixels xy (N, 2) of a scan; NaN where it has none."""
-    for i in range(xy.shape[0]):
-        v = (xy[i, 1] - matrix[1, 2]) / matrix[1, 1]
-        u = (xy[i, 0] - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
-        out[i, 0], out[i, 1], out[i, 2] = scan_ray(k, u, v)

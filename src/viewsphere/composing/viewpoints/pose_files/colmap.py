@@ -12,8 +12,9 @@ from viewsphere.composing.viewpoints.pose_files.lens import one_lens
 from viewsphere.composing.viewpoints.pose_files.lines import counted, number, numbers, read_lines, read_text
 from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion, motion
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.lenses import LensParameters, opencv_parameters
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.validation_errors import told_of
 
 PARAMETERS = {
@@ -70,14 +71,14 @@ def _camera(words: Sequence[str], where: str) -> Intrinsics:
         return Intrinsics(**size, fx=fx, fy=p.get("fy", fx), cx=p["cx"], cy=p["cy"], distortion=_distortion(model, p))
 
 
-def _distortion(model: str, p: dict[str, float]) -> Distortion | None:
+def _distortion(model: str, p: dict[str, float]) -> LensParameters | None:
     k1, k2, k3, k4, k5, k6, p1, p2 = (p.get(n, 0.0) for n in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"))
     if model.endswith("FISHEYE"):
-        return Distortion(model="fisheye", coefficients=(k1, k2, k3, k4))
+        return opencv_parameters((k1, k2, k3, k4), is_fisheye=True)
     if not any((k1, k2, k3, k4, k5, k6, p1, p2)):
         return None
     coefficients = (k1, k2, p1, p2, k3, k4, k5, k6) if any((k4, k5, k6)) else (k1, k2, p1, p2, k3)
-    return Distortion(model="brown_conrady", coefficients=coefficients)
+    return opencv_parameters(coefficients)
 
 
 def _images(file: Path) -> list[tuple[str, int, Extrinsics]]:

@@ -14,8 +14,8 @@ from viewsphere.composing.viewpoints.pose_files.lens import one_lens
 from viewsphere.composing.viewpoints.pose_files.lines import number, read_text
 from viewsphere.composing.viewpoints.pose_files.motions import motion
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.camera import focal_from_fov
-from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.geometry.lenses import LensParameters, focal_from_fov, opencv_parameters
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.validation_errors import told_of
 from viewsphere.store.texts import parsed
 
@@ -79,14 +79,14 @@ def _lens(given: Mapping[str, Any], where: str) -> Intrinsics | None:
         )
 
 
-def _distortion(model: object, values: Mapping[str, float], where: str) -> Distortion | None:
+def _distortion(model: object, values: Mapping[str, float], where: str) -> LensParameters | None:
     if model is not None and model not in MODELS:
         raise RecipeError(f"{where}: camera_model: expected one of {', '.join(MODELS)}; found {model!r}")
     k1, k2, k3, k4, p1, p2 = (values.get(k, 0.0) for k in ("k1", "k2", "k3", "k4", "p1", "p2"))
     if model == "OPENCV_FISHEYE":
-        return Distortion(model="fisheye", coefficients=(k1, k2, k3, k4))
+        return opencv_parameters((k1, k2, k3, k4), is_fisheye=True)
     if k4:
         raise RecipeError(f"{where}: k4: expected 0, OpenCV's lens has no such term; found {k4:g}: undistort the images first")
     if not any((k1, k2, k3, p1, p2)):
         return None
-    return Distortion(model="brown_conrady", coefficients=(k1, k2, p1, p2, k3))
+    return opencv_parameters((k1, k2, p1, p2, k3))

@@ -90,7 +90,7 @@ def edge_samples(
     look = visibility.triangle, visibility.inverse_depth, owner, normals
     marks = _differs_from_neighbour(*look)
     marks[: len(behind)] |= behind
-    if camera.distortion is None:
+    if camera.lens.is_linear:
         pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner, normals, behind)
         samples = Samples(pixels, position, np.zeros((0, 3), np.float32), triangle, inverse)
     else:
@@ -155,7 +155,7 @@ def layers(
     if pixels is not None:
         row_of = np.zeros(shape[0] * shape[1], np.int32)
         row_of[pixels] = np.arange(len(pixels))
-    if camera.distortion is None:
+    if camera.lens.is_linear:
         reach = _CENTER_REACH if count == 1 else _ROTATED_REACH
         chosen = np.flatnonzero(kernels.touched_boxes(q, clear, geometry.triangles, reach, farthest))
     else:
@@ -200,7 +200,7 @@ def _pile(
     points.farthest[:] = kernels_chosen.CLOSED
     points.farthest.reshape(-1)[points.pixels[:-1][behind]] = 0
     if behind.any():
-        if points.camera.distortion is None:
+        if points.camera.lens.is_linear:
             y, x = np.divmod(points.pixels[:-1][behind], points.camera.width)
             window = x.min(), y.min(), x.max(), y.max()
             surfaces = geometry.triangles, in_picture(geometry, q), geometry.triangle_cutout
@@ -264,15 +264,14 @@ class _Points:
 
     def draw(self, geometry: Geometry, q: NDArray[np.float64], see_through: Bool, order: NDArray[np.int64]) -> None:
         """Draw these triangles."""
-        count, lens = self.nearest.shape[1], self.camera.distortion
+        count, lens = self.nearest.shape[1], self.camera.lens
         fragments = self.inverses, self.listed, self.counts, q
         surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.alpha_masks.arrays, see_through
-        if lens is not None:
+        if not lens.is_linear:
             side = 1 if count == 1 else 2
             table = lens_table(self.camera) if side == 1 else _sample_table(self.camera.intrinsics.model_dump_json())
             solid = self.nearest, self.seen
-            unit = lens.model == "fisheye"
-            kernels.draw_rays(q, *surfaces, unit, table.arrays, (self.grid, self.pixels, side), solid, fragments)
+            kernels.draw_rays(q, *surfaces, lens.has_unit_rays, table.arrays, (self.grid, self.pixels, side), solid, fragments)
             return
         offsets, reach = (_CENTER, _CENTER_REACH) if count == 1 else (_ROTATED, _ROTATED_REACH)
         solid = self.nearest, self.seen, self.farthest, kernels_chosen.tiled(self.farthest)

@@ -28,7 +28,7 @@ def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int
     used, or cannot build the scene.
     """
     camera = shot.camera(instant, sensor)
-    if camera.distortion is not None or camera.intrinsics.skew:
+    if not camera.lens.is_linear or camera.intrinsics.skew:
         return None
     python = shot.engine_options.get("python") if shot.engine == "cycles" else None
     options = {"python": python, "samples": 1, "bounces": 0, "denoise": "off", "settings": SHARP}

@@ -58,7 +58,7 @@ def views_of(camera: Camera) -> tuple[PinholeView, ...]:
     """The covering pictures of a camera: the camera's own for a pinhole without skew, one that is somewhat wider for a lens
     that bends rays a little, else up to six sides of a cube.
     """
-    if camera.distortion is None and camera.intrinsics.skew == 0:
+    if camera.lens.is_linear and camera.intrinsics.skew == 0:
         return (PinholeView(camera),)
     rays = pixel_rays(camera.intrinsics).reshape(-1, 3)
     known = np.flatnonzero(np.isfinite(rays).all(axis=1))

@@ -160,7 +160,7 @@ def _lacking(samples: Sequence[Sample], finishes: Sequence[Finish], off: float) 
     """Lines about lens and picture properties that the .blend file lacks; `off` is the camera's error in distances."""
     if off > MOST_OFF:
         yield f"the camera is off by up to {off:.1g} of its distance: Blender's numbers are single, the origin far"
-    if any(sample.camera.distortion is not None or sample.camera.intrinsics.skew for sample in samples):
+    if any(not sample.camera.lens.is_linear or sample.camera.intrinsics.skew for sample in samples):
         yield "Blender's camera has no such distortion or skew: a pinhole of the same focal lengths and centre takes its place"
     if any(has_effects(f.effects) or f.smoother.kind != "none" or f.effects.jpeg for f in finishes):
         yield "scene.effects and scene.smoother are not in the file: viewsphere does them to the finished picture"

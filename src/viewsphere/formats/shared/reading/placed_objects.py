@@ -28,7 +28,7 @@ def placed(box: Float, world_from_object: Float, camera_from_world: Float, lens:
     pixels, in_front = np.full((8, 2), np.nan), in_camera[:, 2] > 0
     if lens is not None:
         with np.errstate(over="ignore"):
-            pixels, in_front = project(lens, in_camera)
+            pixels, _ = project(lens, in_camera)
     view = view_of(camera_from_object, np.nan_to_num((box[2] + box[4]) / 2))
     return {
         "box3d_object": box,

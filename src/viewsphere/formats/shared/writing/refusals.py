@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from viewsphere.formats import Scope
-from viewsphere.model.camera import Intrinsics, Scan
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import missing
 from viewsphere.model.sample import Sample
 
@@ -17,7 +17,7 @@ def lenses(scope: Scope) -> Iterator[tuple[str, Intrinsics]]:
     if scope.rig is not None:
         yield from ((sensor.name, sensor.intrinsics) for sensor in scope.rig.sensors if sensor.lidar is None)
     for sample in scope.pictures:
-        if sample.known_camera is not None and not isinstance(sample.known_camera.distortion, Scan):
+        if sample.known_camera is not None and not sample.known_camera.lens.is_scan:
             yield sample.sensor, sample.known_camera.intrinsics
 
 
@@ -81,8 +81,15 @@ def stereo(scope: Scope) -> Iterator[str]:
 def pinhole(scope: Scope) -> Iterator[str]:
     """Of a format without lens distortion."""
     for name, lens in lenses(scope):
-        if lens.distortion is not None:
+        if not lens.lens.is_linear:
             yield f"expected pinhole cameras; found the lens of {name}"
+
+
+def opencv_lenses(scope: Scope) -> Iterator[str]:
+    """Of a format that has OpenCV's lens models alone."""
+    for name, lens in lenses(scope):
+        if lens.lens.opencv is None:
+            yield f"expected lenses of OpenCV's models; found {lens.lens.name} of {name}"
 
 
 def most_objects(scope: Scope, most: int) -> Iterator[str]:

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.kernels_lens import azimuth_from, row_of
+from viewsphere.geometry.lenses.shared.kernels_lens import azimuth_from, row_of
 from viewsphere.kernels.jit import inner, njit
 
 

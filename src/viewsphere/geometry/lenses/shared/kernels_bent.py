@@ -4,8 +4,8 @@ An edge is a line in the plane z = 1 (Brown-Conrady) or an arc of the unit spher
 picture by length is at most b, a piece of length L stays within b L^2 / 8 of the chord between its ends' pixels. So most edges
 cannot leave the box of the triangles' corners, and the few that can are halved until no piece can.
 
-A lens is (is a fisheye, coefficients, limit, camera matrix, table): limit as in `geometry.camera.lens_limit`, included; table
-as `tabulate` fills it. A direction's distance from the axis is r/z for Brown-Conrady, an angle for a fisheye.
+A lens is (is a fisheye, coefficients, limit, camera matrix, table): limit as in `BentLens`; table as `tabulate`
+fills it. A direction's distance from the axis is r/z for Brown-Conrady, an angle for a fisheye.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.kernels_lens import brown_conrady, radial_fisheye
+from viewsphere.geometry.lenses.shared.kernels_lens import brown_conrady, radial_fisheye
 from viewsphere.kernels.jit import inner, njit
 
 TOLERANCE = 1e-5  # pixels by which a box may be too small, at most

@@ -75,14 +75,13 @@ def invert_radial(k, fisheye, target, limit):
 
 
 @njit
-def rays_brown(k, limit, matrix, x0, y0, samples, out):
-    """Undistorted rays (x, y, 1) of the sample centres; NaN beyond the range in which the lens map is one-to-one."""
-    for j in range(out.shape[0]):
-        for i in range(out.shape[1]):
-            v = ((j + y0 + 0.5) / samples - matrix[1, 2]) / matrix[1, 1]
-            u = ((i + x0 + 0.5) / samples - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
-            x, y = undistort_brown(k, limit, u, v)
-            out[j, i, 0], out[j, i, 1], out[j, i, 2] = x, y, 1.0
+def rays_brown(k, limit, matrix, xy, out):
+    """Undistorted rays (x, y, 1) through positions xy (N, 2); NaN beyond the range in which the lens map is one-to-one."""
+    for i in range(xy.shape[0]):
+        v = (xy[i, 1] - matrix[1, 2]) / matrix[1, 1]
+        u = (xy[i, 0] - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
+        x, y = undistort_brown(k, limit, u, v)
+        out[i, 0], out[i, 1], out[i, 2] = x, y, np.nan if math.isnan(x) else 1.0
 
 
 @njit
@@ -119,20 +118,19 @@ def undistort_brown(k, limit, u, v):
 
 
 @njit
-def rays_fisheye(k, limit, matrix, x0, y0, samples, out):
-    """Unit rays of the sample centres; NaN beyond the largest angle `limit`."""
-    for j in range(out.shape[0]):
-        for i in range(out.shape[1]):
-            v = ((j + y0 + 0.5) / samples - matrix[1, 2]) / matrix[1, 1]
-            u = ((i + x0 + 0.5) / samples - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
-            radius = math.sqrt(u * u + v * v)
-            if radius == 0.0:
-                out[j, i, 0], out[j, i, 1], out[j, i, 2] = 0.0, 0.0, 1.0
-                continue
-            theta = invert_radial(k, True, radius, limit)
-            sine = math.sin(theta) / radius
-            out[j, i, 0], out[j, i, 1] = u * sine, v * sine
-            out[j, i, 2] = math.cos(theta)
+def rays_fisheye(k, limit, matrix, xy, out):
+    """Unit rays through positions xy (N, 2) of the picture; NaN beyond the largest angle `limit`."""
+    for i in range(xy.shape[0]):
+        v = (xy[i, 1] - matrix[1, 2]) / matrix[1, 1]
+        u = (xy[i, 0] - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
+        radius = math.sqrt(u * u + v * v)
+        if radius == 0.0:
+            out[i, 0], out[i, 1], out[i, 2] = 0.0, 0.0, 1.0
+            continue
+        theta = invert_radial(k, True, radius, limit)
+        sine = math.sin(theta) / radius
+        out[i, 0], out[i, 1] = u * sine, v * sine
+        out[i, 2] = math.cos(theta)
 
 
 @njit
@@ -169,13 +167,12 @@ def scan_ray(k, u, v):
 
 
 @njit
-def rays_scan(k, limit, matrix, x0, y0, samples, out):
-    """Unit rays of the sample centres; NaN beyond a whole turn around the scan's middle, and beyond straight up and down."""
-    for j in range(out.shape[0]):
-        for i in range(out.shape[1]):
-            v = ((j + y0 + 0.5) / samples - matrix[1, 2]) / matrix[1, 1]
-            u = ((i + x0 + 0.5) / samples - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
-            out[j, i, 0], out[j, i, 1], out[j, i, 2] = scan_ray(k, u, v)
+def rays_scan(k, matrix, xy, out):
+    """Unit rays through positions xy (N, 2); NaN beyond a whole turn around the middle, and beyond straight up and down."""
+    for i in range(xy.shape[0]):
+        v = (xy[i, 1] - matrix[1, 2]) / matrix[1, 1]
+        u = (xy[i, 0] - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
+        out[i, 0], out[i, 1], out[i, 2] = scan_ray(k, u, v)
 
 
 @njit
@@ -186,7 +183,7 @@ def azimuth_from(turn, x, z):
 
 
 @njit
-def distort_scan(k, limit, points, out):
+def distort_scan(k, points, out):
     """Azimuth from a scan's middle, and row, of camera points (N, 3); NaN straight above and below, and at the centre."""
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]

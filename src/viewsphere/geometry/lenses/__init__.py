@@ -1,0 +1,287 @@
+"""Lens models, one file each: a lens gives a ray for each pixel and a pixel for each point.
+
+A file holds `LENS = LensSpec(...)`, whose name in recipes is the file's. Nothing outside this package depends on which model a
+lens is: it uses the methods and the properties of `Lens`, which `lens_of` returns.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, model_validator
+
+from viewsphere.errors import PluginError
+from viewsphere.geometry.box import Bounds
+from viewsphere.geometry.lens import Intrinsics
+from viewsphere.plugin_modules import entry_points, listed
+
+Float = NDArray[np.float64]
+Window = tuple[int, int, int, int]
+"""Pixels [x0, x1) x [y0, y1) as (x0, y0, x1, y1); may reach outside the image."""
+
+DEFAULT = "pinhole"
+"""The lens of intrinsics without `distortion`."""
+
+
+class LensParameters(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True):
+    """The parameters of a lens besides its camera matrix K; each lens model has a class of its own."""
+
+    model: str = Field(description="the lens model")
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """All parameters in order, as formats list them that have one list of numbers."""
+        values = (value for name, value in self if name != "model")
+        return tuple(float(number) for value in values for number in np.ravel(value))
+
+
+class Rays(NamedTuple):
+    """Rays in camera axes: origins and directions (..., 3), metres. NaN directions where a lens has no ray."""
+
+    origins: Float
+    directions: Float
+
+
+def central(directions: Float) -> Rays:
+    """The rays of these directions that begin at the camera's centre."""
+    return Rays(np.broadcast_to(np.zeros(3), directions.shape), directions)
+
+
+class OpenCVLens(NamedTuple):
+    """A lens as OpenCV's functions take it besides K: `cv2.fisheye` or `cv2.projectPoints`, and `distCoeffs`."""
+
+    is_fisheye: bool
+    coefficients: tuple[float, ...]
+
+
+class LensSpec(BaseModel):
+    """A lens model: typed parameters, and functions whose first value is a `viewsphere.geometry.lenses.Lens`."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", arbitrary_types_allowed=True, strict=True, hide_input_in_errors=True, defer_build=True
+    )
+
+    KIND: ClassVar[Any] = "lenses"
+
+    parameters: type[LensParameters] = Field(
+        description="the class of the parameters in `distortion` of a recipe, a subclass of "
+        "`viewsphere.geometry.lenses.LensParameters`"
+    )
+    rays: Callable[[Any, Float], Rays] = Field(
+        description="`rays(lens, xy)`: the rays through positions (N, 2) of the picture, in camera axes, NaN where there is "
+        "none. All pass through the camera's centre: use `viewsphere.geometry.lenses.central`"
+    )
+    project: Callable[[Any, Float], Float] = Field(
+        description="`project(lens, points)`: the positions (N, 2) in the picture of points (N, 3) in camera axes, NaN where "
+        "the lens does not show a point. Inverse of `rays`"
+    )
+    has_unit_rays: bool = Field(
+        default=True,
+        description="whether directions are unit vectors, which may look anywhere; False: all have z = 1, and only points with "
+        "z > 0 are shown",
+    )
+    is_linear: bool = Field(
+        default=False, description="whether pixels are K times points, as a pinhole's: straight lines stay straight"
+    )
+    is_scan: bool = Field(default=False, description="whether pixels are a LiDAR's measurements instead of a picture")
+    bounds: Callable[..., tuple[Bounds | None, bool]] | None = Field(
+        default=None,
+        description="`bounds(lens, R, t, vertices, is_used, triangles)`: the 2D box of what the lens shows of triangles (n, 3) "
+        "of world vertices (v, 3), None without, and whether it shows all. Default: a search that needs `project` alone",
+    )
+    focal: Callable[[float, float], float] | None = Field(
+        default=None,
+        description="`focal(fov, extent)`: the focal length, pixels, with which `extent` pixels span an angle (radians) around "
+        "the axis. Default: a pinhole's",
+    )
+    field_of_view: Callable[[Any], tuple[float, float]] | None = Field(
+        default=None,
+        description="`field_of_view(lens)`: angles of view across and down, degrees; by default between the outermost pixels",
+    )
+    as_opencv: Callable[[Any], OpenCVLens] | None = Field(
+        default=None,
+        description="`as_opencv(lens)`: the same lens in OpenCV's terms, for formats that have its models; None: it has none",
+    )
+    ray_cells: int | None = Field(
+        default=None,
+        description="cells a side of each face of the cube in which rays are indexed. Default: cells of two pixels at the axis",
+    )
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _explain(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        try:
+            return handler(data)
+        except ValidationError as error:
+            lines = (f"LensSpec.{'.'.join(map(str, e['loc']))}: {e['msg'].lower()}" for e in error.errors())
+            raise PluginError("\n".join(lines)) from None
+
+
+@dataclass(frozen=True, eq=False)
+class Lens:
+    """A lens model with its parameters and camera matrix, in front of a picture of one size."""
+
+    spec: LensSpec
+    intrinsics: Intrinsics
+    parameters: Any
+
+    @property
+    def name(self) -> str:
+        """The name of its model."""
+        return self.parameters.model
+
+    @property
+    def is_linear(self) -> bool:
+        """Return whether pixels are K times points, as a pinhole's."""
+        return self.spec.is_linear
+
+    @property
+    def has_unit_rays(self) -> bool:
+        """Return whether ray directions are unit vectors, which may look anywhere, instead of vectors of z = 1."""
+        return self.spec.has_unit_rays
+
+    @property
+    def is_scan(self) -> bool:
+        """Return whether pixels are a LiDAR's measurements instead of a picture."""
+        return self.spec.is_scan
+
+    @property
+    def ray_cells(self) -> int | None:
+        """Cells a side of a face of the cube in which rays are indexed; None: of about two pixels at the axis."""
+        return self.spec.ray_cells
+
+    @cached_property
+    def opencv(self) -> OpenCVLens | None:
+        """The same lens in OpenCV's terms, which many formats share; None where OpenCV has no such model."""
+        return None if self.spec.as_opencv is None else self.spec.as_opencv(self)
+
+    @property
+    def record(self) -> dict[str, Any] | None:
+        """The model and its parameters as plain data, None for a pinhole."""
+        own = self.intrinsics.distortion
+        return None if own is None else own.model_dump(mode="json")
+
+    @property
+    def flat_record(self) -> dict[str, Any] | None:
+        """The model, and its parameters as one list of `coefficients`, None for a pinhole."""
+        own = self.intrinsics.distortion
+        return None if own is None else {"model": own.model, "coefficients": list(own.numbers)}
+
+    def rays(self, xy: ArrayLike) -> Rays:
+        """The rays through positions (..., 2) of the picture. Directions are NaN where there is none, and have z = 1 unless
+        the lens `has_unit_rays`.
+        """
+        at = np.ascontiguousarray(xy, np.float64)
+        origins, directions = self.spec.rays(self, at.reshape(-1, 2))
+        shape = (*at.shape[:-1], 3)
+        return Rays(origins.reshape(shape), directions.reshape(shape))
+
+    def directions(self, subdivision: int = 1, window: Window | None = None) -> Float:
+        """Directions of the rays through sample centres, (H, W, 3): `subdivision` x `subdivision` samples a pixel.
+
+        `window` (x0, y0, x1, y1) replaces the image by other pixels, which may lie outside it.
+        """
+        i = self.intrinsics
+        x0, y0, x1, y1 = (subdivision * edge for edge in window or (0, 0, i.width, i.height))
+        across, down = (np.arange(x0, x1) + 0.5) / subdivision, (np.arange(y0, y1) + 0.5) / subdivision
+        if self.is_linear:
+            rays, y = np.empty((y1 - y0, x1 - x0, 3)), (down - i.cy) / i.fy
+            rays[..., 0], rays[..., 1] = (across - i.cx - i.skew * y[:, None]) / i.fx, y[:, None]
+        else:
+            xy = np.empty((y1 - y0, x1 - x0, 2))
+            xy[..., 0], xy[..., 1] = across, down[:, None]
+            origins, rays = self.rays(xy)
+            if origins.any():
+                raise PluginError(f"lens {self.name}: expected rays that all begin at the camera's centre; found others")
+        if not self.has_unit_rays:
+            rays[..., 2] = 1.0  # also where it has no ray
+        return rays
+
+    def project(self, points: ArrayLike) -> tuple[Float, NDArray[np.bool_]]:
+        """Positions in the picture, (..., 2) float64, of points (..., 3) in camera axes, and whether the lens shows them, (...)
+        bool. Positions that it does not show are NaN.
+        """
+        points = np.asarray(points, np.float64)
+        xy = self.spec.project(self, np.ascontiguousarray(points.reshape(-1, 3))).reshape(*points.shape[:-1], 2)
+        return xy, ~np.isnan(xy[..., 0])
+
+    def bounds(
+        self, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
+    ) -> tuple[Bounds | None, bool]:
+        """The 2D box (x0, y0, x1, y1) of what the lens shows of triangles (n, 3), whose corners are world vertices (v, 3), None
+        if that is nothing; and whether it shows all of them. `is_used`: the vertices that triangles use.
+        """
+        if self.spec.bounds is None:
+            from viewsphere.geometry.lenses.shared.outline import bounds
+
+            return bounds(self, R, t, vertices, is_used, triangles)
+        return self.spec.bounds(self, R, t, vertices, is_used, triangles)
+
+    def field_of_view(self) -> tuple[float, float]:
+        """Angles of view across and down, degrees."""
+        if self.spec.field_of_view is not None:
+            return self.spec.field_of_view(self)
+        i = self.intrinsics
+        column, row = (int(np.clip(v, 0, most - 1)) for v, most in ((i.cx, i.width), (i.cy, i.height)))
+        strips = (0, row, i.width, row + 1), (column, 0, column + 1, i.height)
+        angles = [angles_off_axis(self.directions(1, strip).reshape(-1, 3)) for strip in strips]
+        across, down = (float(np.nanmax(a[: len(a) // 2]) + np.nanmax(a[len(a) // 2 :])) for a in angles)
+        return across, down
+
+
+def angles_off_axis(directions: Float) -> Float:
+    """Angles of directions (N, 3) to the optical axis, degrees."""
+    return np.degrees(np.arctan2(np.hypot(directions[:, 0], directions[:, 1]), directions[:, 2]))
+
+
+@lru_cache(maxsize=64)
+def lens_of(intrinsics: Intrinsics) -> Lens:
+    """The lens of these intrinsics. Raises PluginError where a third party's model is not installed, or not valid."""
+    own = intrinsics.distortion
+    spec = _spec(DEFAULT if own is None else own.model)
+    return Lens(spec, intrinsics, LensParameters(model=DEFAULT) if own is None else own)
+
+
+def focal_from_fov(fov: float, extent: float, parameters: LensParameters | None = None) -> float:
+    """The focal length, pixels, with which `extent` pixels span the angle `fov` (radians); without parameters a pinhole's."""
+    focal = _spec(DEFAULT if parameters is None else parameters.model).focal
+    return extent / (2 * math.tan(fov / 2)) if focal is None else focal(fov, extent)
+
+
+def lens_parameters(model: str, **values: Any) -> LensParameters:
+    """The parameters of a lens model. Raises PluginError for an unknown model, ValidationError for invalid values."""
+    return _spec(model).parameters.model_validate({"model": model, **values})
+
+
+def read_parameters(value: Any) -> Any:
+    """The parameters of a lens model that are given as a mapping with its name as `model`; any other value unchanged."""
+    if not isinstance(value, Mapping) or not isinstance(value.get("model"), str):
+        return value
+    return _spec(value["model"]).parameters.model_validate(dict(value))
+
+
+def opencv_parameters(coefficients: tuple[float, ...], is_fisheye: bool = False) -> LensParameters:
+    """The parameters of a lens of OpenCV's: k1 k2 k3 k4 of `cv2.fisheye`, else k1 k2 p1 p2 [k3 [k4 k5 k6]]."""
+    return lens_parameters("fisheye" if is_fisheye else "brown_conrady", coefficients=coefficients)
+
+
+def _spec(name: str) -> LensSpec:
+    """The spec of a lens model, without the suggestions that `viewsphere.plugins.load` adds to its errors."""
+    entry = next((entry for entry in entry_points(group="viewsphere.lenses") if entry.name == name), None)
+    if entry is not None:
+        found = entry.load()
+    elif (name, False) in listed(__name__):
+        found = importlib.import_module(f"{__name__}.{name}")
+    else:
+        raise PluginError(f"lens {name}: expected a lens model of viewsphere or of an installed package; found none")
+    spec = found if isinstance(found, LensSpec) else getattr(found, "LENS", None)
+    if not isinstance(spec, LensSpec):
+        raise PluginError(f"lens {name}: expected LENS = LensSpec(...) in its module; found none")
+    return spec

@@ -1,0 +1,74 @@
+"""A pinhole: pixels are K times points, and straight lines stay straight."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.box import NEAR, Bounds
+from viewsphere.geometry.lenses import Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
+
+Float = NDArray[np.float64]
+
+
+class Pinhole(LensParameters, frozen=True):
+    """No parameters besides K."""
+
+    model: Literal["pinhole"] = "pinhole"
+
+
+def rays(lens: Lens, xy: Float) -> Rays:
+    """Rays of z = 1."""
+    i, out = lens.intrinsics, np.ones((len(xy), 3))
+    out[:, 1] = (xy[:, 1] - i.cy) / i.fy
+    out[:, 0] = (xy[:, 0] - i.cx - i.skew * out[:, 1]) / i.fx
+    return central(out)
+
+
+def project(lens: Lens, points: Float) -> Float:
+    """Positions of points in front of the camera."""
+    i = lens.intrinsics
+    z = np.where(points[:, 2] > 0, points[:, 2], np.nan)
+    x, y = points[:, 0] / z, points[:, 1] / z
+    return np.stack([i.fx * x + i.skew * y + i.cx, i.fy * y + i.cy], axis=-1)
+
+
+def bounds(
+    lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
+) -> tuple[Bounds | None, bool]:
+    """The box of the corners; triangles that cross the plane z = NEAR of the camera are cut there."""
+    from viewsphere.geometry.lenses.shared import kernels_linear as kernels
+
+    k = lens.intrinsics.K
+    x0, y0, x1, y1, front = kernels.whole_bounds(vertices, is_used, 0, k, R, t, NEAR)
+    if front:
+        return (x0, y0, x1, y1), True
+    x0, y0, x1, y1, whole = kernels.cut_bounds(vertices, triangles, 0, len(triangles), 0, len(vertices), k, R, t, NEAR)
+    return ((x0, y0, x1, y1) if x0 <= x1 else None), bool(whole)
+
+
+def field_of_view(lens: Lens) -> tuple[float, float]:
+    """Angles through the principal point."""
+    i = lens.intrinsics
+    across = math.atan(i.cx / i.fx) + math.atan((i.width - i.cx) / i.fx)
+    return math.degrees(across), math.degrees(math.atan(i.cy / i.fy) + math.atan((i.height - i.cy) / i.fy))
+
+
+def as_opencv(lens: Any) -> OpenCVLens:
+    """No coefficients."""
+    return OpenCVLens(False, ())
+
+
+LENS = LensSpec(
+    parameters=Pinhole,
+    rays=rays,
+    project=project,
+    has_unit_rays=False,
+    is_linear=True,
+    bounds=bounds,
+    field_of_view=field_of_view,
+    as_opencv=as_opencv,
+)

@@ -1,0 +1,100 @@
+"""The rays of a LiDAR: rows are its rings, columns azimuths."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from viewsphere.geometry.box import Bounds
+from viewsphere.geometry.lenses import Lens, LensParameters, LensSpec, Rays, central
+
+Float = NDArray[np.float64]
+Degrees = Annotated[float, Field(ge=-90, le=90)]
+
+CELLS = 128
+"""Cells along a side of the cube around a scan: smaller ones are slower, as rows of rays are sparse."""
+
+
+class Scan(LensParameters, frozen=True):
+    """The rays of a LiDAR: every ring, a row of the picture, has one elevation, every column one azimuth.
+
+    A direction's azimuth is counted to the right from that of the picture's middle, `turn_deg` to the right of the z axis; K
+    takes it (radians) to columns, and a ring's number + 0.5 to rows. Between rings, and beyond the outermost by the step next
+    to them, elevations go on evenly; a lone ring's rows are a degree apart.
+    """
+
+    model: Literal["scan"] = "scan"
+    elevations_deg: tuple[Degrees, ...] = Field(min_length=1, description="elevation of each ring, highest first")
+    turn_deg: float = Field(default=0.0, ge=-360, le=360, description="azimuth of the picture's middle, to the right")
+
+    @model_validator(mode="after")
+    def _falling(self) -> Self:
+        for above, below in pairwise(self.elevations_deg):
+            if above <= below:
+                raise ValueError(f"expected elevations that fall from ring to ring; found {above:g}, then {below:g}")
+        return self
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """`turn_deg`, then the elevations, degrees."""
+        return (self.turn_deg, *self.elevations_deg)
+
+
+def rays(lens: Lens, xy: Float) -> Rays:
+    """Unit rays; NaN beyond a whole turn around the scan's middle, and beyond straight up and down."""
+    from viewsphere.geometry.lenses.shared import kernels_lens as kernels
+
+    out = np.empty((len(xy), 3))
+    kernels.rays_scan(_angles(lens.parameters), lens.intrinsics.K, xy, out)
+    return central(out)
+
+
+def project(lens: Lens, points: Float) -> Float:
+    """Positions of points in all directions but straight up and down."""
+    from viewsphere.geometry.lenses.shared import kernels_lens as kernels
+
+    i, out = lens.intrinsics, np.empty((len(points), 2))
+    kernels.distort_scan(_angles(lens.parameters), points, out)
+    x, y = out.T
+    return np.stack([i.fx * x + i.skew * y + i.cx, i.fy * y + i.cy], axis=-1)
+
+
+def bounds(
+    lens: Lens, R: Float, t: Float, vertices: Float, is_used: NDArray[np.bool_], triangles: NDArray[np.int32]
+) -> tuple[Bounds | None, bool]:
+    """The box of azimuths and rows: the full circle if the triangles span it, or cross the first and last column."""
+    from viewsphere.geometry.lenses.shared import kernels_scan
+
+    room, (k, skew) = np.empty((len(vertices), 5)), (lens.intrinsics.K, lens.intrinsics.skew)
+    u0, v0, u1, v1 = kernels_scan.bounds(vertices, is_used, triangles, R, t, _angles(lens.parameters), room)
+    (fx, _, cx), (_, fy, cy), _ = k.tolist()
+    assert skew == 0
+    return (fx * u0 + cx, fy * v0 + cy, fx * u1 + cx, fy * v1 + cy), True
+
+
+def field_of_view(lens: Lens) -> tuple[float, float]:
+    """All columns, and from the lowest to the highest ring."""
+    rings = lens.parameters.elevations_deg
+    return math.degrees(lens.intrinsics.width / lens.intrinsics.fx), rings[0] - rings[-1]
+
+
+def _angles(scan: Scan) -> Float:
+    """The azimuth of the middle and the elevations, radians, of two rings at least."""
+    lone = (scan.elevations_deg[0] - 1.0,) if len(scan.elevations_deg) == 1 else ()
+    return np.array([math.radians(angle) for angle in (*scan.numbers, *lone)])
+
+
+LENS = LensSpec(
+    parameters=Scan,
+    rays=rays,
+    project=project,
+    is_scan=True,
+    bounds=bounds,
+    field_of_view=field_of_view,
+    ray_cells=CELLS,
+)
