@@ -230,6 +230,6 @@ def _memory() -> Path:
 
 
 def _aside(place: Path) -> ScratchDir:
-    """A new folder there, once those of processes that were killed with their Blender are gone."""
+    """Return a new scratch folder in this place, after removing those of killed processes."""
     sweep(place, PREFIX)
     return ScratchDir.make(place, PREFIX)

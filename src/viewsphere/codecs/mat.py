@@ -88,7 +88,7 @@ class _Reader:
             raise ValueError(f"expected at most {limits.MAX_MAT_ARRAYS:,} arrays (limit MAX_MAT_ARRAYS); found more")
 
     def _next(self, parts: Iterator[tuple[int, memoryview]], kinds: Container[int] = DTYPES, least: int = 0) -> Any:
-        """The numbers of the next element, of one of these types, and so many at least."""
+        """Read the next element, which needs one of these types and at least this many numbers."""
         kind, data = next(parts, (0, memoryview(b"")))
         if kind not in kinds:
             raise ValueError(f"found an element of type {kind} where another belongs, or a file that is cut off")

@@ -23,6 +23,6 @@ def member(name: str, data: bytes) -> bytes:
 
 
 def ending(size: int) -> bytes:
-    """Return the bytes behind the last file of a tar of so many bytes: two empty blocks, and the padding of a record."""
+    """Return the bytes that end a tar of this size: two empty blocks, and the padding of a record."""
     least = size + 2 * tarfile.BLOCKSIZE
     return bytes(least + -least % tarfile.RECORDSIZE - size)

@@ -258,7 +258,7 @@ class Schedule:
 
     @property
     def poses(self) -> Iterator[int]:
-        """Their indices, in order."""
+        """The indices of the poses, in order."""
         return chain.from_iterable(range(run.first, run.stop) for run in self.runs)
 
     def run_of(self, pose: int) -> Run:

@@ -104,7 +104,7 @@ class _Scenes:
         self._mesh = lru_cache(maxsize=MESHES)(self.dataset.mesh)
 
     def add(self, sample: Sample) -> str:
-        """The file of the scene of the data set's next sample, empty where it has none."""
+        """Return the file of the next sample's scene; empty for a sample without one."""
         known, place = _known(sample), self._count
         self._count += 1
         if not known:

@@ -50,7 +50,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Still pictures; names that take more than a line."""
+    """Yield the refused samples: still pictures, and names longer than a line."""
     yield from sequences(scope)
     yield from plain_names(scope, r"\S([^\r\n]*\S)?", "of one line, without spaces at its ends")
 

@@ -56,7 +56,7 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Pictures of which none has a known camera."""
+    """Yield an error if no picture has a known camera."""
     yield from any_camera(scope)
 
 

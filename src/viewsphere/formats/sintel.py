@@ -68,7 +68,7 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Still pictures, rigs of several cameras that are no pair, lenses that bend."""
+    """Yield the refused samples: still pictures, rigs that are no pair, and distorted lenses."""
     yield from refusals.sequences(scope)
     yield from refusals.stereo(scope) if options.stereo else two_eyes(scope)
     yield from refusals.pinhole(scope)

@@ -151,7 +151,7 @@ def product(a: ArrayLike, b: ArrayLike) -> Float:
 
 
 def inverse(matrix: ArrayLike) -> Float:
-    """The inverses of matrices (..., 3, 3) by their cofactors; no LAPACK, which rounds differently by processor as well."""
+    """Return the inverses of matrices (..., 3, 3) by their cofactors: LAPACK rounds differently on each processor."""
     m = np.asarray(matrix, np.float64)
     cofactors = np.stack([np.cross(m[..., (i + 1) % 3, :], m[..., (i + 2) % 3, :]) for i in range(3)], axis=-1)
     x, y, z = (m[..., 0, i] * cofactors[..., i, 0] for i in range(3))

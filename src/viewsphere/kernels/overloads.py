@@ -46,7 +46,7 @@ class Overload:
 
 @cache
 def table() -> tuple[Overload, ...]:
-    """The overloads, those first that take longest to compile."""
+    """The overloads, in order of their compile time, longest first."""
     rows = json.loads(read_text(TABLE)) if TABLE.is_file() else []
     return tuple(Overload(row[0], row[1], row[2], row[3] if row[3] is None else tuple(row[3]), row[4]) for row in rows)
 

@@ -198,8 +198,10 @@ def compute(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mappi
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """At most one expression for each visible object, whose text has the parts that are told; where the words for all objects'
-    looks are known by the label `looks`, it is the one that singles the object out, and there is none only where none does.
+    """Check that each visible object has at most one expression, with all parts in its text.
+
+    If the label `looks` gives words for all objects, the expression must single out its object, and a missing expression is an
+    error where one exists.
     """
     visible = [o for o in sample.objects if o.box2d is not None]
     ids = [one.object for one in sample.referring]

@@ -38,7 +38,7 @@ def credits_of(specs: Iterable[ModelSpec], said: Mapping[str, Credit]) -> dict[s
 
 
 def unlicensed(keys: Iterable[str], known: Mapping[str, Credit]) -> Iterator[str]:
-    """One line that names the models whose licence is not known; none if there is no such model."""
+    """Yield one line that names the models without a known licence; none if all have one."""
     keys = [key for key in keys if key not in known or known[key].licence is None]
     if keys:
         have = f"{quantity(len(keys), 'model')} {'have' if len(keys) > 1 else 'has'} no licence ({first_few(keys)})"

@@ -56,5 +56,5 @@ def quotas(shares: Mapping[str, float], count: int) -> dict[str, int]:
 
 
 def expected(splits: Splits, count: int) -> dict[str, int]:
-    """About how many of `count` hashed names are in each split; of all together as many."""
+    """Return the expected number of names in each split. The numbers add up to `count`."""
     return quotas(shared(splits), count)

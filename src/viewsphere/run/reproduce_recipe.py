@@ -176,7 +176,7 @@ def _recipe(
 
 
 def _channels(formats: Formats) -> list[str]:
-    """Pictures, and what else the formats read."""
+    """Return the pictures and other channels that the formats need."""
     needed = {name for entry in read_formats(formats) for name in needs_of(plugins.load(FormatSpec, entry.name), entry)}
     return [name for name in CHANNELS if name == CHANNELS[0] or name in needed]
 

@@ -57,7 +57,7 @@ def shard_of_worker(frames: object) -> Shard:
 
 
 def register_for_loaders(kind: type) -> None:
-    """Let PyTorch's DataLoader take objects of a class as data sets to iterate over."""
+    """Register a class as an iterable data set of PyTorch's DataLoader."""
     data: Any = sys.modules.get("torch.utils.data")
     if data is not None:
         data.IterableDataset.register(kind)

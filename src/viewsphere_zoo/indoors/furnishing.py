@@ -186,7 +186,7 @@ class Furnishing:
         return None
 
     def on(self, other: Stand, name: str, family: str, fits: Fits = lambda p: True, turn: float = 0.0) -> Stand | None:
-        """On the middle of a surface of what stands there, whose name begins so."""
+        """Put a thing on the middle of a surface of the piece whose name begins with this text."""
         surface = next((s for s in other.surfaces() if s.name.startswith(name)), None)
         found = self.design(family, lambda p: fits(p) and surface is not None and extent(p)[2] < surface.clearance)
         if surface is None or found is None:

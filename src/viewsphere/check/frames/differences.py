@@ -26,7 +26,7 @@ ABSENT = Absent()
 
 
 def differences(expected: Any, found: Any, path: str = "") -> Iterator[Difference]:
-    """The leaves at which two values of JSON differ; of lists of other lengths the whole lists."""
+    """Yield the leaves at which two JSON values differ. Lists of different lengths differ as a whole."""
     if isinstance(expected, dict) and isinstance(found, dict):
         keys: dict[str, None] = dict.fromkeys((*expected, *found))
         for key in keys:

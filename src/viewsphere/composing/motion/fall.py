@@ -14,7 +14,7 @@ from viewsphere.recipe.draws import Drawn
 
 
 class Options(Frozen):
-    """The fall by which the layout (fall or container) puts it where it comes to rest; then it lies there."""
+    """The options of a fall from the layout `fall` or `container` to the place of rest."""
 
     begin: Drawn[Number] = Field(default=0.0, description="release time in seconds; before, the thing hangs in its place")
     speed: Drawn[Positive] = Field(default=1.0, description="speed factor: 0.25 is slow motion")

@@ -134,9 +134,9 @@ class Store:
 
     @contextmanager
     def telling(self, own: Path, shard: tuple[int, int]) -> Generator[HeartbeatWriter]:
-        """Tell of a run of this shard, as long as the block lasts, in the folder that `occupied` gave it.
+        """Announce a run of this shard during the block, in the folder from `occupied`.
 
-        One of several that fails leaves a note that says why, until its shard is rendered again, or all is finished.
+        If one of several shards fails, a note with the reason stays until this shard is rendered again, or all is finished.
         """
         note = self._failed / f"{shard[0]}-of-{shard[1]}.json"
         with HeartbeatWriter(lambda text: self._tell(own, text), shard) as pulse:

@@ -118,7 +118,7 @@ class ModelInfo:
 
     @property
     def node(self) -> str | None:
-        """The name of the GLB's node that shows its time step, None where all of it is meant."""
+        """The name of the GLB's node for the time step; None for the whole GLB."""
         return None if self.step is None else PurePosixPath(self.obj).stem
 
     def at(self, frame: int | None) -> ModelInfo:

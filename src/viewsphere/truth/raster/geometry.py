@@ -352,7 +352,7 @@ def with_both_sides(geometry: Geometry) -> Geometry:
 
 
 def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
-    """The same, but BLEND materials are surface wherever they have a colour, which labels leave out where it is faint."""
+    """Return the geometry with BLEND materials as surface wherever they have a colour. Labels leave out their faint parts."""
     if not any(material.alpha_mode == "BLEND" for mesh in meshes for material in mesh.materials):
         return geometry
     ground = geometry.triangle_cutout[geometry.triangle_start[-1] :]

@@ -13,7 +13,7 @@ _DECLARED = re.compile(rb"""<\?xml[^>]*encoding\s*=\s*["']([A-Za-z0-9._-]+)""")
 
 
 class _EntityError(Exception):
-    """A declared entity: a few of them in one another expand to gigabytes, and some name files."""
+    """A file declares an entity. Entities are refused: nested ones expand to gigabytes, and some name files."""
 
 
 def parse_xml(folder: ModelFolder, data: bytes, file: str = "") -> Element:

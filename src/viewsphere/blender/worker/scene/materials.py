@@ -267,7 +267,7 @@ def _more_shine(graph, alpha):
 
 
 def _principled(graph, told, look, color, transmission=0.0):
-    """The opaque surface, or that of a solid that transmits; with a black base colour a dielectric only mirrors and emits."""
+    """Return the opaque surface, or that of a transmitting solid. A black dielectric only mirrors and emits."""
     reflectance = _reflectance(told)
     inputs = {
         "Base Color": color,

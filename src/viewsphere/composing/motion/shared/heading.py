@@ -20,7 +20,7 @@ LEVEL = 1e-9
 
 
 def headed(pose: Pose, direction: ArrayLike, heading: Heading) -> Pose:
-    """The pose with its front, -Y, turned to a unit vector (3,) of the world; as it was where that is vertical."""
+    """Return the pose with its front (-Y) turned to a unit vector (3,) of the world. A vertical vector leaves it unchanged."""
     x, y, z = np.asarray(direction, np.float64).tolist()
     level = math.hypot(x, y)
     if heading == "keep" or level < LEVEL:

@@ -58,9 +58,7 @@ class Footprint:
     half: Float
 
     def apart(self, other: Footprint, gap: float) -> bool:
-        """Return whether a side of one of the two separates them by at least `gap`: then nothing of them is nearer than
-        that.
-        """
+        """Return whether a side of one footprint separates the two by at least `gap`."""
         one, two = self.sides, other.sides
         (dx, dy), reach = (two.x - one.x, two.y - one.y), one.radius + two.radius + gap
         if dx * dx + dy * dy >= FAR * reach * reach:

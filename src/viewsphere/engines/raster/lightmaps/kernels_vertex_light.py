@@ -1,4 +1,4 @@
-"""Light at points of surfaces that are not flat, as the samples of a block find it: see `vertex_light`."""
+"""Light on curved surfaces, for the samples of a block: see `vertex_light`."""
 
 from __future__ import annotations
 

@@ -116,9 +116,10 @@ def _follow(glass, looks, o, d, apart, stack):
 
 @inner(_nrt=True)
 def bend(count, glass, looks, b, which):
-    """For gathered samples that look at the outside of solid glass: the direction of the light that it bends towards the
-    viewer, BENT_X to BENT_Z, what its further surfaces leave of it, STAIN_R to STAIN_B, and BENT, how far it takes the place of
-    the light from straight behind, 0 to 1; BENT is 0 for other samples.
+    """Bend the light of gathered samples that show the outside of solid glass.
+
+    BENT_X to BENT_Z are the direction of the bent light, STAIN_R to STAIN_B its colour after further surfaces. BENT is its
+    share, 0 to 1, instead of the light from straight behind; it is 0 for other samples.
     """
     stack = np.empty((DEEP, 2), np.float32)
     for i in range(U(count)):

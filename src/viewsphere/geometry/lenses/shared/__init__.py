@@ -1,1 +1,1 @@
-"""What several lens models share."""
+"""Functions that several lens models use."""

@@ -79,7 +79,7 @@ def first_positive_root(polynomial: Float) -> float:
 
 
 def padded(coefficients: tuple[float, ...], count: int) -> Float:
-    """Coefficients with zeros up to so many."""
+    """Return the coefficients, padded with zeros to this length."""
     out = np.zeros(count)
     out[: len(coefficients)] = coefficients
     return out
