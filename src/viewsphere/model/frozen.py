@@ -1,7 +1,5 @@
 """The one base of all plain data: immutable, strict about names, finite numbers only."""
 
-from __future__ import annotations
-
 from contextvars import ContextVar
 from typing import Any, ClassVar, Self
 
@@ -48,6 +46,7 @@ class Frozen(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
+    # No `from __future__ import annotations` here: pydantic would compile this text for each of 170 subclasses, in 7 ms.
     IS_CHOICE: ClassVar[bool] = False
     """True for members of a tagged union: pydantic reads the tag's field, and builds all members together."""
 
@@ -58,6 +57,11 @@ class Frozen(BaseModel):
             return handler(data)
         except ValidationError as error:
             raise explained(error, tuple(cls.model_fields)) from None
+
+    @classmethod
+    def of_defaults(cls) -> Self:
+        """The instance without arguments, made without the validator: for defaults of fields, which few recipes read."""
+        return cls.model_construct()
 
     @classmethod
     def model_rebuild(cls, **options: Any) -> bool | None:

@@ -1,7 +1,5 @@
 """Plain data that is written without what it does not say."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 from pydantic import SerializerFunctionWrapHandler, model_serializer

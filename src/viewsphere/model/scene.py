@@ -239,10 +239,10 @@ class Effects(Frozen):
 class Finish(Frozen):
     """The steps from light to a picture: all that need no new stage, so every frame may have its own."""
 
-    background: Background = Background()
-    smoother: Smoother = Smoother()
-    view: ViewTransform = ViewTransform()
-    effects: Effects = Effects()
+    background: Background = Background.of_defaults()
+    smoother: Smoother = Smoother.of_defaults()
+    view: ViewTransform = ViewTransform.of_defaults()
+    effects: Effects = Effects.of_defaults()
 
     def with_background(self, transparent: bool) -> Finish:
         """The same finish, with its background, or transparent behind the scene."""
@@ -294,12 +294,12 @@ class Scene(Frozen):
     of `fog`: beyond the windows of a room; only sky and ground, which are outdoors, are seen through it.
     """
 
-    sun: Sun | None = Sun()
-    sky: AnySky = Sky()
+    sun: Sun | None = Sun.of_defaults()
+    sky: AnySky = Sky.of_defaults()
     lights: tuple[AnyLight, ...] = ()
     ground: Ground | None = None
     floor: Annotated[Floor | None, BeforeValidator(_floor)] = None
-    finish: Finish = Finish()
+    finish: Finish = Finish.of_defaults()
     blend: BlendScene | None = None
     fog: Fog | None = None
     rain: Rain | None = None

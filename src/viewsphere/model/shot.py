@@ -47,7 +47,7 @@ class Shot(Frozen):
     channels: tuple[str, ...]
     annotations: tuple[str, ...] = ()  # labels of objects and of pictures that were asked for
     labels: dict[str, dict[str, JsonValue]] = Field(default_factory=dict)  # options of labels
-    files: Files = Files()
+    files: Files = Files.of_defaults()
     label_alpha: float = 0.01
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
     shutter: float = Field(default=0.0, ge=0, le=1)

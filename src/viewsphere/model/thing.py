@@ -84,7 +84,7 @@ class Thing(Frozen):
 
     id: int = Field(ge=0)
     model: ModelSpec
-    motion: Motion = Motion()
+    motion: Motion = Motion.of_defaults()
     scenery: bool = False
     repaints: tuple[Repaint, ...] = ()  # the last that matches a material counts
 

@@ -1,7 +1,5 @@
 """The base of all specs: what a plug-in states about itself, checked when it is loaded."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar, 
 
 from pydantic import (
     BeforeValidator,
+    ConfigDict,
     Field,
     GetCoreSchemaHandler,
     PrivateAttr,
@@ -334,7 +335,9 @@ def _of(schema: Any) -> tuple[Of, tuple[float, float]]:
 Drawn = Annotated[T, OrDrawn()]
 """A field of a recipe that is a T or a distribution over T. A draw, as scenes are made of, is a T."""
 
-_DEVIATION: TypeAdapter[Any] = TypeAdapter(Drawn[Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]])
+_DEVIATION: TypeAdapter[Any] = TypeAdapter(
+    Drawn[Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]], config=ConfigDict(defer_build=True)
+)
 
 
 def drawn(value: T, rng_of: RngOf, path: Steps = ()) -> T:

@@ -4,8 +4,6 @@ A field is written once, in the scene's class: the entry takes its limits, defau
 distributions over its values. The body of an entry holds only the fields that differ.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from types import NoneType, UnionType
 from typing import Annotated, Any, ClassVar, TypeVar, Union, cast, get_args, get_origin

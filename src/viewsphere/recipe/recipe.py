@@ -153,7 +153,9 @@ class Recipe(Shown, Frozen):
         default=None,
         description="points to follow through each sequence: {grid: 16}, {count: 1024, on: objects}, or {points: file}",
     )
-    scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects and surroundings")
+    scene: SceneEntry = Field(
+        default=SceneEntry.of_defaults(), description="light, ground, background, effects and surroundings"
+    )
     variations: Variations | None = Field(
         default=None,
         description="conditions, such as weather; every shot is rendered under each, with the same labels. Each name has "
@@ -179,7 +181,7 @@ class Recipe(Shown, Frozen):
         "so that appending frames changes no other",
     )
     engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
-        default=EngineEntry(),
+        default=EngineEntry.of_defaults(),
         description="the renderer: a name, or a mapping of name and the engine's options",
     )
     channels: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
@@ -191,7 +193,9 @@ class Recipe(Shown, Frozen):
     labels: dict[str, dict[str, JsonValue]] = Field(
         default={}, description="options of the recipe's labels, by name: {captions: {count: 5}}"
     )
-    files: Files = Field(default=Files(), description="how each channel is written: lossless PNG and TIFF by default")
+    files: Files = Field(
+        default=Files.of_defaults(), description="how each channel is written: lossless PNG and TIFF by default"
+    )
     formats: Annotated[tuple[FormatField, ...], AfterValidator(_distinct_formats)] = Field(
         default=(FormatEntry(name="native"), FormatEntry(name="coco")),
         description="formats to write after rendering, by name or with options: {coco: {category_ids: coco}}",

@@ -207,7 +207,7 @@ class SceneEntry(Frozen):
         "strength, color, angle_deg",
     )
     sky: Drawn[SkyField] = Field(
-        default=GradientEntry(),
+        default=GradientEntry.of_defaults(),
         description="ambient light: zenith, horizon and strength of a gradient, daylight, night, or an EXR or HDR file",
     )
     lights: LightsField = Field(default=(), description="lamps: point, spot, area, hemisphere, or your own")
@@ -218,17 +218,18 @@ class SceneEntry(Frozen):
     )
     materials: tuple[MaterialEntry, ...] = Field(default=(), description="changes to the models' materials")
     background: Drawn[BackgroundField] = Field(
-        default=BackgroundEntry(),
+        default=BackgroundEntry.of_defaults(),
         description="sky, environment, transparent, a colour, {image: path}, or {images: folder, draw: per_frame}",
     )
     smoother: SmootherField = Field(
-        default=SmootherEntry(), description="softening of the models' border: none, box, gaussian or poisson, or a mapping"
+        default=SmootherEntry.of_defaults(),
+        description="softening of the models' border: none, box, gaussian or poisson, or a mapping",
     )
     view: ViewField = Field(
-        default=ViewEntry(), description="exposure, temperature_k, tint and transform; or the transform alone"
+        default=ViewEntry.of_defaults(), description="exposure, temperature_k, tint and transform; or the transform alone"
     )
-    effects: EffectsEntry = Field(default=EffectsEntry(), description="camera effects such as blur and noise")
-    jitter: JitterEntry = Field(default=JitterEntry(), description="random offsets added to every viewpoint")
+    effects: EffectsEntry = Field(default=EffectsEntry.of_defaults(), description="camera effects such as blur and noise")
+    jitter: JitterEntry = Field(default=JitterEntry.of_defaults(), description="random offsets added to every viewpoint")
     fog: Drawn[FogField] = Field(default="off", description="off, visibility in metres, or a mapping of visibility and height")
     rain: Drawn[RainField] = Field(
         default="off", description="off, millimetres an hour, or a mapping of rate, wind, exposure and clouds"

@@ -18,7 +18,7 @@ def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:
     """
     path = None if spec.parts is not None else sidecar_of(spec)
     try:
-        return path, Sidecar() if path is None else read_sidecar(path)
+        return path, Sidecar.of_defaults() if path is None else read_sidecar(path)
     except RecipeError as error:
         raise ModelError(str(error)) from None
 

@@ -7,7 +7,7 @@ from binascii import Error as NoBase64
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import accumulate, chain
 from pathlib import PurePosixPath
 from typing import Annotated, Any, Literal, TypeVar
@@ -162,7 +162,7 @@ class ModelInfo:
     @staticmethod
     def from_plain(value: Mapping[str, Any]) -> ModelInfo:
         """The record that `to_plain` was asked of; raises LookupError, TypeError or ValueError for anything else."""
-        found = typed(_MODEL, value)
+        found = typed(_adapter(ModelInfo), value)
         for one in (found, *found.steps):
             names([one.key, *([one.track] if one.track else [])], "the key")
         return found
@@ -405,7 +405,7 @@ class PlanRecord:
         value = unsealed(text)
         del value["store"]
         value.pop("classes", None)  # for other readers: they follow from the categories
-        record = typed(_PLAN, value)
+        record = typed(_adapter(PlanRecord), value)
         for number, part in enumerate(map(Part.checked, record.parts)):
             if any(not 0 <= other < number for other, _ in part.supplies):
                 raise ValueError("channels that were added to a part that was not there")
@@ -419,9 +419,13 @@ def _keeping(recipe: dict[str, Any], least: float | None) -> dict[str, Any]:
     return recipe if recipe.get(KEEP) == least else recipe | {KEEP: least}
 
 
-_MODEL, _PLAN = TypeAdapter(ModelInfo), TypeAdapter(PlanRecord)
-
 Record = TypeVar("Record")
+
+
+@cache
+def _adapter(kind: type[Record]) -> TypeAdapter[Record]:
+    """The validator of a record: making those of models and plans takes 10 ms, and planning needs none."""
+    return TypeAdapter(kind)
 
 
 def typed(kind: TypeAdapter[Record], value: Any) -> Record:
