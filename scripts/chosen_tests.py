@@ -123,6 +123,10 @@ def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
+UNNAMED = {"lights", "readers"}
+"""Kinds of plug-ins whose names are common words (point, off): tests reach them through the module that loads them."""
+
+
 class Modules:
     """The modules of viewsphere, and which others each imports or names."""
 
@@ -130,13 +134,8 @@ class Modules:
         graph = grimp.build_graph("viewsphere", "viewsphere_zoo", exclude_type_checking_imports=True)
         self.all = frozenset(graph.modules)
         self.plugins = defaultdict[str, set[str]](set)
-        for kind in SEAMS:
+        for kind in SEAMS.keys() - UNNAMED:
             for name, module in shipped(kind).items():
-                self.plugins[name].add(module)
-        homes = {"viewsphere.composing.trajectories"}
-        for module in self.all:
-            package, _, name = module.rpartition(".")
-            if package in homes and not name.startswith("_"):
                 self.plugins[name].add(module)
         self.plugins["zoo"] = {"viewsphere_zoo.source"}
         self.needs = {module: graph.find_modules_directly_imported_by(module) | self._named(module) for module in self.all}
@@ -148,9 +147,14 @@ class Modules:
 
     def _implied(self) -> dict[str, set[str]]:
         """By the module that loads them: the plug-ins that a recipe means without naming them, and the program for Blender."""
-        samplers, readers, worker = (
+        samplers, readers, lights, worker = (
             {module for module in self.all if module.startswith(f"{package}.")}
-            for package in (SEAMS["samplers"].package, SEAMS["readers"].package, "viewsphere.blender.worker")
+            for package in (
+                SEAMS["samplers"].package,
+                SEAMS["readers"].package,
+                SEAMS["lights"].package,
+                "viewsphere.blender.worker",
+            )
         )
         defaults = self.plugins[Shot.model_fields["engine"].default].union(
             *(self.plugins[name] for name in DEFAULT_CHANNELS if name not in PICTURES)
@@ -158,6 +162,7 @@ class Modules:
         return {
             "viewsphere.planning.plan": samplers,
             "viewsphere.assets.readers": readers,
+            "viewsphere.recipe.lights": lights,
             "viewsphere.planning.checks.models": defaults,
             "viewsphere.run.shots.stages": defaults,
             "viewsphere.blender.process": worker,

@@ -47,7 +47,7 @@ def chosen():
          ["tests/geometry/test_box.py"]),
         ("src/viewsphere/composing/trajectories/spline.py", ["tests/composing/test_trajectories.py"],
          ["tests/geometry/test_box.py"]),
-        ("src/viewsphere/composing/trajectories/_along.py", ["tests/composing/test_trajectories.py"],
+        ("src/viewsphere/composing/trajectories/shared/along.py", ["tests/composing/test_trajectories.py"],
          ["tests/geometry/test_box.py"]),
         ("src/viewsphere/preview/notebook.py", ["tests/test_notebook.py"],
          ["tests/geometry/test_box.py"]),

@@ -311,11 +311,12 @@ GROUPS = {
     "ring": ("lights", "ring"),
     "peg": ("families", "Pegs that stand on a foot."),
     "pegs": ("places", "A pair of pegs on an empty floor."),
+    "swing": ("trajectories", "swing"),
 }
 """The plug-ins of the page: their groups, and how their examples begin."""
 
 INSTALLED = """
-models: [{source: "zoo:peg", count: 3}, {source: "zoo:box", category: box}]
+models: [{source: "zoo:peg", count: 3}, {source: "parts/*.tri", category: part}, {source: "zoo:box", category: box}]
 viewpoints: {azimuth: [0, 40], elevation: 20, distance: 2}
 camera: {size: [96, 72], fov_deg: 40}
 scene: {ground: {material: dots}, lights: {kind: ring, position: [0, 0, 1], strength: 4}}
@@ -335,9 +336,14 @@ def test_the_page_s_plug_ins_work_in_a_package_that_is_installed(tmp_path):
     """Written as pip writes it: modules, and metadata with entry points; then used by the command line."""
     site = tmp_path / "site"
     write_package(site, "my_package", {(group, name): example(begins) for name, (group, begins) in GROUPS.items()})
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "a.tri").write_text(TETRAHEDRON.replace("1", "0.2"))
     for name, more in RECIPES.items():
         moves = ", motion: {kind: bounce, height: 1}}]" if name == "moving" else "}]"
-        (tmp_path / f"{name}.yaml").write_text(INSTALLED.replace("}]", moves, 1) + more)
+        text = INSTALLED.replace("}]", moves, 1)
+        if name == "moving":
+            text = text.replace("viewpoints: {azimuth: [0, 40], elevation: 20, ", "viewpoints: {kind: swing, ")
+        (tmp_path / f"{name}.yaml").write_text(text + more)
         for words in (("render", f"{name}.yaml", "-o", name, "--workers", "0"), ("check", name, "--workers", "0")):
             run = subprocess.run(
                 [sys.executable, "-m", "viewsphere", *words],
@@ -496,6 +502,21 @@ def test_a_broken_package_is_listed_with_its_reason_and_breaks_nothing_else(smal
         assert check(small_dataset, rays=False, sample=0).ok
         with pytest.raises(PluginError, match=f"broken cannot be imported: {error}"):
             export(small_dataset.root, ["broken"])
+
+
+def test_a_trajectory_is_one_file(install):
+    install("trajectories", "swing", EXAMPLES["swing"])
+    swing = {"kind": "swing", "distance": 1.0, "degrees": 40, "period": 0.4}
+    recipe = small_recipe(viewpoints=swing, time={"frames": 3, "fps": 10}, channels=["rgb"], formats=[])
+    samples = list(render(recipe))[:3]
+    assert [sample.pose.azimuth_deg for sample in samples] == pytest.approx([0, 40, 0], abs=1e-6)
+    assert {round(sample.pose.distance, 6) for sample in samples} == {1.0}
+    with pytest.raises(RecipeError, match=r"viewpoints\.perod: 'perod' is unknown; did you mean 'period'\?"):
+        small_recipe(viewpoints=swing | {"perod": 1})
+    with pytest.raises(RecipeError, match=r"viewpoints\.kind: 'swin' is unknown; did you mean 'swing'\?"):
+        small_recipe(viewpoints=swing | {"kind": "swin"})
+    with pytest.raises(RecipeError, match="time"):
+        plan(small_recipe(viewpoints=swing))
 
 
 RING = {"kind": "ring", "at": {"elevation": {"uniform": [40, 60]}, "distance": 2}, "strength": 9, "color": "red", "count": 2}

@@ -7,7 +7,6 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from viewsphere.errors import PluginError
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import AnyLight
 from viewsphere.plugins.registry import Kind
@@ -36,9 +35,4 @@ class LightSpec(Spec):
 
     @model_validator(mode="after")
     def _check_options(self) -> Self:
-        lacking = [name for name in ALL_LAMPS if name not in self.options.model_fields]
-        if lacking:
-            raise PluginError(
-                f"LightSpec.options: expected a class with the fields {', '.join(ALL_LAMPS)}; found no {lacking[0]}"
-            )
-        return self
+        return self.with_fields_of("options", ALL_LAMPS)

@@ -41,6 +41,7 @@ Kind = Literal[
     "readers",
     "samplers",
     "sources",
+    "trajectories",
 ]
 
 
@@ -77,6 +78,7 @@ SEAMS: dict[Kind, Seam] = {
     "places": Seam("", "PLACE"),
     "samplers": Seam("viewsphere.planning.samplers", "SAMPLER"),
     "sources": Seam("", "SOURCE"),
+    "trajectories": Seam("viewsphere.composing.trajectories", "TRAJECTORY"),
 }
 
 

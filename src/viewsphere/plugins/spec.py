@@ -1,7 +1,7 @@
 """The base of all specs: what a plug-in states about itself, checked when it is loaded."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, get_args, get_origin
 
@@ -46,6 +46,14 @@ class Spec(Frozen):
                 _check_call(f"{cls.__name__}.{name}", getattr(made, name), count)
         return made
 
+    def with_fields_of(self, field: str, names: Sequence[str]) -> Self:
+        """Return the spec; raises PluginError where the class in a field lacks fields of these names."""
+        lacking = [name for name in names if name not in getattr(self, field).model_fields]
+        if lacking:
+            expected = f"expected a class with the fields {', '.join(names)}"
+            raise PluginError(f"{type(self).__name__}.{field}: {expected}; found no {lacking[0]}")
+        return self
+
     @property
     def takes_options(self) -> bool:
         """Return whether functions may be given options after their other values."""
@@ -56,6 +64,14 @@ class SpecWithOptions(Spec):
     """A plug-in that a recipe may give options."""
 
     options: type[Frozen] | None = Field(default=None, description="the class of the options; without, there are none")
+
+    def with_fields_of(self, field: str, names: Sequence[str]) -> Self:
+        """Return the spec; raises PluginError where the class in a field lacks fields of these names."""
+        lacking = [name for name in names if name not in getattr(self, field).model_fields]
+        if lacking:
+            expected = f"expected a class with the fields {', '.join(names)}"
+            raise PluginError(f"{type(self).__name__}.{field}: {expected}; found no {lacking[0]}")
+        return self
 
     @property
     def takes_options(self) -> bool:

@@ -4,12 +4,10 @@ in metres.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import (
-    Discriminator,
     Field,
-    Tag,
     field_validator,
     model_validator,
 )
@@ -19,6 +17,7 @@ from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Number, Positive
 from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.validation_errors import at
+from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.recipe.aim import (
     AZIMUTH,
     DISTANCE,
@@ -35,8 +34,9 @@ from viewsphere.recipe.aim import (
     in_elevation,
     in_reach,
 )
+from viewsphere.recipe.kinds import ByKind
 from viewsphere.recipe.time import RATE, Frames, Rate
-from viewsphere.recipe.trajectories import DrivePath, MastPost, OrbitPath, SplinePath, WalkPath
+from viewsphere.recipe.trajectories import Moving
 from viewsphere.recipe.values import Interval, Point, Range, Values
 
 AxisValues = float | tuple[float, ...] | Range
@@ -266,20 +266,7 @@ class PoseList(Aimed, OmitNone):
         return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
-def _kind(value: Any) -> Any:
-    return value.get("kind", "grid") if isinstance(value, dict) else getattr(value, "kind", None)
+_STILL = {"grid": Grid, "sphere": Sphere, "normal": Normal, "jitter": Jitter, "file": PoseList}
 
-
-Viewpoints = Annotated[
-    Annotated[Grid, Tag("grid")]
-    | Annotated[Sphere, Tag("sphere")]
-    | Annotated[Normal, Tag("normal")]
-    | Annotated[Jitter, Tag("jitter")]
-    | Annotated[PoseList, Tag("file")]
-    | Annotated[OrbitPath, Tag("orbit")]
-    | Annotated[SplinePath, Tag("spline")]
-    | Annotated[DrivePath, Tag("drive")]
-    | Annotated[WalkPath, Tag("walk")]
-    | Annotated[MastPost, Tag("mast")],
-    Discriminator(_kind),
-]
+Viewpoints = Annotated[Grid | Sphere | Normal | Jitter | PoseList | Moving, ByKind(TrajectorySpec, "grid", _STILL)]
+"""Places of the camera, or its motion: a trajectory."""

@@ -6,19 +6,33 @@ A trajectory is asked once for all instants of a sequence, so that no cut of the
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from viewsphere import plugins
-from viewsphere.composing.trajectories._shake import Handheld, shaken
-from viewsphere.composing.trajectories._world import RigPose, Trajectory, World
+from viewsphere.composing.trajectories.shared.aim import aimed, around, focuses
+from viewsphere.composing.trajectories.shared.shake import Handheld, shaken
+from viewsphere.composing.trajectories.shared.world import RigPose, Trajectory, World
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
 from viewsphere.model.scene import IDENTITY, Vector
+from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, Sphere, Viewpoints
 
-__all__ = ["RigPose", "Trajectory", "World", "instant", "is_still", "shaken", "standing", "trajectory"]
+__all__ = [
+    "RigPose",
+    "Trajectory",
+    "World",
+    "aimed",
+    "around",
+    "focuses",
+    "instant",
+    "is_still",
+    "shaken",
+    "standing",
+    "trajectory",
+]
 
 
 def is_still(viewpoints: Viewpoints) -> bool:
@@ -32,8 +46,9 @@ def trajectory(viewpoints: Viewpoints, folder: Path) -> Trajectory:
     Raises RecipeError for a file that cannot be read, ValueError for viewpoints that stay still.
     """
     if is_still(viewpoints):
-        raise ValueError(f"trajectory: expected viewpoints that move, got {viewpoints.kind}")
-    steady: Trajectory = plugins.attribute(f"composing.trajectories.{viewpoints.kind}.trajectory")(viewpoints, folder)
+        raise ValueError(f"trajectory: expected viewpoints that move, got {cast(Any, viewpoints).kind}")
+    spec = plugins.load(TrajectorySpec, cast(Any, viewpoints).kind)
+    steady: Trajectory = spec.trajectory(viewpoints, folder)
     return Handheld(steady, viewpoints.shake) if viewpoints.shake else steady
 
 

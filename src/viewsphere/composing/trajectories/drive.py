@@ -4,20 +4,36 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from viewsphere.composing.trajectories._aim import aimed, focuses
-from viewsphere.composing.trajectories._along import level
-from viewsphere.composing.trajectories._world import RigPose, World
+from viewsphere.composing.trajectories.shared.aim import aimed, focuses
+from viewsphere.composing.trajectories.shared.along import level
+from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.curve import Curve, spline
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.numbers import Length, Metres, Positive
 from viewsphere.model.validation_errors import one_of
-from viewsphere.recipe.trajectories import DrivePath
+from viewsphere.plugins.trajectory import TrajectorySpec
+from viewsphere.recipe.trajectories import LOOK, Look, Moving
 
 Float = NDArray[np.float64]
+
+
+class DrivePath(Moving):
+    """Along a lane of the place, as a camera on a car."""
+
+    kind: Literal["drive"] = Field(description="along a lane of the place")
+    lane: Annotated[str, Field(min_length=1)] | None = Field(default=None, description="its name; default: the place's first")
+    speed: Positive = Field(default=10.0, description="metres a second; it stops at the lane's end, or repeats a closed lane")
+    height: Length = Field(default=1.5, description="metres above the lane")
+    offset: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="metres along the lane at the first instant")
+    side: Metres = Field(default=0.0, description="metres to the right of the lane's middle; below 0 to the left")
+    look: Look = Field(default="ahead", description=LOOK)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,3 +72,6 @@ class Drive:
 def trajectory(entry: DrivePath, folder: Path) -> Drive:
     """The motion that an entry of a recipe means."""
     return Drive(entry)
+
+
+TRAJECTORY = TrajectorySpec(options=DrivePath, trajectory=trajectory)

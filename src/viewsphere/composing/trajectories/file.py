@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.composing.trajectories._aim import around, on_axis, posed
-from viewsphere.composing.trajectories._world import RigPose, World
+from viewsphere.composing.trajectories.shared.aim import around, on_axis, posed
+from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.composing.viewpoints.pose_files import Extrinsics, PoseFile
 from viewsphere.composing.viewpoints.poses import placed, pose_file, world_turn
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, slerp
 from viewsphere.model.camera import Intrinsics
+from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.recipe.viewpoints import PoseList
 
 Float = NDArray[np.float64]
@@ -137,3 +138,6 @@ def _is_3d(entry: PoseList) -> bool:
 
 
 __all__: Sequence[str] = ["FileTrajectory", "trajectory"]
+
+
+TRAJECTORY = TrajectorySpec(options=PoseList, trajectory=trajectory)

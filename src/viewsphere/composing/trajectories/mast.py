@@ -4,16 +4,45 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
-from viewsphere.composing.trajectories._aim import aimed, focuses, overhead, posed
-from viewsphere.composing.trajectories._world import RigPose, World
+from viewsphere.composing.trajectories.shared.aim import aimed, focuses, overhead, posed
+from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.model.camera import Intrinsics
-from viewsphere.recipe.trajectories import MastPost
+from viewsphere.model.numbers import Length, Number
+from viewsphere.model.validation_errors import shown
+from viewsphere.plugins.trajectory import TrajectorySpec
+from viewsphere.recipe.trajectories import LOOK, Look, Moving, Place
 
 Float = NDArray[np.float64]
+
+
+class MastPost(Moving):
+    """A camera on a mast, or straight overhead: it stays, and may turn or go with a thing."""
+
+    kind: Literal["mast"] = Field(description="a fixed place, or straight overhead")
+    position: Place | None = Field(default=None, description="[x, y, z] in metres")
+    overhead: Length | None = Field(
+        default=None, description="instead of position: metres straight above its target; follows a moving thing"
+    )
+    heading: Number = Field(
+        default=0.0, description="for a view straight down: the direction that is up in the picture, degrees; 0 is +Y, 90 is -X"
+    )
+    look: Look = Field(default="center", description=f"{LOOK}; not ahead")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> MastPost:
+        if (self.position is None) == (self.overhead is None):
+            raise ValueError(f"expected position or overhead; found {'neither' if self.position is None else 'both'}")
+        if self.look == "ahead":
+            raise ValueError("expected what to look at; found look: ahead")
+        if self.position is not None and self.look == self.position:
+            raise ValueError(f"expected look away from position; found both at {shown(self.look)}")
+        return self
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,3 +68,6 @@ class Mast:
 def trajectory(entry: MastPost, folder: Path) -> Mast:
     """The motion that an entry of a recipe means."""
     return Mast(entry)
+
+
+TRAJECTORY = TrajectorySpec(options=MastPost, trajectory=trajectory)

@@ -6,19 +6,72 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
-from viewsphere.composing.trajectories._aim import aimed, focuses
-from viewsphere.composing.trajectories._along import level
-from viewsphere.composing.trajectories._world import RigPose, World
+from viewsphere.composing.trajectories.shared.aim import aimed, focuses
+from viewsphere.composing.trajectories.shared.along import level
+from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.geometry.curve import Curve, spline
 from viewsphere.model.camera import Intrinsics
-from viewsphere.recipe.trajectories import WalkPath
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Length, Metres, Number, Positive
+from viewsphere.model.validation_errors import shown
+from viewsphere.plugins.trajectory import TrajectorySpec
+from viewsphere.recipe.trajectories import LOOK, MOST_POINTS, MOST_TURNS, Look, Moving, Spot
 
 Float = NDArray[np.float64]
+
+
+class Turn(Frozen):
+    """A turn of a walk."""
+
+    at: Annotated[Number, Field(ge=0)] = Field(description="start in seconds from the sequence's first instant")
+    degrees: Number = Field(description="to the left; negative: to the right")
+
+
+class WalkPath(Moving):
+    """At eye height over the floor, straight on with turns, or through points, with a gentle bob."""
+
+    kind: Literal["walk"] = Field(description="at eye height over the floor")
+    start: Spot | None = Field(default=None, description="start [x, y] in metres")
+    heading: Number = Field(default=0.0, description="initial direction in degrees: 0 walks along +Y, 90 along -X")
+    turns: Annotated[tuple[Turn, ...], Field(max_length=MOST_TURNS)] = Field(
+        default=(), description="a list of turns {at, degrees}"
+    )
+    turn_rate: Positive = Field(default=45.0, description="degrees a second during a turn")
+    points: Annotated[tuple[Spot, ...], Field(min_length=2, max_length=MOST_POINTS)] | None = Field(
+        default=None, description="instead of start: [x, y] in metres, two or more, to walk through"
+    )
+    speed: Positive = Field(default=1.4, description="metres a second; through points it stops at the last")
+    eye_height: Length = Field(default=1.6, description="metres above the floor, z = 0")
+    bob: Annotated[Metres, Field(ge=0, le=1)] = Field(
+        default=0.02, description="vertical movement of the eyes from the middle in metres, twice a stride"
+    )
+    stride: Length = Field(default=1.5, description="length of two steps in metres")
+    look: Look = Field(default="ahead", description=LOOK)
+
+    @model_validator(mode="after")
+    def _one_way(self) -> WalkPath:
+        if (self.start is None) == (self.points is None):
+            raise ValueError(f"expected start or points; found {'neither' if self.start is None else 'both'}")
+        if self.points is not None and self.turns:
+            raise ValueError("expected turns beside start; found them beside points")
+        for i, (a, b) in enumerate(pairwise(self.points or ())):
+            if a == b:
+                raise ValueError(
+                    f"expected points that differ from the one before; found points[{i}] and the next at {shown(a)}"
+                )
+        for a, b in pairwise(self.turns):
+            end = a.at + abs(a.degrees) / self.turn_rate
+            if b.at < end:
+                raise ValueError(f"expected turns one after another, this after {end:g} s; found it at {b.at:g} s")
+        return self
 
 
 @dataclass(frozen=True)
@@ -103,3 +156,6 @@ class Walk:
 def trajectory(entry: WalkPath, folder: Path) -> Walk:
     """The motion that an entry of a recipe means."""
     return Walk(entry)
+
+
+TRAJECTORY = TrajectorySpec(options=WalkPath, trajectory=trajectory)

@@ -20,6 +20,7 @@ from viewsphere.plugins.registry import SEAMS, Kind, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.source import SourceSpec
 from viewsphere.plugins.spec import Spec
+from viewsphere.plugins.trajectory import TrajectorySpec
 
 SPECS: tuple[type[Spec | LensSpec], ...] = (
     EngineSpec,
@@ -34,6 +35,7 @@ SPECS: tuple[type[Spec | LensSpec], ...] = (
     ReaderSpec,
     SamplerSpec,
     SourceSpec,
+    TrajectorySpec,
     ZooFamily,
 )
 """The specs of all kinds."""

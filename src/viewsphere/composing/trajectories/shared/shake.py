@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.composing.noise import noise
-from viewsphere.composing.trajectories._aim import DIGITS
-from viewsphere.composing.trajectories._world import RigPose, Trajectory, World
+from viewsphere.composing.trajectories.shared.aim import DIGITS
+from viewsphere.composing.trajectories.shared.world import RigPose, Trajectory, World
 from viewsphere.geometry.rotation import compose, rigid, rotation_about
 from viewsphere.model.camera import Intrinsics
 from viewsphere.recipe.aim import Shake

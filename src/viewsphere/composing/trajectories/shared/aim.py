@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.composing.trajectories._world import RigPose, World
+from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import rigid

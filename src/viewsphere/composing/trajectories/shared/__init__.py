@@ -1,0 +1,1 @@
+"""Poses, aims and shake that several trajectories share."""
