@@ -280,14 +280,16 @@ def fields_table(entries: dict[str, Any], named: list[str]) -> str:
 
 
 def value(default: Any) -> str:
-    """A default as a recipe would write it; empty without a default."""
+    """A default as a recipe would write it; empty without a default, and for a function."""
     if isinstance(default, (list, tuple)):
         return f"[{', '.join(map(value, default))}]"
     if isinstance(default, str):
         return f"`{default}`"
     if isinstance(default, Mapping):
         return ", ".join(map(str, cast(Mapping[object, object], default)))
-    return "" if default is None else str(default).lower() if isinstance(default, bool) else f"{default:g}"
+    if default is None or callable(default):
+        return ""
+    return str(default).lower() if isinstance(default, bool) else f"{default:g}"
 
 
 def field_type(field: Field) -> str:
