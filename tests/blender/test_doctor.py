@@ -89,7 +89,7 @@ def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
 
 
 def test_speed_is_measured_in_a_second_once_kernels_are_there(monkeypatch):
-    from viewsphere.run.estimate import REFERENCE_MS, SPEED_RECIPE, measure_speed
+    from viewsphere.run.estimate import REFERENCE_MS, measure_speed, speed_recipe
     from viewsphere.run.shots import precompile as warm
 
     monkeypatch.setattr("viewsphere.run.estimate.is_precompiled", lambda shot: False)
@@ -102,7 +102,7 @@ def test_speed_is_measured_in_a_second_once_kernels_are_there(monkeypatch):
     found = measure_speed()
     assert found is not None and found.frame_ms == pytest.approx(20)
     assert found.relative == pytest.approx(REFERENCE_MS / 20)
-    assert warm.sketched(SPEED_RECIPE).objects
+    assert warm.sketched(speed_recipe()).objects
 
 
 @pytest.mark.slow

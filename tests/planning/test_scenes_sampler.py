@@ -25,7 +25,7 @@ from viewsphere.planning.plan import Plan
 from viewsphere.planning.samplers import scenes
 from viewsphere.preview import preview_samples
 from viewsphere.run.estimate import estimate
-from viewsphere.run.generate import Missing
+from viewsphere.run.missing import Missing
 from viewsphere.store import Store
 
 

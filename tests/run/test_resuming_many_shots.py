@@ -8,7 +8,7 @@ import viewsphere as vs
 from counting import counted
 from small import small_recipe
 from viewsphere.planning.extension import whole
-from viewsphere.run.generate import Missing
+from viewsphere.run.missing import Missing
 from viewsphere.store import Store
 from viewsphere.store.index import Index
 from viewsphere.store.shots.manifest import MANIFEST

@@ -23,7 +23,8 @@ from viewsphere.check import check
 from viewsphere.errors import ModelError, StoreError, UserError
 from viewsphere.model.shard import Shard
 from viewsphere.planning.extension import whole
-from viewsphere.run.generate import Missing, generate
+from viewsphere.run.generate import generate
+from viewsphere.run.missing import Missing
 from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.shards import shard_named
 from viewsphere.run.status import status

@@ -7,7 +7,7 @@ from command_line import viewsphere
 from small import small_recipe
 from viewsphere.planning.extension import whole
 from viewsphere.run.executors.local import LocalPool
-from viewsphere.run.generate import Missing
+from viewsphere.run.missing import Missing
 from viewsphere.run.workers import worker_count as crew_size
 from viewsphere.run.workers.worker_count import default_workers
 from viewsphere.store import Store

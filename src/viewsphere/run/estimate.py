@@ -33,13 +33,6 @@ from viewsphere.run.shots.tasks import Worker
 from viewsphere.scratch import temporary
 from viewsphere.store import Dataset, Row, Store
 
-SPEED_RECIPE = Recipe.model_validate(
-    {
-        "models": [{"source": model_for("example")}],
-        "viewpoints": {"azimuth": {"start": 0, "stop": 345, "step": 15}, "elevation": [20], "distance": 4},
-        "camera": {"size": [640, 480]},
-    }
-)
 REFERENCE_MS = 63.0
 """CPU milliseconds of a frame on the machine of docs/performance.md, an AMD EPYC, idle: the upper of five calls, 59 to 63,
 2026-11.
@@ -201,12 +194,20 @@ class Speed:
     relative: float
 
 
+def speed_recipe() -> Recipe:
+    """The scene that `measure_speed` renders."""
+    viewpoints = {"azimuth": {"start": 0, "stop": 345, "step": 15}, "elevation": [20], "distance": 4}
+    models = [{"source": model_for("example")}]
+    return Recipe.model_validate({"models": models, "viewpoints": viewpoints, "camera": {"size": [640, 480]}})
+
+
 def measure_speed() -> Speed | None:
     """The median over some frames, without the first; None where kernels would have to be compiled."""
-    if not is_precompiled(sketched(SPEED_RECIPE)):
+    recipe = speed_recipe()
+    if not is_precompiled(sketched(recipe)):
         return None
     begun, before, spent = time.monotonic(), 0.0, list[float]()
-    for number, _ in enumerate(render(SPEED_RECIPE)):
+    for number, _ in enumerate(render(recipe)):
         now = time.process_time()
         if number:
             spent.append(now - before)

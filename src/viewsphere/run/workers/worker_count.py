@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from viewsphere.model.model_spec import ModelSpec
     from viewsphere.recipe.recipe import Recipe
-    from viewsphere.run.generate import Missing
+    from viewsphere.run.missing import Missing
 
 SHORT_S = 3.0
 """Seconds of work below which workers do not pay: two of them take 2 CPU-seconds to start."""
