@@ -29,6 +29,7 @@ from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.composing.viewpoints.camera import looking
+from viewsphere.engines.shared.blender.requests import laid_with_slabs
 from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
@@ -40,7 +41,6 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.rendering.ground.material import SLABS, ground_material
-from viewsphere.rendering.ground.slab_picture import laid_with_slabs
 from viewsphere.rendering.view import develop
 from viewsphere.truth.raster.visibility import rasterize
 from viewsphere_zoo import build

@@ -64,7 +64,7 @@ def test_stable_poses_and_rays_name_their_extras(tmp_path):
         """
         import numpy as np
         from viewsphere.check.frames.rays import RayCaster
-        from viewsphere.composing.physics.stable_poses import stable_ways
+        from viewsphere.composing.layouts import stable_ways
         print(refused(stable_ways, np.eye(3)))
         print(refused(RayCaster, None, None))
         """,

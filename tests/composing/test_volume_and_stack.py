@@ -9,7 +9,7 @@ from test_fall import fallen
 from resting import deepest, depth, one_more_second, placed, shape_of, solids
 from small import small_recipe
 from viewsphere.assets.cache import load_normalised
-from viewsphere.composing.physics.stable_poses import stable_turn, stable_ways
+from viewsphere.composing.layouts import stable_turn, stable_ways
 from viewsphere.composing.placing.volume import apart
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices

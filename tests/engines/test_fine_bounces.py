@@ -19,8 +19,7 @@ from viewsphere.engines.raster.indirect.gathering.near_field_gather import with_
 from viewsphere.engines.raster.reflections import kernels_mirror
 from viewsphere.engines.raster.reflections import planar_reflections as panes
 from viewsphere.engines.raster.reflections.glossy_reflections import NOWHERE
-from viewsphere.engines.raster.reflections.lobes import lobe_rays
-from viewsphere.engines.raster.reflections.planar_reflections import mirror_in_panes
+from viewsphere.engines.raster.reflections.planar_reflections import lobe_rays, mirror_in_panes
 from viewsphere.engines.raster.shading.painting import paint, view_of
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera

@@ -11,7 +11,7 @@ from test_physics import camera, stage_of
 
 from viewsphere.assets.mesh import Material
 from viewsphere.engines.raster.shading.painting import paint
-from viewsphere.engines.shared.blender.veiling import veil
+from viewsphere.engines.shared.blender.backdrop import veil
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.scene import Ground, Scene, Sky, Sun
 from viewsphere.model.weather import CONTRAST, Fog

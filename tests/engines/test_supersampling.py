@@ -10,7 +10,7 @@ from test_raster import camera, card, mesh_of, picture, stage_of, unlit
 from shots import with_camera
 from viewsphere.assets.srgb import linear
 from viewsphere.engines import raster
-from viewsphere.engines.raster.antialiasing.supersampling import larger
+from viewsphere.engines.raster.staging import larger
 from viewsphere.errors import RecipeError
 from viewsphere.model.channel import LIGHT_PASSES
 from viewsphere.model.scene import Background, Finish, Scene, Sun, ViewTransform

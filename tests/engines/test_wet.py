@@ -13,13 +13,12 @@ from test_raster import box, mesh_of, rectangle
 from shots import with_camera
 from viewsphere.assets.appearance.wetting import DARKEST, FILM, SMOOTH, UPRIGHT, darkened, wet, wetted
 from viewsphere.assets.mesh import Material
-from viewsphere.engines.raster.reflections.wet_ground import WATER, mirror_in_water
+from viewsphere.engines.raster.reflections.wet_ground import WATER, mirror_in_water, puddles
 from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.scene import Ground, Scene, Sky
 from viewsphere.model.weather import Wet
 from viewsphere.rendering.view import EXPOSURE
-from viewsphere.rendering.weather.puddles import puddles
 from viewsphere.truth.raster.visibility import rasterize
 
 POOL = Wet(amount=1.0, puddles=1.0)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from viewsphere.assets.srgb import linear
+from viewsphere.engines.shared.blender.requests import TEXELS, laid_with_slabs
 from viewsphere.model.scene import Ground
 from viewsphere.rendering.ground.kernels_slabs import JOINT, shades
 from viewsphere.rendering.ground.material import PERIOD, SLABS, ground_frame, ground_material
-from viewsphere.rendering.ground.slab_picture import TEXELS, laid_with_slabs
 
 
 def tones(x, y, pixel):

@@ -9,9 +9,8 @@ import pytest
 import yaml
 
 from viewsphere.errors import StoreError, UserError
-from viewsphere.report import Proof, report_data, write_report
+from viewsphere.report import Proof, chosen_frames, report_data, write_report
 from viewsphere.report.cells import sphere_cells
-from viewsphere.report.choice import chosen_frames
 from viewsphere.report.frames import frame_data
 from viewsphere.report.meshes import mesh_data, simplified
 from viewsphere.report.page import script_json

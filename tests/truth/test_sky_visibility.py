@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from truth_scenes import cube, mesh_of, sphere
-from viewsphere.truth.sky_visibility import sky_occlusion
+from viewsphere.run.shots.camera_collisions import sky_occlusion
 
 
 def hidden(mesh, *point, chosen=slice(None)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,13 +14,11 @@ from viewsphere import plugins
 from viewsphere.composing.filling import shape_of
 from viewsphere.composing.physics import EDITION
 from viewsphere.composing.physics.packages import check_packages
-from viewsphere.composing.physics.stable_poses import NEEDS as STABLE_NEEDS
-from viewsphere.composing.physics.stable_poses import stable_turn
 from viewsphere.composing.placing import Draws, Piece, Room, Shape, Way
 from viewsphere.composing.scene.scenery import composed
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
-from viewsphere.geometry.rotation import random_rotation, rigid
+from viewsphere.geometry.rotation import random_rotation, rigid, rotation_about
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.thing import TimeStep
@@ -29,6 +27,13 @@ from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.layout import Layout, options_of, placer_of
 from viewsphere.recipe.scenery import CompanyEntry
 from viewsphere.recipe.scenes import ScenesEntry
+
+NEEDS = ("trimesh", "networkx", "scipy")
+"""Packages of the extra physics."""
+
+RAREST = 0.02
+"""Share of its falls after which a model comes to lie in a way, below which it is taken for one on which it tips over."""
+
 
 Float = NDArray[np.float64]
 
@@ -146,7 +151,7 @@ def check_layout(layout: Layout, field: str) -> None:
 def check_orientation(orientation: str, field: str) -> None:
     """See that things can be turned in this way; raises MissingExtraError for packages that it needs."""
     if orientation == "stable":
-        check_packages(STABLE_NEEDS, "physics", f"{field}.orientation: stable")
+        check_packages(NEEDS, "physics", f"{field}.orientation: stable")
 
 
 def has_ways(layout: Layout) -> bool:
@@ -188,3 +193,39 @@ def _vertices(spec: ModelSpec) -> Float:
 def _surface(spec: ModelSpec) -> tuple[Float, NDArray[np.int32]]:
     found = shape_of((spec, None))
     return found.vertices, found.triangles
+
+
+def stable_turn(hull: Float, rng: np.random.Generator) -> Float:
+    """A rotation (3, 3) of a model with these corners of its convex hull (N, 3) that lets it lie on z = 0: each way to lie is
+    as likely as the model, let go at random, is to come to rest so (Goldberg et al. 1999, by trimesh's `compute_stable_poses`).
+    Turned about the vertical at random.
+
+    Raises MissingExtraError without the packages that it needs.
+    """
+    ways, chances = stable_ways(hull)
+    way = ways[int(rng.choice(len(ways), p=chances))]
+    return rotation_about((0.0, 0.0, 2 * np.pi * rng.random())) @ way
+
+
+def stable_ways(hull: Float) -> tuple[Float, Float]:
+    """Return the stable poses as rotations (N, 3, 3), the likeliest first, and their probabilities (N,); the rarest are left
+    out.
+    """
+    return _stable_ways(hull.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _stable_ways(corners: bytes) -> tuple[Float, Float]:
+    check_packages(NEEDS, "physics", "orientation: stable")
+    import trimesh
+
+    hull = np.frombuffer(corners).reshape(-1, 3)
+    solid: Any = trimesh.convex.convex_hull(hull, repair=True) if np.linalg.matrix_rank(hull - hull[0], 1e-9) == 3 else None
+    if solid is None:  # flat, or a line
+        return np.eye(3)[None], np.ones(1)
+    with np.errstate(invalid="ignore"):  # of triangles so thin that rounding makes their chance no number; such are passed over
+        found, chances = solid.compute_stable_poses(n_samples=1, seed=0)
+    turns, chances = found[:, :3, :3], np.round(chances, 6)
+    order = np.lexsort([*np.round(turns[:, 2], 6).T, -chances]).tolist()  # the same where two are as likely
+    kept = [i for i in order if chances[i] >= min(RAREST, chances.max())]
+    return turns[kept], chances[kept] / chances[kept].sum()

@@ -13,6 +13,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
+import numpy as np
+
 from viewsphere import plugins
 from viewsphere.assets.animation.clip import Timeline
 from viewsphere.assets.metadata.sidecars import said_of
@@ -27,11 +29,13 @@ from viewsphere.composing.time_steps import check_keys, timed
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses, poses_of
 from viewsphere.errors import RecipeError, each
 from viewsphere.model.credit import Credit
+from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.notebook import Shown
 from viewsphere.model.rig import Rig
+from viewsphere.model.scene import IDENTITY, Floor
 from viewsphere.model.shot import Shot
-from viewsphere.planning.checks.emptying import emptied
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.planning.checks.models import (
     check_all_frames,
     check_blend,
@@ -47,7 +51,6 @@ from viewsphere.planning.checks.models import (
     check_sizes,
     check_splits,
 )
-from viewsphere.planning.checks.off_center import off_center
 from viewsphere.planning.checks.sequences import check_sequences
 from viewsphere.planning.checks.warnings import hidden_background, hidden_by_exposure, no_light, out_of_view, too_small
 from viewsphere.planning.clips import with_clips
@@ -61,6 +64,7 @@ from viewsphere.planning.tracks import tracks_digest, tracks_of
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.finish import JitterEntry
 from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scene import SceneEntry
@@ -355,7 +359,7 @@ class Plan(Shown, SamplingContext):
             if self.recipe.empty is None:
                 return shot
             shares = (share(self.recipe.seed, "empty", subject, self.pose_list.name(pose)) for pose in poses)
-            return emptied(shot, [one < self.recipe.empty for one in shares], box_of)
+            return _emptied(shot, [one < self.recipe.empty for one in shares], box_of)
 
     def cast(self, subject: str, pose: int | None = None) -> tuple[ModelSpec, ...]:
         """The recipe's models in a frame of a subject, from a pose (its number); without one, those in all of its frames."""
@@ -498,3 +502,57 @@ def check_images(planned: Plan) -> None:
             field = "images" if planned.recipe.scene.planes[i].image is None else "image"
             for path in files:
                 proportions(path, f"scene.planes[{i}].{field}")
+
+
+def _emptied(shot: Shot, empty: Sequence[bool], box_of: BoxOf) -> Shot:
+    """A shot of still pictures without its targets at the instants that are to be `empty`; scenery and ground stay.
+
+    All shots of a recipe come through here, those without an empty picture too: what is painted of a thing may not depend on
+    which pictures share its shot.
+    """
+    things = tuple(_absent(thing, empty) if thing.is_target else thing for thing in shot.things)
+    scene = shot.scene
+    if scene.ground is not None:
+        height = _lowest(shot, box_of) if scene.floor is None else scene.floor.height
+        scene = scene.model_copy(update={"floor": Floor(height=height, is_fixed=True)})
+    return shot.model_copy(update={"things": things, "scene": scene})
+
+
+def _lowest(shot: Shot, box_of: BoxOf) -> float:
+    """The lowest point of a model alone, in whose axes the world is; what is placed stands on z = 0."""
+    first = shot.things[0]
+    return float(box_of(first.model, first.step)[:, 2].min()) + 0.0 if first.world_from_object == IDENTITY else 0.0
+
+
+def _absent(thing: Thing, empty: Sequence[bool]) -> Thing:
+    """The thing, which stands still, where it is there."""
+    at = thing.motion.poses[0]
+    motion = Motion(poses=tuple(None if is_empty else at for is_empty in empty), steps=thing.motion.steps, moves=True)
+    return thing.model_copy(update={"motion": motion})
+
+
+def off_center(context: SamplingContext, subject: str, shot: Shot) -> Shot:
+    """The shot with its cameras moved in their pictures' planes, as its recipe's jitter says: what they look at keeps its
+    distance along the camera's axis, and so its size. Cameras without a viewpoint of their own stay.
+    """
+    if context.recipe.scene.jitter.off_center == JitterEntry().off_center:
+        return shot
+    instants = tuple(_moved(context, subject, shot, i) for i in range(len(shot.instants)))
+    return shot.model_copy(update={"instants": instants})
+
+
+def _moved(context: SamplingContext, subject: str, shot: Shot, i: int) -> Instant:
+    now, lens = shot.instants[i], shot.camera(i).intrinsics
+    view = now.viewpoint
+    if view is None:
+        return now
+    right, down = context.scenes.jitter(subject, context.jitter_name(view.index)).off_center
+    pose = np.array(now.world_from_rig)
+    x, y = -right * lens.width * view.distance / lens.fx, -down * lens.height * view.distance / lens.fy
+    by = x * pose[:3, 0] + y * pose[:3, 1]
+    pose[:3, 3] += by
+    target = tuple((np.array(view.target or now.focus) + by).tolist())
+    rows = tuple(map(tuple, pose.tolist()))
+    return now.model_copy(
+        update={"world_from_rig": rows, "focus": target, "viewpoint": view.model_copy(update={"target": target})}
+    )

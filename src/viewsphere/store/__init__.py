@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from viewsphere.store.index import Block, Row
     from viewsphere.store.samples.channel_files import check_codecs, decode, depth_step, encode
     from viewsphere.store.samples.choice import Choice, frame_ranges
-    from viewsphere.store.samples.dataset import Dataset
-    from viewsphere.store.samples.exported import Exported
+    from viewsphere.store.samples.dataset import Dataset, Exported
     from viewsphere.store.samples.simulated import Simulated
     from viewsphere.store.samples.watching import Finished, Watch
     from viewsphere.store.shots.folder import Store, kept_shot, new_folder
@@ -63,7 +62,7 @@ __getattr__ = names_of(
         "Category": "viewsphere.store.shots.records",
         "Choice": "viewsphere.store.samples.choice",
         "Dataset": "viewsphere.store.samples.dataset",
-        "Exported": "viewsphere.store.samples.exported",
+        "Exported": "viewsphere.store.samples.dataset",
         "Finished": "viewsphere.store.samples.watching",
         "ModelInfo": "viewsphere.store.shots.records",
         "Part": "viewsphere.store.shots.records",

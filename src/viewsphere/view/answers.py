@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,18 @@ from viewsphere.model.validation_errors import one_of
 from viewsphere.report import conventions, model_data
 from viewsphere.report.facts import facts
 from viewsphere.report.frames import frame_data
-from viewsphere.report.page import vendor_module
+from viewsphere.report.page import served_page, vendor_module
 from viewsphere.report.paths import without_folders
 from viewsphere.report.pictures import Scale, layer, layer_names
 from viewsphere.report.summary import hues, summary
 from viewsphere.report.unknown import number
 from viewsphere.view.live import Live
-from viewsphere.view.page import VENDOR, live_page
 from viewsphere.view.query import MEASURES, Query
+
+WEB = Path(__file__).parent / "web"
+VENDOR = "/vendor.js"
+"""The path of the libraries."""
+
 
 SMALL = Scale(400, 78, 400, quick=True)
 LARGE = Scale(1600, 88, 1600)
@@ -105,7 +110,7 @@ class Answers:
             "proof": None,
             **self._conventions,
         }
-        return Answer(live_page(dataset.name, data).encode(), "text/html; charset=utf-8")
+        return Answer(_live_page(dataset.name, data).encode(), "text/html; charset=utf-8")
 
     def _vendor(self, asked: Parameters) -> Answer:
         return Answer(vendor_module().encode(), "text/javascript; charset=utf-8", keep=3600)
@@ -212,3 +217,8 @@ def _whole(asked: dict[str, str], name: str, default: int | None = None) -> int:
     if not (text.isascii() and text.isdecimal() and len(text) <= 18):
         raise UserError(f"{name}: expected a whole number, found {text!r:.100}")
     return int(text)
+
+
+def _live_page(title: str, data: Mapping[str, Any]) -> str:
+    """The whole HTML text."""
+    return served_page(title, data, WEB, VENDOR)

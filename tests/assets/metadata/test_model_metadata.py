@@ -9,9 +9,8 @@ import trimesh
 
 from viewsphere.assets.cache import load
 from viewsphere.assets.metadata import model_metadata as metadata
-from viewsphere.assets.metadata.model_metadata import metadata_of
+from viewsphere.assets.metadata.model_metadata import metadata_of, spread_points
 from viewsphere.assets.metadata.sidecars import sidecar_of
-from viewsphere.assets.metadata.spread_points import spread_points
 from viewsphere.errors import ModelError
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import ModelSpec

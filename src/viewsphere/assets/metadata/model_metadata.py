@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.assets.animation.skin import grouped
 from viewsphere.assets.cache import frame_of, readers_digest
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.metadata.sidecars import said_of
-from viewsphere.assets.metadata.spread_points import spread_points
 from viewsphere.assets.metadata.surface import Surface
 from viewsphere.assets.metadata.symmetries import find, lacking
 from viewsphere.assets.primitive import FileFacts
@@ -27,6 +27,9 @@ from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
 from viewsphere.model.validation_errors import nearest, shown
 from viewsphere.recipe.sidecar import Sidecar
+
+Float = NDArray[np.float64]
+
 
 BEYOND = 0.1
 """Share of its diameter by which a point that a model names may lie outside of its box."""
@@ -122,3 +125,23 @@ def _spread(spec: ModelSpec, mesh: Mesh) -> Keypoints | None:
         return None
     places = spread_points(mesh.corners, spec.keypoints)
     return Keypoints(points={f"point_{i}": cast("Place", tuple(place)) for i, place in enumerate(places.tolist())})
+
+
+def spread_points(vertices: Float, count: int) -> Float:
+    """Up to `count` of the vertices (N, 3), each the farthest from those before it and from the middle of the box.
+
+    Farthest-point sampling, with the middle as its start, as PVNet picks its keypoints (Peng et al. 2019, section 3.1). Equal
+    vertices give equal points, in whatever order they come; of vertices that are equally far the first by x, y, z counts.
+    """
+    vertices = np.unique(vertices, axis=0)
+    away = _squares(vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2)
+    chosen: list[int] = []
+    while len(chosen) < min(count, len(vertices)):
+        chosen.append(int(away.argmax()))
+        away = np.minimum(away, _squares(vertices - vertices[chosen[-1]]))
+    return vertices[chosen]
+
+
+def _squares(vectors: Float) -> Float:
+    x, y, z = vectors.T
+    return x * x + y * y + z * z

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.animation.deforming import Load
-from viewsphere.engines.raster.antialiasing.supersampling import paint_finely
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
 from viewsphere.engines.raster.blurring import Blur
 from viewsphere.engines.raster.indirect.bounce_scene import BounceScenes
@@ -36,7 +35,10 @@ from viewsphere.rendering.finish import finished
 from viewsphere.rendering.seen import seen_by
 from viewsphere.rendering.weather.falling import fall_in
 from viewsphere.truth.raster.geometry import Geometry
-from viewsphere.truth.raster.visibility import Visibility
+from viewsphere.truth.raster.visibility import Visibility, rasterize
+
+Paint = Callable[[Camera, Visibility, Float32, Float32], None]
+"""Fills the light (H * W, 4) that a camera sees, and its parts (H * W, C), which are 0 before, or (0, 0)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +120,7 @@ class RasterStage:
             more = None if wet else partial(_mirror, baked, camera, seen, None)
             paint(baked, camera, seen, self.options.antialias > 1, has_sky, light, parts, more=more)
 
-        paint_finely(paint_all, self.options.times, baked.geometry, camera, visibility, radiance, split)
+        _paint_finely(paint_all, self.options.times, baked.geometry, camera, visibility, radiance, split)
         shape = camera.height, camera.width, 3
         albedo, emission = (split[:, k : k + 3].reshape(shape) for k in (0, 3))
         if not is_lit:
@@ -175,7 +177,7 @@ class RasterStage:
             edges = self.options.antialias > 1
             paint(baked, camera, seen, edges, has_sky, light, parts, fog=fog, is_outdoors=is_outdoors, more=more)
 
-        paint_finely(paint_all, self.options.times, baked.geometry, camera, seen, radiance, NO_SPLIT)
+        _paint_finely(paint_all, self.options.times, baked.geometry, camera, seen, radiance, NO_SPLIT)
 
     def _canvas(self, pixels: int) -> Float32:
         """Room for the light of a picture, the same one every time: fresh memory costs as much as the sky."""
@@ -204,3 +206,37 @@ def build_stage(shot: Shot, load: Load) -> RasterStage:
         raise RecipeError(f"engine.antialias: {options.antialias} samples in a pixel want {found}")
     size = options.for_width(longest)
     return RasterStage(Arrangements.build(shot, load), replace(options, shadow_resolution=size))
+
+
+def _paint_finely(
+    paint: Paint, times: int, geometry: Geometry, camera: Camera, visibility: Visibility, radiance: Float32, split: Float32
+) -> None:
+    """Fill `radiance` (H * W, 4) and `split` (H * W, C) with the means of what `paint` gives for `times` as many pixels each
+    way; `visibility` is truth's buffer for this camera.
+    """
+    if times == 1:
+        paint(camera, visibility, radiance, split)
+        return
+    large = larger(camera, times)
+    light, parts = (np.zeros((len(values) * times * times, values.shape[1]), np.float32) for values in (radiance, split))
+    paint(large, rasterize(geometry, large), light, parts)
+    for fine, coarse in ((light, radiance), (parts, split)):
+        if len(coarse):
+            _average(fine.reshape(camera.height, times, camera.width, times, -1), coarse)
+
+
+def larger(camera: Camera, times: int) -> Camera:
+    """The camera whose picture is the same with `times` as many pixels each way."""
+    lens = camera.intrinsics
+    scaled = {name: times * getattr(lens, name) for name in ("width", "height", "fx", "fy", "cx", "cy", "skew")}
+    return Camera(lens.model_copy(update=scaled), camera.R, camera.t)
+
+
+def _average(fine: Float32, coarse: Float32) -> None:
+    """Fill coarse (H * W, C) with means of fine (H, times, W, times, C)."""
+    total = coarse.reshape(fine.shape[0], fine.shape[2], -1)
+    total[:] = 0
+    for down in range(fine.shape[1]):
+        for across in range(fine.shape[3]):
+            total += fine[:, down, :, across]
+    total /= np.float32(fine.shape[1] * fine.shape[3])

@@ -7,8 +7,10 @@ anywhere. Shots carry the instants that labels of theirs need, too.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import replace
+
+import numpy as np
 
 from viewsphere.composing.composition import BoxOf
 from viewsphere.composing.layouts import is_slow
@@ -19,14 +21,16 @@ from viewsphere.composing.trajectories import is_still
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
 from viewsphere.labels import label_named
+from viewsphere.model.exposure import Exposure, Sweep, beyond
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor, Matrix4
 from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion
 from viewsphere.model.tracks import Tracks
 from viewsphere.planning.samplers import SamplingContext, Standing
-from viewsphere.planning.samplers.shared.exposing import exposures
+from viewsphere.planning.samplers.shared.moving import Moving
 from viewsphere.planning.samplers.shared.random import (
     check_scene_models,
     scene_cast,
@@ -39,7 +43,18 @@ from viewsphere.planning.samplers.shared.sequence_state import SequenceState, mi
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
+from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.store import Block
+
+NODES = 5
+"""Moments of an open shutter at which a thing's pose is recorded; it goes straight on in between."""
+
+AROUND = (-1.0, 0.0, 1.0)
+"""Moments of the instants around one."""
+
+RigAt = Callable[[int], Matrix4]
+"""The rig's pose at an instant of a sequence."""
+
 
 FLOOR = Floor(height=0.0, is_fixed=True)
 """The floor of all sequences: what moves may be above it or below."""
@@ -127,7 +142,7 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
     def rig_at(instant: int) -> Matrix4:
         return _instant(context, own, subject, start + instant, box_of).world_from_rig
 
-    blurred = exposures(own, [i if i in taken else None for i in numbers], time_of(context), rig_at)
+    blurred = _exposures(own, [i if i in taken else None for i in numbers], time_of(context), rig_at)
     more = {"sequence": context.sequence(subject, start), "tracks": _tracks(context, subject, start)}
     return made.model_copy(update=more | {"shutter": time_of(context).shutter, "exposures": blurred})
 
@@ -188,3 +203,37 @@ SAMPLER = SamplerSpec(
     standing=standing,
     shot=shot,
 )
+
+
+def _exposures(
+    state: SequenceState, instants: Sequence[int | None], time: TimeEntry, rig_at: RigAt
+) -> tuple[Exposure | None, ...]:
+    """Return the movements around each of these instants; empty for a shutter without duration.
+    An instant has None where it is not recorded (None), and where nothing moves.
+    """
+    if not time.shutter:
+        return ()
+    return tuple(None if at is None else _exposure(state, at, time, rig_at) for at in instants)
+
+
+def _exposure(state: SequenceState, at: int, time: TimeEntry, rig_at: RigAt) -> Exposure | None:
+    things = tuple(None if moving is None or moving.is_still else _thing(moving, at, time) for moving in state.moving)
+    rig = _rig(at, time.count, rig_at)
+    return None if rig is None and not any(things) else Exposure(things=things, rig=rig)
+
+
+def _thing(moving: Moving, at: int, time: TimeEntry) -> Sweep | None:
+    """A thing's poses while the shutter is open; of one whose file plays, those of the instants around, as its time steps."""
+    moments = AROUND if moving.plays_file else tuple(np.linspace(-0.5, 0.5, NODES) * time.shutter)
+    motion = moving.around(at, moments)
+    return None if motion.is_still else Sweep(moments=tuple(map(float, moments)), motion=motion)
+
+
+def _rig(at: int, count: int, rig_at: RigAt) -> Sweep | None:
+    """The rig's poses at the instants around one; before the first instant and after the last it goes on as it went."""
+    if count == 1:
+        return None
+    now = rig_at(at)
+    before = rig_at(at - 1) if at else beyond(now, rig_at(at + 1))
+    after = rig_at(at + 1) if at < count - 1 else beyond(now, before)
+    return None if before == now == after else Sweep(moments=AROUND, motion=Motion(poses=(before, now, after)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -23,7 +24,9 @@ from viewsphere.planning.distances import Distances
 from viewsphere.planning.plan import Plan
 from viewsphere.plugins.source import rooms_of
 from viewsphere.run.shots.stages import Stages
-from viewsphere.truth.sky_visibility import sky_occlusion
+
+DIRECTIONS = 64
+
 
 Float = NDArray[np.float64]
 
@@ -212,3 +215,24 @@ def _is_crossed(corners: Float, a: Float, b: Float) -> bool:
 
 def _shown(point: Float) -> str:
     return f"({', '.join(f'{v:.3g}' for v in point)})"
+
+
+def sky_occlusion(vertices: Float, triangles: NDArray[np.int32], point: Float) -> float:
+    """Share of the upper hemisphere that a mesh hides from a point (3,); point and vertices in one frame, +Z up.
+
+    1 inside a house, whatever its floor and the thickness of its walls; 0 where no part of the mesh is overhead, as in a street
+    or among hills; in between beside a wall or below a tree.
+    """
+    from viewsphere.truth.kernels_sky_visibility import hits_any
+
+    if not hits_any(vertices, triangles, point, np.array([0.0, 0.0, 1.0])):
+        return 0.0
+    return sum(hits_any(vertices, triangles, point, d) for d in _upward()) / DIRECTIONS
+
+
+def _upward() -> Float:
+    """Unit vectors spread evenly over the upper hemisphere, on a Fibonacci spiral."""
+    z = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
+    turn = np.arange(DIRECTIONS) * math.pi * (3 - math.sqrt(5))
+    level = np.sqrt(1 - z * z)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)

@@ -31,7 +31,6 @@ from viewsphere.store.index import Row
 from viewsphere.store.paths import file_inside, files_inside, names
 from viewsphere.store.samples.channel_files import decode
 from viewsphere.store.samples.choice import Choice
-from viewsphere.store.samples.made import Made
 from viewsphere.store.samples.point_tracks import PointTracks, joined
 from viewsphere.store.samples.selection import Selection
 from viewsphere.store.shots.folder import Store
@@ -44,6 +43,7 @@ from viewsphere.urls import here, link_file, located
 if TYPE_CHECKING:
     from viewsphere.assets.mesh import Mesh
     from viewsphere.model.voxels import Occupancy
+
 
 Options = Mapping[str, Mapping[str, Any]]
 """Options of labels, by their names."""
@@ -582,3 +582,41 @@ def _damaged(file: Path, error: Exception) -> StoreError:
         f"{file}: expected the frames of a finished shot, found {type(error).__name__}: {error}: "
         f"delete {file.parent} and render again"
     )
+
+
+class Made:
+    """The files made of the frame that is exported now, by the names of their encodings."""
+
+    def __init__(self) -> None:
+        self._frame = -1
+        self._files: dict[str, Path] = {}
+
+    def put(self, frame: int, name: str, make: Callable[[], bytes], file: Path) -> str | None:
+        """Write what `make` gives into a file, or link it to where the same was written before; says how it was linked."""
+        if frame != self._frame:
+            self._frame, self._files = frame, {}
+        first = self._files.setdefault(name, file)
+        if first is not file:
+            return link_file(first, file)
+        file.write_bytes(make())
+        return None
+
+
+class Exported(Dataset):
+    """A data set whose samples lack the annotations that exports leave out: of what is seen no more than `least`, if that
+    is said.
+    """
+
+    def __init__(self, root: str | os.PathLike[str], choice: Choice | None, least: float | None) -> None:
+        super().__init__(root, choice)
+        self.least = least
+
+    def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice, float | None]]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return type(self), (self.root, self.choice, self.least)
+
+    def shown(self, sample: Sample) -> Sample:
+        """A sample of the data set with the annotations that are kept; of imported ones nobody knows the visibility."""
+        if self.least is None:
+            return sample
+        kept = tuple(o for o in sample.objects if o.source is not None or o.visibility > self.least)
+        return replace(sample, objects=kept)

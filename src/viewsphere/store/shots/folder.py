@@ -18,6 +18,7 @@ from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
+from viewsphere.model.quantity import first_few
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
@@ -31,7 +32,6 @@ from viewsphere.store.samples.channel_files import encode
 from viewsphere.store.shots.heartbeat import Heartbeat, HeartbeatWriter
 from viewsphere.store.shots.manifest import MANIFEST, Manifest, refuse_another
 from viewsphere.store.shots.moving import move
-from viewsphere.store.shots.other_files import other_files
 from viewsphere.store.shots.records import ModelInfo, OtherStoreError, PlanRecord
 from viewsphere.store.shots.sample_records import short_sample, whole_sample
 from viewsphere.store.shots.shot_files import ShotFiles
@@ -244,7 +244,7 @@ class Store:
         if found.digest != plan.digest:
             differing = different(found.recipe, plan.recipe)
             if not differing:
-                raise StoreError(f"{self.root}: {other_files(found.models, plan.models)}")
+                raise StoreError(f"{self.root}: {_other_files(found.models, plan.models)}")
             what = f"another in {', '.join(differing)}"
             raise StoreError(
                 f"{self.root}: expected data of recipe {plan.name!r} (digest {plan.digest[:12]}), found that of "
@@ -466,3 +466,21 @@ def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
 def _held(indices: Iterable[Index], keys: Iterable[str]) -> Iterator[tuple[str, str, int]]:
     """Key, subject and number of samples of the shots of these keys in some indices."""
     return chain.from_iterable(index.held(keys) for index in indices)
+
+
+def _other_files(then: Sequence[str], now: Sequence[str]) -> str:
+    """The problem and its fix; `then` and `now` are the keys of a data set's models and of the recipe's."""
+    gone, new = _without(then, now), _without(now, then)
+    if gone:
+        are, them = ("is", "it") if len(gone) == 1 else ("are", "them")
+        what = f"with other model files: {first_few(gone)} {are} not in the recipe any more. Restore {them}"
+    elif new:
+        what = f"without {first_few(new)}. Add {'it' if len(new) == 1 else 'them'} with --append"
+    else:
+        what = "with other files: pictures, poses or scripts that the recipe names. Restore them, add with --append"
+    return f"this folder was rendered {what}, or choose another output folder"
+
+
+def _without(some: Sequence[str], others: Sequence[str]) -> list[str]:
+    left = set(others)
+    return [f"`{key}`" for key in some if key not in left]

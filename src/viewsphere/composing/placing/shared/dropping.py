@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
@@ -13,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from viewsphere.composing.physics import LONGEST_S, Board, Body, Touch, World, body_of
+from viewsphere.caches.arrays import Content
+from viewsphere.caches.entries import kept
+from viewsphere.composing.physics import LONGEST_S, Board, Body, Touch, World, body_of, needed
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, Way, draws_of
-from viewsphere.composing.placing.shared.parts import convex_parts
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
@@ -23,6 +26,19 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length, Portion, Positive, Strength
 from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import Drawn, drawn
+
+SETTINGS = {
+    "threshold": 0.08,
+    "max_convex_hull": 16,
+    "preprocess_resolution": 30,
+    "mcts_nodes": 10,
+    "mcts_iterations": 60,
+    "mcts_max_depth": 2,
+    "resolution": 1000,
+    "seed": 1,
+}
+"""coacd's own settings take up to thirty times as long, and nothing comes to rest better."""
+
 
 Float = NDArray[np.float64]
 
@@ -193,7 +209,7 @@ class Drop:
         return body_of(self._parts(shape), own.density, own.mass, Touch(own.friction, own.restitution))
 
     def _parts(self, shape: Shape) -> list[Float]:
-        return [shape.hull] if self.options.collide == "hulls" else convex_parts(shape)
+        return [shape.hull] if self.options.collide == "hulls" else _convex_parts(shape)
 
     def _spheres(self, slot: int) -> tuple[Float, float]:
         """Middle (3,) and radius of a ball around a thing, its own axes."""
@@ -309,3 +325,29 @@ def _fences(around: Footprint, height: float) -> list[Board]:
         x, y = (around.center + side * (around.half[axis] + thick) * around.axes[axis]).tolist()
         found.append(Board((x, y, height / 2), (half[0], half[1], height / 2), turn, is_fence=True))
     return found
+
+
+def _convex_parts(shape: Shape) -> list[Float]:
+    """Corners (N, 3) of the convex parts of a model, by CoACD (Wei et al. 2022), which together cover it: they are kept in the
+    cache by the mesh's digest. Raises ModelError if the model's file cannot be used, MissingExtraError without coacd.
+    """
+    if shape.surface is None:
+        return [shape.hull]
+    vertices, triangles = shape.surface()
+    digest = hashlib.sha256(json.dumps(SETTINGS).encode() + vertices.tobytes() + triangles.tobytes()).hexdigest()
+    return kept("parts", digest, lambda: _parted(vertices, triangles), _plain, lambda content: list(content.arrays.values()))
+
+
+def _plain(parts: list[Float]) -> Content:
+    return Content(None, {f"{i}": part for i, part in enumerate(parts)})
+
+
+def _parted(vertices: Float, triangles: NDArray[np.int32]) -> list[Float]:
+    coacd = needed("coacd")
+    trimesh = needed("trimesh")
+
+    coacd.set_log_level("error")
+    mesh = trimesh.Trimesh(vertices, triangles, process=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)  # else every seam of a texture is an open edge
+    found = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), **SETTINGS)
+    return [np.round(np.asarray(corners, np.float64), 9) for corners, _ in found]

@@ -11,10 +11,12 @@ from viewsphere.engines.shared.blender.requests import extent
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
+from viewsphere.model.weather import Fog
 from viewsphere.rendering.ground.horizon import BEGIN, FLAT, OVER
 from viewsphere.rendering.sky.sky import SkyPictures, sky_pictures
+from viewsphere.rendering.weather.fog import Air
 from viewsphere.truth.raster.geometry import Geometry
-from viewsphere.truth.raster.visibility import Visibility
+from viewsphere.truth.raster.visibility import Visibility, rasterize
 
 EDGE = 1
 """Pixels by which an object's smoothed outline reaches beyond the pixels whose rays hit the object."""
@@ -97,3 +99,36 @@ def _widened(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _smooth(x: Float) -> Float:
     return x * x * (3 - 2 * x)
+
+
+def veil(picture: Float32, fog: Fog, camera: Camera, geometry: Geometry, is_outdoors: bool = False) -> None:
+    """Veil what a picture (H, W, 4), premultiplied, without its sky shows, in place; of fog that `is_outdoors` its ground."""
+    seen = rasterize(geometry, camera, subdivision=2)
+    rays = pixel_rays(camera.intrinsics, 2).reshape(-1, 3)
+    depth = Air.of(fog, camera, rays).depth(seen.inverse_depth.reshape(-1))
+    triangle = seen.triangle.reshape(-1)
+    if is_outdoors:
+        depth = np.where(triangle >= geometry.triangle_start[-1], depth, np.float32(0))
+    is_there = triangle >= 0
+    through, there = (_of_pixels(values, camera) for values in (np.exp(-depth) * is_there, is_there.astype(np.float32)))
+    mean = np.where(there > 0, through / np.maximum(there, np.float32(0.25)), 0)
+    Air.of(fog, camera).veil(picture.reshape(-1, 4), -np.log(np.maximum(mean, np.float32(1e-30))))
+
+
+def lay_sky(picture: Float32, fog: Fog, camera: Camera, backdrop: Backdrop | None) -> None:
+    """Lay a veiled picture over the sky as fog shows it, in place; without a backdrop there is fog alone."""
+    rows = picture.reshape(-1, 4)
+    hidden = rows[:, 3].copy()
+    sky = np.zeros((len(rows), 3), np.float32)
+    if backdrop is not None:
+        rays = np.nan_to_num(pixel_rays(camera.intrinsics)) @ camera.R
+        directions = rays / np.maximum(np.linalg.norm(rays, axis=2, keepdims=True), 1e-12)
+        sky = (1 - hidden[:, None]) * backdrop.seen(directions).reshape(-1, 3).astype(np.float32)
+    rows[:, :3] += Air.of(fog, camera).behind(sky, hidden)
+    rows[:, 3] = 1
+
+
+def _of_pixels(values: NDArray[np.floating], camera: Camera) -> Float32:
+    """The mean (H * W,) of values at the quarters of each pixel, (2H * 2W,)."""
+    quarters = values.reshape(camera.height, 2, camera.width, 2)
+    return quarters.mean(axis=(1, 3)).reshape(-1).astype(np.float32)

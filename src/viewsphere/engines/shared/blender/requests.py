@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.appearance.repaint import repainted
-from viewsphere.assets.mesh import Image, Material, Mesh
+from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.assets.srgb import encoded
 from viewsphere.engines.shared.blender.file_frame import FileFrame
 from viewsphere.engines.shared.blender.options import AnyOptions
 from viewsphere.engines.shared.blender.texels import Kind, Levels
@@ -21,11 +23,18 @@ from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint, Thing
 from viewsphere.rendering.ground.horizon import BEGIN, FLAT, OVER
-from viewsphere.rendering.ground.material import ground_frame, ground_material, only_scatters
-from viewsphere.rendering.ground.slab_picture import laid_with_slabs
+from viewsphere.rendering.ground.kernels_slabs import shades
+from viewsphere.rendering.ground.material import PERIOD, SLABS, ground_frame, ground_material, only_scatters
 from viewsphere.rendering.sky.sky import SURROUNDINGS, SkyPictures, sky_pictures
 from viewsphere.rendering.sky.sun import sun_light
 from viewsphere.truth.raster.geometry import Geometry
+
+TEXELS = 1024
+"""Side of the slabs' picture; it shows `PERIOD` slabs a side."""
+
+_BRIGHTEST = 1.44
+"""No shade of the slabs is greater."""
+
 
 Put = Callable[[NDArray[Any]], str]
 """Writes an array to a file that the worker can read, and returns the file's path."""
@@ -236,3 +245,28 @@ def _hemispheres(scene: Scene, pictures: SkyPictures) -> list[list[float]]:
         direct = 0 if sun is None else np.array(sun.irradiance) * max(sun.direction[2], 0) / math.pi
         below = SURROUNDINGS * (above + direct)
     return [above.tolist(), below.tolist()]
+
+
+def laid_with_slabs(material: Material) -> tuple[Material, tuple[Image, ...]]:
+    """The ground's material with a picture of its slabs."""
+    r, g, b, a = material.base_color
+    picture = _slab_picture()
+    used = replace(
+        material,
+        base_color=(r * _BRIGHTEST, g * _BRIGHTEST, b * _BRIGHTEST, a),
+        base_color_texture=Texture(0, scale=(SLABS / PERIOD, SLABS / PERIOD)),
+    )
+    return used, (picture,)
+
+
+@lru_cache(maxsize=1)
+def _slab_picture() -> Image:
+    """One period of the slabs, as a share of `_BRIGHTEST`."""
+    at = ((np.arange(TEXELS) + 0.5) * (PERIOD / TEXELS)).astype(np.float32)
+    x, y = (np.ascontiguousarray(v).reshape(-1) for v in np.broadcast_arrays(at, at[:, None]))
+    tone = np.empty(TEXELS * TEXELS, np.float32)
+    shades(x, y, np.float32(PERIOD / TEXELS), tone)
+    pixels = np.full((TEXELS, TEXELS, 4), 255, np.uint8)
+    grey = np.rint(encoded(tone.reshape(TEXELS, TEXELS) / _BRIGHTEST) * 255).astype(np.uint8)
+    pixels[..., :3] = grey[..., None]
+    return Image("slabs", pixels)

@@ -17,16 +17,14 @@ from viewsphere.blender.interpreter import GRAPHICS, find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.codecs.npz import load_array
 from viewsphere.engines.shared.arranged import Arrangements
-from viewsphere.engines.shared.blender.backdrop import Backdrop
+from viewsphere.engines.shared.blender.backdrop import Backdrop, lay_sky, veil
 from viewsphere.engines.shared.blender.border import border_of
 from viewsphere.engines.shared.blender.file_frame import FileFrame
-from viewsphere.engines.shared.blender.lens import resampled, views_of
+from viewsphere.engines.shared.blender.lens import Sweeping, resampled, views_of
 from viewsphere.engines.shared.blender.options import AnyOptions, options_of
 from viewsphere.engines.shared.blender.requests import Request, kinds_of, materials_request, scene_request, staged
 from viewsphere.engines.shared.blender.scripts import script_request
-from viewsphere.engines.shared.blender.sweeping import Sweeping
 from viewsphere.engines.shared.blender.texels import Kind, Levels
-from viewsphere.engines.shared.blender.veiling import lay_sky, veil
 from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.model.camera import Camera
