@@ -74,28 +74,24 @@ def labelled(install: Callable[[str, str, str], Path]) -> Iterator[Callable[[str
     forget()
 
 
-UNSEEN = """
-import numpy as np
-from viewsphere.labels import ChannelLabel, Next
-
-LABEL = ChannelLabel(
-    name="unseen", meaning="whether the point is hidden an instant later", needs=(Next(),), dtype=np.uint8, empty=4,
-    ids={}, encoding="png", compute=lambda context: np.zeros(context.visibility.triangle.shape, np.uint8)
-    if context.match(Next()) is None else context.match(Next()).state,
-)
-"""
+HIDDEN = EXAMPLES["hidden_next and hidden_previous"]
 
 
 @pytest.mark.slow
 def test_a_label_of_motion_after_tracks_in_the_alphabet_is_computed_again_from_its_own_instants(labelled, tmp_path):
     """Picking points at four instants writes over the triangles of the instants that labels before it have asked for."""
-    labelled("unseen", UNSEEN)
-    recipe = eventful_recipe(8, channels=["rgb", "flow", "unseen", "tracks"], formats=[])
+    code = HIDDEN.replace("hidden_", "unseen_")  # after `tracks` in the alphabet
+    labelled("unseen_next unseen_previous", code)
+    recipe = eventful_recipe(8, channels=["rgb", "flow", "unseen_next", "unseen_previous", "tracks"], formats=[])
     generate(recipe, tmp_path / "out")
     dataset = Dataset(tmp_path / "out")
     report = check(dataset)
     assert report.ok, report.findings
-    assert report.checked["unseen"] == report.checked["tracks"] == len(dataset) > 0
+    assert report.checked["unseen_next"] == report.checked["tracks"] == len(dataset) > 0
+    for sample in dataset:
+        known = sample.channels["unseen_next"][np.isfinite(sample.flow[..., 0])]
+        assert set(np.unique(known)) <= {0, 1}
+    assert any(sample.channels[name].any() for sample in dataset for name in ("unseen_next", "unseen_previous"))
 
 
 def test_a_label_of_pixels_is_one_file(labelled, tmp_path):
@@ -176,9 +172,11 @@ def test_a_channel_that_needs_its_neighbours_is_refused_for_still_pictures(label
 
 def test_a_label_that_reads_a_view_without_listing_it_is_refused(labelled):
     """Else a run would compute it, and `check` could not: it gives labels no views that they do not need."""
-    labelled("unseen", UNSEEN.replace("needs=(Next(),)", "needs=(Previous(),)").replace("Next\n", "Next, Previous\n"))
-    recipe = eventful_recipe(8, channels=["rgb", "unseen"], formats=[])
-    with pytest.raises(PluginError, match=r"label unseen: `compute` reads Next\(instants=1\), which `needs` does not list"):
+    labelled("hidden_next hidden_previous", HIDDEN.replace("needs=(other,)", "needs=(Previous(),)"))
+    recipe = eventful_recipe(8, channels=["rgb", "hidden_next"], formats=[])
+    with pytest.raises(
+        PluginError, match=r"label hidden_next: `compute` reads Next\(instants=1\), which `needs` does not list"
+    ):
         next(iter(render(recipe)))
 
 
@@ -302,6 +300,7 @@ GROUPS = {
     "csv_boxes": ("formats", "One row an object"),
     "lines": ("formats", "One JSON line a picture"),
     "borders": ("labels", "borders"),
+    "hidden_next hidden_previous": ("labels", "hidden_next and hidden_previous"),
     "flat": ("engines", "flat"),
     "circle": ("placers", "In a circle around the middle, all facing it; where the circle begins is drawn."),
     "bounce": ("motions", "Falls from a height, and bounces."),
@@ -343,6 +342,7 @@ def test_the_page_s_plug_ins_work_in_a_package_that_is_installed(tmp_path):
         text = INSTALLED.replace("}]", moves, 1)
         if name == "moving":
             text = text.replace("viewpoints: {azimuth: [0, 40], elevation: 20, ", "viewpoints: {kind: swing, ")
+            text = text.replace("borders]", "borders, hidden_next, hidden_previous]")
         (tmp_path / f"{name}.yaml").write_text(text + more)
         for words in (("render", f"{name}.yaml", "-o", name, "--workers", "0"), ("check", name, "--workers", "0")):
             run = subprocess.run(
