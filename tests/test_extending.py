@@ -305,6 +305,7 @@ GROUPS = {
     "circle": ("placers", "In a circle around the middle, all facing it; where the circle begins is drawn."),
     "bounce": ("motions", "Falls from a height, and bounces."),
     "pairs": ("samplers", "Every model beside the next one, from all poses."),
+    "division": ("lenses", "division"),
     "dots": ("materials", "dots"),
     "tri": ("readers", "Triangles as text"),
     "ring": ("lights", "ring"),
@@ -317,7 +318,7 @@ GROUPS = {
 INSTALLED = """
 models: [{source: "zoo:peg", count: 3}, {source: "parts/*.tri", category: part}, {source: "zoo:box", category: box}]
 viewpoints: {azimuth: [0, 40], elevation: 20, distance: 2}
-camera: {size: [96, 72], fov_deg: 40}
+camera: {size: [96, 72], fov_deg: 40, distortion: {model: division, k: -0.3}}
 scene: {ground: {material: dots}, lights: {kind: ring, position: [0, 0, 1], strength: 4}}
 channels: [rgb, instances, borders]
 formats: [csv_boxes, lines]
