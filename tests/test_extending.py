@@ -30,6 +30,7 @@ from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.check import check
 from viewsphere.errors import ModelError, PluginError, RecipeError, UserError
 from viewsphere.formats import coco
+from viewsphere.planning.models import model_specs
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.writable import writable_formats
@@ -229,7 +230,7 @@ def test_several_labels_are_one_file_in_the_package_and_are_listed_without_impor
             table.cache_clear()
         assert set(TWINS.split()) < set(plugins.names("labels")) and "edges" not in plugins.names("labels")
         assert "viewsphere.labels.edges" not in sys.modules
-        assert plugins.source("labels", "edges_across") == tmp_path / "shipped" / "edges.py"
+        assert plugins.module_file("labels", "edges_across") == tmp_path / "shipped" / "edges.py"
         _has_edges(tmp_path / "out")
         sys.modules.pop("viewsphere.labels.edges")
     for table in tables:
@@ -309,6 +310,7 @@ GROUPS = {
     "dots": ("materials", "dots"),
     "tri": ("readers", "Triangles as text"),
     "ring": ("lights", "ring"),
+    "parts": ("sources", "Our library of parts"),
     "peg": ("families", "Pegs that stand on a foot."),
     "pegs": ("places", "A pair of pegs on an empty floor."),
     "swing": ("trajectories", "swing"),
@@ -357,6 +359,64 @@ def test_the_page_s_plug_ins_work_in_a_package_that_is_installed(tmp_path):
             assert run.returncode == 0, run.stdout + run.stderr
         assert (tmp_path / name / "csv_boxes" / "boxes.csv").stat().st_size > 60
         assert len(Dataset(tmp_path / name)) > 0
+
+
+BOLT = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.fixture
+def parts(install, monkeypatch, tmp_path):
+    """A library of two parts, and the source that finds them."""
+    for name in ("bolt", "nut"):
+        (tmp_path / f"{name}.obj").write_text(BOLT)
+    monkeypatch.setenv("PARTS", str(tmp_path))
+    install("sources", "parts", EXAMPLES["Our library of parts"])
+
+
+def parts_recipe(source):
+    return small_recipe(models=[{"source": source}], channels=["rgb", "instances"], formats=[])
+
+
+@pytest.mark.usefixtures("parts")
+def test_a_source_of_models_is_one_file(tmp_path):
+    recipe = parts_recipe("parts:*")
+    assert [(spec.key, spec.category, spec.seed) for spec in model_specs(recipe)] == [
+        ("bolt", "bolt", None),
+        ("nut", "nut", None),
+    ]
+    generate(recipe, tmp_path / "out")
+    dataset = Dataset(tmp_path / "out")
+    assert {sample.objects[0].category for sample in dataset} == {"bolt", "nut"}
+    assert dataset.store.model_info("bolt").credit.licence == "CC0-1.0"
+    report = check(dataset)
+    assert report.ok, report.findings
+    with pytest.raises(RecipeError, match=r"models\[0\]\.source: parts: expected a part, such as bolt; found 'screw'"):
+        plan(parts_recipe("parts:screw"))
+
+
+@pytest.mark.usefixtures("parts")
+def test_a_part_that_changed_is_found(tmp_path):
+    generate(parts_recipe("parts:bolt"), tmp_path / "out")
+    (tmp_path / "bolt.obj").write_text(BOLT.replace("v .1 0 0", "v .2 0 0"))
+    with pytest.raises(UserError, match=r"model 'bolt' \(parts:bolt\) changed since this data set was begun"):
+        generate(parts_recipe("parts:*"), tmp_path / "out", append=True)
+
+
+def test_a_package_of_plug_ins_is_listed_and_one_that_is_broken_breaks_nothing_else(tmp_path, monkeypatch):
+    for name, code in (("good", ""), ("bad", "1 / 0")):
+        site = tmp_path / name
+        folder = write_package(site, f"{name}_families", {("packages", "families"): ""})
+        (folder / "families.py").rename(folder / "peg.py")
+        (folder / "peg.py").write_text(example("Pegs that stand on a foot."))
+        (folder / "__init__.py").write_text(code)
+        entry = site / f"{name}_families-1.0.dist-info" / "entry_points.txt"
+        entry.write_text(f"[viewsphere.packages]\nfamilies = {name}_families\n")
+        monkeypatch.syspath_prepend(str(site))
+    assert {"peg", "car", "bad_families"} <= set(plugins.names("families"))
+    assert plugins.is_third_party("families", "peg") and not plugins.is_third_party("families", "car")
+    assert zoo.build("peg", np.random.default_rng(0)).parts == ("foot", "stem")
+    with pytest.raises(PluginError, match="bad_families cannot be imported: ZeroDivisionError"):
+        zoo.family("bad_families")
 
 
 @pytest.mark.slow

@@ -33,7 +33,7 @@ class ZooFamily(Spec):
     home: Home = Field(description="the usual surroundings: `table`, `floor`, `street`, `garden`, `water`, or `place`")
     classes: Mapping[str, str] = Field(
         default={"": "scenery"},
-        description="stuff classes by part, for models without labels of their own; `''`: all other parts",
+        description="stuff classes by part, for models without labels of their own; `''` (scenery by default): all other parts",
     )
     keypoints: Mapping[str, At] = Field(default={}, description="named points, as places in the boxes around parts")
     skeleton: tuple[tuple[str, str], ...] = Field(default=(), description="lines between the points")

@@ -58,9 +58,10 @@ class SourceSpec(Spec):
         default=False,
         description="whether a name stands for any number of models, each drawn from `model.seed`; else each name is one model",
     )
-    versioned: bool = Field(
-        default=False,
-        description="whether its models change only with the version of viewsphere, so a finished data set need not read them",
+    versioned: Callable[[str], bool] = Field(
+        default=lambda name: False,
+        description="`versioned(name)`: whether the models of a name change only with the version of viewsphere, so that a run "
+        "that goes on need not compare them",
     )
     family: Callable[[str], ZooFamily | None] = Field(
         default=lambda name: None, description="`family(name)`: facts about the models of a name, if there are any"
@@ -94,7 +95,7 @@ def source_of(text: str) -> Named | None:
 def is_versioned(text: str) -> bool:
     """Return whether the version of viewsphere decides what a model is."""
     named = source_of(text)
-    return named is not None and named.spec.versioned
+    return named is not None and named.spec.versioned(named.name)
 
 
 def place_of(text: str) -> PlaceSpec | None:

@@ -13,7 +13,7 @@ from viewsphere.check.report import in_short
 from viewsphere.errors import UserError
 from viewsphere.files import read_bytes
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.plugins import prefix_of
+from viewsphere.plugins.source import is_versioned
 from viewsphere.run.shots.models import Export, Models
 from viewsphere.scratch import temporary
 from viewsphere.store import Dataset, ModelInfo
@@ -73,7 +73,7 @@ class Sources:
         except UserError as error:
             self.why_not[info.key] = str(error)
             return
-        if made.digest != info.digest and not prefix_of(spec.source) and not self._is_same(info, export):
+        if made.digest != info.digest and not is_versioned(spec.source) and not self._is_same(info, export):
             self.why_not[info.key] = f"{Path(spec.source).name} changed since"
             return
         wanted, found = (json.loads(json.dumps(one.to_plain())) for one in (made, info))
