@@ -184,7 +184,7 @@ def test_plans_count_sensors_and_tell_rigs_apart():
     assert (one.frames, two.frames) == (6, 12) and sum(two.split_counts.values()) == 12
     assert two.factors.endswith("3 poses x 2 sensors")
     assert len({one.digest, two.digest, three.digest}) == 3
-    assert [row.count for row in two.rows] == [6, 6] and two.rows.at(7).first == 6
+    assert [row.count for row in two.rows] == [6, 6] and two.rows.row_at(7).first == 6
 
 
 def test_a_rig_in_words_and_as_a_model():

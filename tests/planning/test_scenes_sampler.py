@@ -124,7 +124,8 @@ def test_some_of_the_viewpoints_are_drawn_for_each_scene():
     planned = vs.plan(recipe(20, viewpoints=grid, scenes={"views": 4}))
     assert planned.frames == 20 * 4 and planned.factors == "20 scenes of 9 models x 4 poses"
     taken = {
-        name: tuple(p for r in planned.rows.of(name) for a, b in r.positions for p in range(a, b)) for name in planned.subjects
+        name: tuple(p for r in planned.rows.rows_of(name) for a, b in r.positions for p in range(a, b))
+        for name in planned.subjects
     }
     assert all(len(set(poses)) == 4 for poses in taken.values())
     assert len(set(taken.values())) > 10 and len({p for poses in taken.values() for p in poses}) == 12
@@ -227,7 +228,7 @@ def test_listed_spots_are_taken():
     planned = vs.plan(recipe(3, scenes={"objects": 3, "layout": spots}))
     for shot in planned.shots(box_of):
         assert [(t.world_from_object[0][3], t.world_from_object[1][3]) for t in shot.things] == [(1, 0), (-1, 0), (0, 2)]
-    with pytest.raises(RecipeError, match=r"expected objects: 3, as many as the layout lists"):
+    with pytest.raises(RecipeError, match=r"expected objects: 3, one for each place"):
         recipe(3, scenes={"layout": spots})
 
 

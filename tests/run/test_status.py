@@ -51,7 +51,7 @@ def test_a_clock_that_jumps_changes_no_rate(jump, monkeypatch):
     pulse.enters("frames")
     pulse.now = replace(pulse.now, done=40, total=100)
     ticks[0], now[0] = 20.0, 1e9 + 20 + jump
-    told = json.loads(pulse.told())
+    told = json.loads(pulse.note())
     assert told["beat"] == now[0]
     assert told["beat"] - told["begun"] == 20
     assert replace(pulse.now, begun=told["begun"], beat=told["beat"]).rate == 2
@@ -107,7 +107,7 @@ def test_the_pulse_tells_what_is_under_way():
         pulse.enters("frames")
         pulse.now = replace(pulse.now, done=6, total=40, resumed=4, under_way=3)
         pulse.working_on["m-000000"] = None
-        told = json.loads(pulse.told())
+        told = json.loads(pulse.note())
     assert len(written) == 1  # the first at once
     assert (told["phase"], told["done"], told["under_way"], told["working_on"]) == ("frames", 6, 3, ["m-000000"])
 

@@ -47,24 +47,24 @@ def test_every_way_leads_to_the_same_row(index):
     assert len(index) == len(rows)
     assert [index[i] for i in range(len(index))] == rows == list(index[:])
     assert [index[i - len(index)] for i in range(len(index))] == rows
-    assert all(index.at(row.first) == index.at(row.first + row.count - 1) == row for row in rows)
+    assert all(index.row_at(row.first) == index.row_at(row.first + row.count - 1) == row for row in rows)
     assert len({row.key for row in rows}) == len(rows)
     assert all(index.find(row.key) == row for row in rows)
     keys = ["", "no-such", *(row.key for row in rows), "a-999999"]
-    assert list(index.found(keys)) == rows
+    assert list(index.rows_with_keys(keys)) == rows
     assert list(index.held(keys)) == [(row.key, row.subject, row.count) for row in rows]
     own = replace(index, shard=Shard(1, 3))
     assert list(own.held(keys)) == [(row.key, row.subject, row.count) for row in own]
     for subject in index.subjects:
         own = [row for row in rows if row.subject == subject]
-        assert list(index.of(subject)) == own
+        assert list(index.rows_of(subject)) == own
         assert index.count_of(subject) == len(own)
     for wrong in (len(index), -len(index) - 1):
         with pytest.raises(IndexError, match="expected a shot"):
             index[wrong]
     for wrong in (index.first - 1, index.first + index.samples):
         with pytest.raises(IndexError, match="expected a sample"):
-            index.at(wrong)
+            index.row_at(wrong)
 
 
 @given(indices(), st.data())
@@ -90,8 +90,8 @@ def test_memory_and_time_do_not_grow_with_the_samples():
     def peak(count):
         index = Index((Block(("car", "boat"), ((0, count),)),), 0, 16, 0)
         tracemalloc.start()
-        assert index.find(index[len(index) - 1].key) == index.at(index.samples - 1)
-        assert next(index.of("boat")).first == count
+        assert index.find(index[len(index) - 1].key) == index.row_at(index.samples - 1)
+        assert next(index.rows_of("boat")).first == count
         found = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return found

@@ -127,7 +127,7 @@ def _found_shots(dataset: Dataset, findings: Iterable[Finding]) -> Iterator[str]
     for finding in findings:
         if finding.frame is not None and finding.check not in names:
             added = [
-                index.at(finding.frame).key
+                index.row_at(finding.frame).key
                 for index, channels in dataset.plan.supplements
                 if finding.check in channels and index.first <= finding.frame < index.first + index.samples
             ]

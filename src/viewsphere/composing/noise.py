@@ -21,7 +21,7 @@ class Noise:
     frequencies: Float
     phases: Float
 
-    def at(self, seconds: float) -> Float:
+    def values_at(self, seconds: float) -> Float:
         """The components (D,) at a time, each of -1 to 1."""
         rows = zip(self.frequencies.tolist(), self.phases.tolist(), strict=True)
         return np.array([_sum(frequencies, phases, seconds) for frequencies, phases in rows])

@@ -135,7 +135,7 @@ def explained(error: ValidationError, fields: Sequence[str], steps: Path = ()) -
 
 
 @contextmanager
-def at(*steps: str | int) -> Generator[None]:
+def error_at(*steps: str | int) -> Generator[None]:
     """Turn a ValueError about one part of a value into a ValidationError that has the part's place."""
     try:
         yield

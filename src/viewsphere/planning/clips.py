@@ -69,9 +69,9 @@ def shown_steps(recipe: Recipe, number: int, spec: ModelSpec, line: Timeline) ->
 def _played(clips: tuple[MotionEntry, ...], spec: ModelSpec, line: Timeline, time: TimeEntry, field: str) -> list[TimeStep]:
     """The time steps that are shown at all instants, and just before and after, which blurred pictures show."""
     around = range(-1, time.count + 1) if time.shutter else range(time.count)
-    start = Start(IDENTITY, spec, time.at(time.count - 1), lambda *names: generator(0, *names))
+    start = Start(IDENTITY, spec, time.seconds_at(time.count - 1), lambda *names: generator(0, *names))
     there = tuple(entry.model_copy(update={"enter": None, "leave": None}) for entry in clips)
-    moved = mover(there, start.playing(line, field)).at([time.at(i) for i in around])
+    moved = mover(there, start.playing(line, field)).at([time.seconds_at(i) for i in around])
     return [step for step in moved.steps if step is not None]
 
 

@@ -107,7 +107,7 @@ class DatasetPart(Sendable):
         """The shots, but for those that show the same models as another."""
         if self.plan.recipe.scene.is_moved_each_frame:
             return self.rows
-        return (next(index.of(subject)) for index in self.indices for subject, shots in index.counts.items() if shots)
+        return (next(index.rows_of(subject)) for index in self.indices for subject, shots in index.counts.items() if shots)
 
     @cached_property
     def indices(self) -> tuple[Index, ...]:

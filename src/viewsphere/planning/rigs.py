@@ -87,10 +87,10 @@ def _check_sweep(recipe: Recipe, name: str, entry: SensorEntry) -> None:
         raise RecipeError(
             f"rig.sensors.{name}.lidar.sweep: expected time beside it, as all moves meanwhile; found none: set time"
         )
-    if recipe.time.count > 1 and sweep > recipe.time.at(1) * (1 + 1e-9):
+    if recipe.time.count > 1 and sweep > recipe.time.seconds_at(1) * (1 + 1e-9):
+        most = recipe.time.seconds_at(1)
         raise RecipeError(
-            f"rig.sensors.{name}.lidar.sweep: expected at most the {recipe.time.at(1):g} seconds between two instants; found "
-            f"{sweep:g}"
+            f"rig.sensors.{name}.lidar.sweep: expected at most the {most:g} seconds between two instants; found {sweep:g}"
         )
 
 

@@ -30,7 +30,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Metres, Natural, Number
 from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.quantity import quantity
-from viewsphere.model.validation_errors import at, nearest, shown
+from viewsphere.model.validation_errors import error_at, nearest, shown
 from viewsphere.recipe.seed_names import seed_name
 from viewsphere.recipe.values import OrShort
 
@@ -201,7 +201,7 @@ class _Reader(NamedTuple):
         kind = raw.kind
         values: list[Any] = []
         for i, value in enumerate(getattr(raw, kind)):
-            with at(kind, i):
+            with error_at(kind, i):
                 values.append(self.read(value))
         if kind != "choice":
             _check_ends(kind, values[0], values[1])
@@ -212,7 +212,7 @@ class _Reader(NamedTuple):
         for name, value in raw:
             if value is None and name in ("min", "max"):
                 continue
-            with at("normal", name):
+            with error_at("normal", name):
                 values[name] = self._deviation(value) if name == "deviation" else self.read(value)
         order = [values[name] for name in ("min", "mean", "max") if name in values]
         if not all(_ordered(a, b) for a, b in pairwise(order)):
@@ -230,7 +230,7 @@ class _Reader(NamedTuple):
             return _DEVIATION.validate_python(value)
         parts: list[Any] = []
         for i, part in enumerate(cast(list[Any], value)):
-            with at(i):
+            with error_at(i):
                 parts.append(_DEVIATION.validate_python(part))
         return tuple(parts)
 

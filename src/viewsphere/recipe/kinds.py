@@ -11,7 +11,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from viewsphere import plugins
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.validation_errors import at, one_of, shown
+from viewsphere.model.validation_errors import error_at, one_of, shown
 from viewsphere.plugins.spec import Spec
 
 
@@ -50,7 +50,7 @@ class ByKind:
         fields = cast(Mapping[Any, Any], value)
         kind, known = fields.get("kind", self.default), self._names()
         if kind not in known:
-            with at("kind"):
+            with error_at("kind"):
                 raise ValueError(one_of(kind, known))
         return self._class(kind).model_validate(fields, context=info.context)
 

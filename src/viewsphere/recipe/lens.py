@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, SerializeAsAny, ValidationError, WithJsonS
 
 from viewsphere import plugins
 from viewsphere.geometry.lenses import LensParameters
-from viewsphere.model.validation_errors import at, explained, one_of
+from viewsphere.model.validation_errors import error_at, explained, one_of
 from viewsphere.plugins.lens import LensSpec
 
 
@@ -21,7 +21,7 @@ def _read(value: Any) -> Any:
     name = entry["model"]
     if name not in plugins.names("lenses") or plugins.load(LensSpec, name).is_scan:
         pictures = [other for other, spec in plugins.loadable(LensSpec).items() if not spec.is_scan]
-        with at("model"):
+        with error_at("model"):
             raise ValueError(one_of(name, pictures))
     parameters = plugins.load(LensSpec, name).parameters
     try:

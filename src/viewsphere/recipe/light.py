@@ -17,8 +17,7 @@ from viewsphere.model.scene import (
     Sky,
     Sun,
 )
-from viewsphere.model.validation_errors import at as standing_at
-from viewsphere.model.validation_errors import nearest, one_of, shown
+from viewsphere.model.validation_errors import error_at, nearest, one_of, shown
 from viewsphere.recipe.draws import Drawn
 from viewsphere.recipe.entries import entry_of
 from viewsphere.recipe.values import OrShort, shape_of, switch
@@ -141,7 +140,7 @@ def _sky(value: Any) -> Any:
     if isinstance(value, Mapping):
         for name in cast(Mapping[Any, Any], value):
             if nearest(name, SKIES) and name not in SKIES:
-                with standing_at(str(name)):
+                with error_at(str(name)):
                     raise ValueError(one_of(name, SKIES))
     elif not isinstance(value, Frozen):
         raise ValueError(f"expected daylight, night, the path of an EXR or HDR file, or a mapping; found {shown(value)}")

@@ -37,7 +37,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.lidar import LIDAR
 from viewsphere.model.notebook import Shown
 from viewsphere.model.numbers import Count, Natural, Number
-from viewsphere.model.validation_errors import Marks, at, report, shown
+from viewsphere.model.validation_errors import Marks, error_at, report, shown
 from viewsphere.recipe.formats import FormatEntry, FormatField
 from viewsphere.recipe.former_names import former_paths, is_former, renamed, with_present_names
 from viewsphere.recipe.models import ModelEntry
@@ -262,7 +262,7 @@ class Recipe(Shown, Frozen):
             return value
         merged: dict[str, SceneEntry] = {}
         for name, change in value.items():
-            with at(name):
+            with error_at(name):
                 if not timed:
                     change.check_still()
                 merged[name] = varied(scene, change.over_time() if timed else change)

@@ -24,7 +24,7 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Number, Positive
 from viewsphere.model.scene import WEATHER
-from viewsphere.model.validation_errors import at, shown, told_of
+from viewsphere.model.validation_errors import error_at, shown, told_of
 from viewsphere.recipe.blend import BlendField, VariantEntry
 from viewsphere.recipe.draws import Drawn, alternatives, is_random
 from viewsphere.recipe.finish import (
@@ -254,7 +254,7 @@ class SceneEntry(Frozen):
         if len(backgrounds) > 1 and any(entry.draw != "per_frame" for entry in backgrounds):
             raise ValueError("expected no draw inside of a choice of backgrounds, which is made per_frame; found one")
         if any(entry.transparent for entry in backgrounds) and "poisson" in alternatives(self.smoother.kind):
-            with at("smoother", "kind"):
+            with error_at("smoother", "kind"):
                 raise ValueError(
                     "expected none, box or gaussian beside background: transparent; found poisson, which takes the border's "
                     "colours from a background: choose another, or give a background"
@@ -269,12 +269,12 @@ class SceneEntry(Frozen):
         for name in OF_FILE:
             given = getattr(self, name)
             if given != type(self).model_fields[name].default and (name, given) != ("ground", "off"):
-                with at(name):
+                with error_at(name):
                     raise ValueError(f"expected no {name} beside blend, whose file has its own; found one: leave it out")
         for i, lamp in enumerate(self.lights):
             if spec_of(lamp).is_sky:
                 kind = cast(Any, lamp).kind
-                with at("lights", i):
+                with error_at("lights", i):
                     raise ValueError(f"expected a lamp beside blend, whose file has its own sky; found {kind}: leave it out")
 
     @property

@@ -37,6 +37,6 @@ class TimeEntry(Frozen):
         """Number of instants; the first is at 0 s."""
         return self.frames or max(1, round((self.seconds or 0.0) * self.fps))
 
-    def at(self, instant: int) -> float:
+    def seconds_at(self, instant: int) -> float:
         """Seconds of an instant."""
         return instant / self.fps

@@ -37,7 +37,7 @@ class FrameRange(Frozen):
             raise ValueError(f"expected first up to last; found {self.first} and {self.last}")
         return self
 
-    def of(self, first: int, last: int) -> tuple[int, ...]:
+    def frames_within(self, first: int, last: int) -> tuple[int, ...]:
         """The frames of this range in a file whose first and last frame are `first` and `last`."""
         begin, end = first if self.first is None else self.first, last if self.last is None else self.last
         return tuple(range(begin, end + 1, self.step))
@@ -76,4 +76,4 @@ def chosen_frames(frames: Frames, first: int, last: int) -> tuple[int, ...]:
     """The chosen frames of a file whose first and last frame are `first` and `last`; empty for a range beyond the file."""
     if isinstance(frames, tuple):
         return frames
-    return (FrameRange() if frames == "all" else frames).of(first, last)
+    return (FrameRange() if frames == "all" else frames).frames_within(first, last)

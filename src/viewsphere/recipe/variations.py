@@ -16,7 +16,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
-from viewsphere.model.validation_errors import at
+from viewsphere.model.validation_errors import error_at
 from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.scene import SceneEntry
 
@@ -31,7 +31,7 @@ Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_
 
 def _of_light_alone(entry: SceneEntry) -> SceneEntry:
     for name in entry.model_fields_set.difference(CONDITIONS):
-        with at(name):
+        with error_at(name):
             raise ValueError(
                 f"expected {', '.join(CONDITIONS[:-1])} or {CONDITIONS[-1]}, on which no label depends; found {name}: set it "
                 "in scene, for all variations alike"
@@ -92,7 +92,7 @@ def _read(value: Any, handler: ValidatorFunctionWrapHandler) -> Variations:
         value = dict(cast(Mapping[str, Any], value))
         paired = value.pop(PAIRED)
         if not isinstance(paired, bool):
-            with at(PAIRED):
+            with error_at(PAIRED):
                 raise ValueError(f"expected true or false, as no variation can have this name; found {paired!r:.40}")
     made = Variations(handler(value))
     made.paired = paired
@@ -115,10 +115,10 @@ def check_alike(scenes: dict[str, SceneEntry]) -> None:
     for name in others:
         one, other = scenes[first], scenes[name]
         if _is_transparent(one) != _is_transparent(other):
-            with at(name, "background"):
+            with error_at(name, "background"):
                 raise ValueError(f"expected a transparent background in all variations or in none; {first} differs from {name}")
         if "auto" in alternatives(one.ground) and one.automatic_ground != other.automatic_ground:
-            with at(name, "background"):
+            with error_at(name, "background"):
                 raise ValueError(
                     f"expected a background under which ground: auto is {one.automatic_ground}, as under {first}; found one "
                     f"under which it is {other.automatic_ground}: set scene.ground"

@@ -16,7 +16,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Number, Positive
 from viewsphere.model.omit_none import OmitNone
-from viewsphere.model.validation_errors import at
+from viewsphere.model.validation_errors import error_at
 from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.recipe.aim import (
     AZIMUTH,
@@ -129,7 +129,7 @@ class Spread(Frozen):
 def _check_width(width: Spread, field: str, instead: str) -> None:
     """Raise ValueError for metres added to a distance that is not given in metres."""
     if width.distance:
-        with at(field, "distance"):
+        with error_at(field, "distance"):
             raise ValueError(
                 f"expected 0 beside distance: {{fill: ...}}, which is no length; found {width.distance:g}: use {instead}"
             )

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Portion
-from viewsphere.model.validation_errors import at, nearest
+from viewsphere.model.validation_errors import error_at, nearest
 from viewsphere.model.weather import Fog, Lamps, Light, Rain, Snow, Wet
 from viewsphere.recipe.draws import Drawn, span
 from viewsphere.recipe.entries import entry_of
@@ -91,7 +91,7 @@ def check_weather(rain: object, snow: object) -> None:
     if isinstance(rain, RainEntry) and isinstance(snow, SnowEntry):
         least = {"rain": span(rain.rate)[0], "snow": span(snow.rate)[0]}
         if all(least[name] >= HEAVY[name] for name in HEAVY):
-            with at("snow"):
+            with error_at("snow"):
                 raise ValueError(
                     f"expected less than {HEAVY['snow']:g} mm/h beside heavy rain (from {HEAVY['rain']:g}); found "
                     f"{least['snow']:g}: sleet has little of one of them"

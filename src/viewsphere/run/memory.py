@@ -158,7 +158,7 @@ class RenderUnits:
 
     def in_order(self) -> Iterator[Row]:
         """Yield all units, subject by subject."""
-        return chain.from_iterable(map(self._index.of, self.plan.taken))
+        return chain.from_iterable(map(self._index.rows_of, self.plan.taken))
 
     def shuffled(self, epoch: int) -> Iterator[Row]:
         """Yield all units in an order that the recipe's seed and the epoch draw."""
@@ -172,6 +172,6 @@ class RenderUnits:
             return
         first, end = unit.first, unit.first + unit.count
         while first < end:
-            row = self.plan.rows.at(first)
+            row = self.plan.rows.row_at(first)
             yield row
             first = row.first + row.count

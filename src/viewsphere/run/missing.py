@@ -68,7 +68,7 @@ class Missing:
 
     def jobs(self, line: str) -> Iterator[Job]:
         """The shots of a model that are to be rendered."""
-        rows = chain.from_iterable(index.of(line) for index in self.portion.indices)
+        rows = chain.from_iterable(index.rows_of(line) for index in self.portion.indices)
         return (Job(row.key, line, row) for row in self._lacking(rows))
 
     def rows(self) -> Iterator[Row]:

@@ -115,7 +115,7 @@ class Index(Sequence[Row]):
         """Number of all samples."""
         return sum(self._samples_in(number, 0, len(block.subjects)) for number, block in enumerate(self.blocks))
 
-    def of(self, subject: str) -> Iterator[Row]:
+    def rows_of(self, subject: str) -> Iterator[Row]:
         """The rows of a subject, in order."""
         for number, place in self._places.get(subject, ()):
             yield from (self._row(number, place, chunk) for chunk in self._own(number, place))
@@ -155,7 +155,7 @@ class Index(Sequence[Row]):
         """The subjects, each once, in order."""
         return tuple(self._places)
 
-    def at(self, sample: int) -> Row:
+    def row_at(self, sample: int) -> Row:
         """The row that holds a sample; raises IndexError for one that none holds."""
         if not self.first <= sample < self._samples[-1]:
             raise IndexError(f"expected a sample of {self.first}..{self._samples[-1] - 1}, got {sample}")
@@ -166,9 +166,9 @@ class Index(Sequence[Row]):
 
     def find(self, key: str) -> Row | None:
         """The row of this key, None if there is none."""
-        return next(self.found((key,)), None)
+        return next(self.rows_with_keys((key,)), None)
 
-    def found(self, keys: Iterable[str]) -> Iterator[Row]:
+    def rows_with_keys(self, keys: Iterable[str]) -> Iterator[Row]:
         """The rows of these keys, but for those that it does not have."""
         return (self._row(*spot) for _, spot in self._spots(keys))
 

@@ -49,7 +49,7 @@ def rows_of(plan: PlanRecord, frame: int) -> Iterator[Row]:
     yield plan.row_at(frame)
     for index, _ in plan.supplements:
         if index.first <= frame < index.first + index.samples:
-            yield index.at(frame)
+            yield index.row_at(frame)
 
 
 class Recomputed:
@@ -134,7 +134,7 @@ class Recomputed:
         if _names_files({name: value for name, value in recipe.items() if name != "models"}):
             return True
         index = self._record.indices[number]
-        rows = (next(index.of(subject)) for subject, _ in zip(index.counts, range(MOST_SUBJECTS), strict=False))
+        rows = (next(index.rows_of(subject)) for subject, _ in zip(index.counts, range(MOST_SUBJECTS), strict=False))
         shots = (store.labelled(row.key) for row in rows if store.has_shot(row.key))
         sources = {thing.model.source for shot in shots if shot for thing in shot.things}
         return not all(prefix_of(source) or split_source(Path(source))[0].exists() for source in sources)

@@ -14,7 +14,7 @@ from viewsphere.composing.motion import Move, Origin, Pose, Start
 from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_about, quaternion_product, slerp
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Number
-from viewsphere.model.validation_errors import at, shown
+from viewsphere.model.validation_errors import error_at, shown
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
 
@@ -63,7 +63,7 @@ class Options(Frozen):
     def _check(self) -> Options:
         for i, (a, b) in enumerate(pairwise(self.keys), 1):
             if b.time <= a.time:
-                with at("keys", i, "time"):
+                with error_at("keys", i, "time"):
                     raise ValueError(f"expected a time after {a.time:g}, the key's before; found {shown(b.time)}")
         return self
 

@@ -32,7 +32,7 @@ def moves(options: Options, start: Start) -> Move:
     way = noise(start.rng("noise"), 6, options.highest_hz)
 
     def moved(time: float, pose: Pose) -> Pose:
-        shares = way.at(time)
+        shares = way.values_at(time)
         return pose.turned(rotation_about(turns * shares[3:])).moved(sides * shares[:3])
 
     return moved

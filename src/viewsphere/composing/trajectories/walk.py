@@ -86,7 +86,7 @@ class Stretch:
     heading: float
     rate: float
 
-    def at(self, seconds: float, speed: float) -> tuple[float, float, float]:
+    def offset_at(self, seconds: float, speed: float) -> tuple[float, float, float]:
         """Place and heading at a time: on a line, or on an arc of radius speed / rate."""
         passed = seconds - self.begin
         heading = self.heading + self.rate * passed
@@ -129,9 +129,8 @@ class Walk:
         """Places on the floor and directions (T, 3) from the start on, turn after turn."""
         stretches = tuple(self._stretches())
         begins = np.array([stretch.begin for stretch in stretches])
-        found = [
-            stretches[max(int(np.searchsorted(begins, t, side="right")) - 1, 0)].at(t, self.entry.speed) for t in times.tolist()
-        ]
+        places = np.maximum(np.searchsorted(begins, times, side="right") - 1, 0)
+        found = [stretches[i].offset_at(t, self.entry.speed) for i, t in zip(places.tolist(), times.tolist(), strict=True)]
         places = np.array([(x, y, 0.0) for x, y, _ in found])
         return places, np.array([(-math.sin(h), math.cos(h), 0.0) for *_, h in found])
 
@@ -143,7 +142,7 @@ class Walk:
         for turn in entry.turns:
             rate = math.copysign(math.radians(entry.turn_rate), turn.degrees)
             for begin, faster in ((turn.at, rate), (turn.at + abs(turn.degrees) / entry.turn_rate, 0.0)):
-                now = Stretch(begin, *now.at(begin, entry.speed), faster)
+                now = Stretch(begin, *now.offset_at(begin, entry.speed), faster)
                 yield now
 
     def _bob(self, walked: Float) -> tuple[Float, Float]:

@@ -99,7 +99,7 @@ class Poses(Sequence[Viewpoint]):
         """Return whether random poses are the same for all subjects."""
         return getattr(self.viewpoints, "shared", False)
 
-    def of(self, subject: str) -> Poses:
+    def for_subject(self, subject: str) -> Poses:
         """The poses that a subject is taken from: random ones are drawn for each, unless they are shared."""
         return self if self.are_shared else self.drawn_for(subject)
 

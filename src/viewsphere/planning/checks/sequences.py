@@ -56,7 +56,7 @@ def _check_trajectory(planned: Plan, subject: str, cast: Sequence[ModelSpec], la
         return np.array(UNKNOWN)
 
     world = World(time.fps, UNKNOWN, center, partial(generator, planned.recipe.seed, "rig", *names), lanes)
-    planned.pose_list.base.trajectory.poses(np.array([0.0, time.at(time.count - 1)]), world)
+    planned.pose_list.base.trajectory.poses(np.array([0.0, time.seconds_at(time.count - 1)]), world)
 
 
 def _check_thing(planned: Plan, wanted: int | str, cast: Sequence[ModelSpec]) -> None:

@@ -86,7 +86,7 @@ def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[
         target = context.composition.center(things, box_of)
     for run in context.schedule(spec).runs:
         at = _target(context, things[0], run, target, box_of)
-        yield Standing(_at(context, things, run), at, context.pose_list.of(subject), range(run.first, run.stop))
+        yield Standing(_at(context, things, run), at, context.pose_list.for_subject(subject), range(run.first, run.stop))
 
 
 def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
@@ -108,7 +108,7 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
     scene = _scene(context, subject, context.pose_list.name(poses[0]), run).model_copy(
         update=_floor(context, spec, things, box_of)
     )
-    own = context.pose_list.of(subject)
+    own = context.pose_list.for_subject(subject)
     views = (
         (i, context.view(own, pose), split(context, subject, pose))
         for i, pose in enumerate(poses, first // len(context.rig.sensors))
@@ -121,7 +121,7 @@ def _seen_from(context: SamplingContext, subject: str, poses: Sequence[int]) -> 
     """Azimuth and elevation of the camera of a shot's only pose; None where shots have several."""
     if not context.recipe.scene.is_moved_each_frame or isinstance(context.pose_list, TimedPoses):
         return None
-    view = context.viewpoint(subject, context.view(context.pose_list.of(subject), poses[0]), None)
+    view = context.viewpoint(subject, context.view(context.pose_list.for_subject(subject), poses[0]), None)
     return view.azimuth_deg, view.elevation_deg
 
 

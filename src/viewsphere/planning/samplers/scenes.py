@@ -92,7 +92,7 @@ def standing(context: SamplingContext, subject: str, box_of: BoxOf) -> Iterator[
     """The models of a scene; nothing where the place they stand in is drawn for each frame."""
     if not context.recipe.scene.is_moved_each_frame and not is_slow(scenes_entry(context.recipe).layout):
         things = scene_things(context, subject, None, box_of)
-        views, poses = context.pose_list.of(subject), tuple(numbers(_poses(context, subject)))
+        views, poses = context.pose_list.for_subject(subject), tuple(numbers(_poses(context, subject)))
         yield Standing(things, center_of_all(things, box_of), views, poses)
 
 
@@ -104,7 +104,7 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
     if context.composition is not None:
         things = context.composition.things(subject, things, pose, box_of, redraw=context.redraw)
     things += scene_distractors(context, subject, pose, box_of) + scene_around(context, subject, pose, box_of)
-    views = context.pose_list.of(subject)
+    views = context.pose_list.for_subject(subject)
     instants = [
         context.instant(subject, context.view(views, pose), middle, middle, split(context, subject, pose), i)
         for i, pose in enumerate(poses, first // len(context.rig.sensors))

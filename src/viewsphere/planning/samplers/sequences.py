@@ -161,11 +161,11 @@ def _instant(context: SamplingContext, own: SequenceState, subject: str, pose: i
     i = pose % time.count
     if own.rig is None:
         view, at = context.sequences_of(subject)[pose], own.focus_at(i, context.recipe.viewpoints.target == "follow", box_of)
-        return context.instant(subject, view, at, at, part, i).model_copy(update={"seconds": time.at(i)})
+        return context.instant(subject, view, at, at, part, i).model_copy(update={"seconds": time.seconds_at(i)})
     finish, now = context.finish(subject, pose), own.rig[i]
     if not context.recipe.camera.of_viewpoints:
         now = replace(now, intrinsics=context.drawn_lens(subject, pose))
-    return instant_of(now, i, time.at(i), pose, context.recipe.viewpoints.bins, split=part, finish=finish)
+    return instant_of(now, i, time.seconds_at(i), pose, context.recipe.viewpoints.bins, split=part, finish=finish)
 
 
 def _needed(context: SamplingContext, taken: Set[int]) -> set[int]:

@@ -45,7 +45,7 @@ class Composer:
         if not self.portion.number or self.portion.plan.draws == 1:
             return None
         parts = (index for number in range(self.portion.number) for index in self.portion.record.indices_of(number))
-        shots = (self.boxes.store.shot(other.key) for index in parts for other in index.of(row.subject))
+        shots = (self.boxes.store.shot(other.key) for index in parts for other in index.rows_of(row.subject))
         return next((shot.redraw for shot in shots if shot), None)
 
     def scenery(self, shot: Shot) -> str:

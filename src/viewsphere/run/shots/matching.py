@@ -99,7 +99,7 @@ def _exported(root: str, key: str, frame: int | None) -> Mesh:
     info = Store(located(root)).model_info(key)
     if info is None:
         raise StoreError(f"{root}: expected a finished model {key}, found none")
-    shown = info.at(frame)
+    shown = info.at_frame(frame)
     return read_exported(located(root) / shown.glb, shown.parts, shown.node)
 
 

@@ -178,7 +178,7 @@ class Models:
         if bool(held) != bool(wanted):
             raise _changed(self.store, spec)
         for frame in wanted.keys() & held.keys() if wanted else (None,):
-            info, step = known.at(frame), None if frame is None else wanted[frame]
+            info, step = known.at_frame(frame), None if frame is None else wanted[frame]
             if info.digest != mesh_digest(self.stages.model(spec, step)):
                 raise _changed(self.store, spec)
             now: dict[str, object] = {

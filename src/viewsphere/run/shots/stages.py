@@ -60,7 +60,7 @@ class StoredBoxes:
                 raise ModelError(f"model {spec.key}: expected a finished model in {self.store.root}, found none: render again")
             self._known[spec.key] = info
         try:
-            return self._known[spec.key].at(step and step.frame).box3d_object
+            return self._known[spec.key].at_frame(step and step.frame).box3d_object
         except ValueError as error:
             raise ModelError(f"{self.store.root}: {error}: render again") from None
 

@@ -120,7 +120,7 @@ class Dataset(Shown, Sequence[Sample]):
     def rows(self) -> tuple[Row, ...]:
         """The rows of all finished shots, chosen or not, in frame order; without those that add channels to others."""
         keys = tuple(self.store.finished())
-        found = chain.from_iterable(index.found(keys) for index in self.plan.indices)
+        found = chain.from_iterable(index.rows_with_keys(keys) for index in self.plan.indices)
         return tuple(sorted(found, key=lambda row: row.first))
 
     @cached_property
@@ -336,7 +336,7 @@ class Dataset(Shown, Sequence[Sample]):
         info = self._info(key)
         if info is None:
             raise ValueError(f"no model {key}")
-        return info.at(frame)
+        return info.at_frame(frame)
 
     def _sample(self, records: _Records, place: int) -> Sample:
         record = records.records[place]
@@ -375,7 +375,7 @@ class Dataset(Shown, Sequence[Sample]):
         number = record["index"]
         for index, added in self.plan.supplements:
             if index.first <= number < index.first + index.samples:
-                key = index.at(number).key
+                key = index.row_at(number).key
                 if self.store.has_shot(key):
                     kinds = self.kinds[index.part]
                     files |= {name: self.store.channel_file(key, name, number, kinds) for name in added}

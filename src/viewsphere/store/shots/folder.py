@@ -145,7 +145,7 @@ class Store:
                 yield pulse
             except Exception as error:
                 if shard[1] > 1:
-                    self._note_failure(note, pulse.told(str(error) or type(error).__name__))
+                    self._note_failure(note, pulse.note(str(error) or type(error).__name__))
                 raise
 
     def _note_failure(self, note: Path, text: str) -> None:

@@ -98,7 +98,7 @@ class HeartbeatWriter:
         self._thread = Thread(target=self._beats, name="heartbeat", daemon=True)
 
     def __enter__(self) -> HeartbeatWriter:
-        self._write(self.told())
+        self._write(self.note())
         self._thread.start()
         return self
 
@@ -111,7 +111,7 @@ class HeartbeatWriter:
         if phase != self.now.phase:
             self.now, self._phase_begun = replace(self.now, phase=phase), time.monotonic()
 
-    def told(self, error: str = "") -> str:
+    def note(self, error: str = "") -> str:
         """Return the current report: the run's progress, or the reason for its end."""
         beat = time.time()
         begun = beat - (time.monotonic() - self._phase_begun)
@@ -122,4 +122,4 @@ class HeartbeatWriter:
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})  # are the main thread's
         while not self._ended.wait(BEAT_S):
             with suppress(OSError, StoreError):  # a full disk ends the run elsewhere, if it has to
-                self._write(self.told())
+                self._write(self.note())

@@ -121,7 +121,7 @@ class ModelInfo:
         """The name of the GLB's node for the time step; None for the whole GLB."""
         return None if self.step is None else PurePosixPath(self.obj).stem
 
-    def at(self, frame: int | None) -> ModelInfo:
+    def at_frame(self, frame: int | None) -> ModelInfo:
         """Return the metadata at a time step, by the frame of the model's file (None: at rest); raises ValueError for another
         frame.
         """
@@ -367,7 +367,7 @@ class PlanRecord:
 
     def row_at(self, sample: int) -> Row:
         """The row that holds a sample; raises IndexError for a sample beyond all rows."""
-        return self.indices[self.part_of(sample)].at(sample)
+        return self.indices[self.part_of(sample)].row_at(sample)
 
     @cached_property
     def _firsts(self) -> list[int]:

@@ -85,7 +85,7 @@ class TakenMap:
         points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
         self.taken[low[0] : high[0], low[1] : high[1]] |= _are_near(points, corners, far)
 
-    def at(self, middles: Float) -> NDArray[np.bool_]:
+    def are_taken(self, middles: Float) -> NDArray[np.bool_]:
         """True for middles (N, 2) of things that surely are too near to another."""
         cells = np.floor((middles + self.reach) / self.cell)
         is_beyond = ((cells < 0) | (cells >= len(self.taken))).any(axis=1)

@@ -51,7 +51,7 @@ class Others:
         if not fitting:
             return np.arange(len(spots))
         cos, sin = np.cos(turns), np.sin(turns)
-        return np.flatnonzero(~fitting[-1].at(spots + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)))
+        return np.flatnonzero(~fitting[-1].are_taken(spots + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)))
 
 
 def free_spot(rng: np.random.Generator, room: Room, box: Float, others: Others, cover: Cover) -> Matrix4 | None:

@@ -27,7 +27,7 @@ def shaken(poses: Sequence[RigPose], shake: Shake, times: Float, world: World) -
 def _shaken(poses: Sequence[RigPose], shake: Shake, times: Float, world: World) -> Iterator[RigPose]:
     hand = noise(world.rng("shake"), 6, shake.hertz)
     for pose, seconds in zip(poses, times.tolist(), strict=True):
-        off = hand.at(seconds)
+        off = hand.values_at(seconds)
         by = rigid(rotation_about(math.radians(shake.degrees) * off[:3]), shake.mm / 1000 * off[3:])
         yield RigPose(np.round(compose(pose.world_from_rig, by), DIGITS) + 0.0, pose.focus, pose.intrinsics)
 

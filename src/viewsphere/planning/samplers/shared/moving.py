@@ -25,7 +25,7 @@ class Moving:
         """Return whether the thing stands at one place all the time, and shows no time step."""
         return not self._goes and not self._plays and self._first_step is None
 
-    def at(self, instant: int) -> Motion:
+    def motion_at(self, instant: int) -> Motion:
         """The motion of what stays as the thing is at an instant."""
         return Motion(poses=(self._pose(instant),), steps=(self._step(instant),))
 
@@ -60,10 +60,10 @@ class Moving:
         return next(filter(None, map(self._shown, range(self.time.count))), None) if self.plays_file else None
 
     def _pose(self, instant: int) -> Matrix4 | None:
-        return self.mover.state(self.time.at(instant))[0]
+        return self.mover.state(self.time.seconds_at(instant))[0]
 
     def _shown(self, instant: int) -> TimeStep | None:
-        return self.mover.state(self.time.at(instant))[1]
+        return self.mover.state(self.time.seconds_at(instant))[1]
 
     def _step(self, instant: int) -> TimeStep | None:
         """Return the time step that the thing shows.

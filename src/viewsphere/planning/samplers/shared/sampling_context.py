@@ -178,7 +178,7 @@ class SamplingContext(Sendable):
 
     def sequences_of(self, subject: str) -> SequencePoses:
         """The poses of a subject's sequences."""
-        views = self.pose_list.of(subject)
+        views = self.pose_list.for_subject(subject)
         assert isinstance(views, SequencePoses)
         return views.drawn_for(*redraw_names(self.redraw)) if self.redraw else views
 

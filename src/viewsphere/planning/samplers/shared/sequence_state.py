@@ -60,7 +60,7 @@ def _with(thing: Thing, motion: Motion | None) -> Thing:
 
 def _at(thing: Thing, moving: Moving | None, instant: int) -> Thing:
     """The thing as it is at an instant: standing still there, or not there."""
-    return _with(thing, moving and moving.at(instant))
+    return _with(thing, moving and moving.motion_at(instant))
 
 
 def time_of(context: SamplingContext) -> TimeEntry:
@@ -173,7 +173,7 @@ def _moving(
     time, rng = time_of(context), partial(generator, context.recipe.seed, "motion", *names)
     place = context.position.get(thing.model.key)
     line = None if place is None else context.timelines[place]
-    start = Start(thing.world_from_object, thing.model, time.at(time.count - 1), rng, lanes, way=way)
+    start = Start(thing.world_from_object, thing.model, time.seconds_at(time.count - 1), rng, lanes, way=way)
     return Moving(mover(motions, start.playing(line, field)), time)
 
 
@@ -193,7 +193,7 @@ def _rig(
 ) -> tuple[RigPose, ...] | None:
     """Return the rig's poses at all instants, None where it stands still."""
     time, views = time_of(context), context.sequences_of(subject)
-    times = np.array([time.at(i) for i in range(time.count)])
+    times = np.array([time.seconds_at(i) for i in range(time.count)])
     names = (subject, context.pose_list.place(start), *redraw_names(context.redraw))
     world = World(
         time.fps,

@@ -11,8 +11,7 @@ from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Length, Natural
 from viewsphere.model.scene import AimedLight, Light, PlacedLight, Vector
-from viewsphere.model.validation_errors import at as standing_at
-from viewsphere.model.validation_errors import shown
+from viewsphere.model.validation_errors import error_at, shown
 from viewsphere.recipe.draws import Coordinate, Drawn, alternatives, is_random
 from viewsphere.recipe.entries import concrete, entry_of
 
@@ -54,7 +53,7 @@ class Aimed(entry_of(AimedLight), Placed):
         places = (_standing(self.at),) if self.at is not None else tuple(alternatives(self.position))
         for place in places:
             if any(_is_one_point(place, toward) for toward in alternatives(self.toward)):
-                with standing_at("position" if self.at is None else "at"):
+                with error_at("position" if self.at is None else "at"):
                     raise ValueError(f"the lamp is at the point it is aimed at, {shown(place)}: change this place or toward")
         return self
 
