@@ -90,7 +90,7 @@ def test_rays_that_do_not_begin_at_the_centre_are_refused(tmp_path):
     ).replace("import LensParameters", "import Rays, LensParameters")  # fmt: skip
     with (
         installed(tmp_path / "site", "lenses", "division", code),
-        pytest.raises(PluginError, match="expected rays that all begin at the camera's centre"),
+        pytest.raises(PluginError, match="its rays do not all begin at the camera's centre"),
     ):
         lens = lens_parameters("division", k=-0.1)
         Intrinsics(width=4, height=3, fx=4, fy=4, cx=2, cy=1.5, distortion=lens).lens.directions()

@@ -12,6 +12,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Distribution, OrDrawn, drawn
+from viewsphere.recipe.kinds import ByKind
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.scene import CameraEntry, SceneEntry
 from viewsphere.recipe.scenes import ScenesEntry
@@ -29,6 +30,9 @@ def parts(kind):
         return {Distribution}
     if isinstance(kind, type) and issubclass(kind, Frozen):
         return {kind}
+    if isinstance(kind, ByKind):
+        specs = (plugins.load(kind.spec, name) for name in plugins.names(kind.spec.KIND))
+        return {spec.options for spec in specs if spec.options.__module__.startswith(SHIPPED)}
     inner = (*typing.get_args(kind), *getattr(kind, "__metadata__", ()))
     return set().union(*(parts(part) for part in inner if part is not kind)) if inner else set()
 

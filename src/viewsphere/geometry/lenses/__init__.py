@@ -199,7 +199,9 @@ class Lens:
             xy[..., 0], xy[..., 1] = across, down[:, None]
             origins, rays = self.rays(xy)
             if origins.any():
-                raise PluginError(f"lens {self.name}: expected rays that all begin at the camera's centre; found others")
+                raise PluginError(
+                    f"lens {self.name}: its rays do not all begin at the camera's centre. Return `central(directions)`"
+                )
         if not self.has_unit_rays:
             rays[..., 2] = 1.0  # also where it has no ray
         return rays
