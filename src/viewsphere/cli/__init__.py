@@ -6,7 +6,6 @@ Worker processes import the main program again: so commands are imported only wh
 from __future__ import annotations
 
 import errno
-import gc
 import os
 import signal
 import sys
@@ -14,7 +13,7 @@ from io import TextIOWrapper
 from typing import NoReturn
 
 from viewsphere.errors import CheckFailedError, UserError, ViewsphereError
-from viewsphere.kernels.garbage import importing
+from viewsphere.kernels.garbage import importing, spare_imports
 
 ONE_BLAS_THREAD = ("OPENBLAS_NUM_THREADS", "1")
 """One thread for numpy's matrix library. Other threads spin while they wait, 50 ms of CPU for each core at each start, also of
@@ -26,7 +25,7 @@ def program() -> NoReturn:
     """Run the command line as the whole of a process, which ends at once."""
     from viewsphere.run.workers.exit_at_once import exit_at_once
 
-    gc.freeze()  # see `importing`
+    spare_imports()
     os.environ.setdefault(*ONE_BLAS_THREAD)
     try:
         main()

@@ -6,7 +6,6 @@ warm, hence our own (`workers/process.py`).
 
 from __future__ import annotations
 
-import gc
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from viewsphere.errors import UserError, ViewsphereError
-from viewsphere.kernels.garbage import importing
+from viewsphere.kernels.garbage import importing, spare_imports
 from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored
 from viewsphere.run.workers.process import OUT_OF_MEMORY, WorkerProcess, belong_to_parent, end_reason, interrupts_deferred
 
@@ -180,7 +179,7 @@ class _Worker(WorkerProcess):
 def _serve(pipe: Connection, root: Path, portion: DatasetPart) -> None:
     """A worker's life: take a job, tell of each of its frames by their number so far, answer, until the other side is gone."""
     belong_to_parent()
-    gc.freeze()  # see `importing`
+    spare_imports()
     with importing():
         from viewsphere.run.shots.tasks import Worker
         from viewsphere.run.workers.allocator import keep_freed_memory
