@@ -58,21 +58,42 @@ def csv_boxes(install: Callable[[str, str, str], Path]) -> None:
     install("formats", "csv_boxes", EXAMPLES["One row an object"])
 
 
+def _forget_labels() -> None:
+    for table in vars(labels).values():
+        if hasattr(table, "cache_clear"):
+            table.cache_clear()
+
+
 @pytest.fixture
 def labelled(install: Callable[[str, str, str], Path]) -> Iterator[Callable[[str, str], None]]:
-    """Installs a label; what is kept of the table of labels is forgotten before and after."""
-    tables = [table for table in vars(labels).values() if hasattr(table, "cache_clear")]
-
-    def forget() -> None:
-        for table in tables:
-            table.cache_clear()
+    """Installs a label; the tables of labels are made again before and after."""
 
     def add(name: str, code: str) -> None:
         install("labels", name, code)
-        forget()
+        _forget_labels()
 
     yield add
-    forget()
+    _forget_labels()
+
+
+@pytest.fixture
+def shipped(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[[str, str], None]]:
+    """Puts a module of labels beside those of viewsphere; the tables of labels are made again before and after."""
+    folder, added = tmp_path / "shipped", list[str]()
+    folder.mkdir()
+    monkeypatch.setattr(labels, "__path__", [*labels.__path__, str(folder)])
+
+    def add(name: str, code: str) -> None:
+        (folder / f"{name}.py").write_text(code)
+        added.append(name)
+        _forget_labels()
+
+    yield add
+    monkeypatch.undo()
+    for name in added:
+        sys.modules.pop(f"viewsphere.labels.{name}", None)
+        vars(labels).pop(name, None)
+    _forget_labels()
 
 
 HIDDEN = EXAMPLES["hidden_next and hidden_previous"]
@@ -119,8 +140,9 @@ LABEL = ObjectLabel.from_placement(of, name="aspect", meaning="how tall", fields
 """
 
 
-def test_a_label_of_objects_is_one_file(labelled, tmp_path):
-    labelled("aspect", ASPECT)
+@pytest.mark.parametrize("way", ["labelled", "shipped"])
+def test_a_label_of_objects_is_one_file(way, request, tmp_path):
+    request.getfixturevalue(way)("aspect", ASPECT)
     generate(small_recipe(formats=[]), tmp_path / "out")
     sample = next(iter(render(small_recipe())))
     kept = Dataset(tmp_path / "out")[0]
@@ -220,21 +242,11 @@ def test_several_labels_are_one_file_with_an_entry_point_each(labelled, tmp_path
     _has_edges(tmp_path / "out")
 
 
-def test_several_labels_are_one_file_in_the_package_and_are_listed_without_import(monkeypatch, tmp_path):
-    (tmp_path / "shipped").mkdir()
-    (tmp_path / "shipped" / "edges.py").write_text(EDGES)
-    tables = [table for table in vars(labels).values() if hasattr(table, "cache_clear")]
-    with monkeypatch.context() as patch:
-        patch.setattr(labels, "__path__", [*labels.__path__, str(tmp_path / "shipped")])
-        for table in tables:
-            table.cache_clear()
-        assert set(TWINS.split()) < set(plugins.names("labels")) and "edges" not in plugins.names("labels")
-        assert "viewsphere.labels.edges" not in sys.modules
-        assert plugins.module_file("labels", "edges_across") == tmp_path / "shipped" / "edges.py"
-        _has_edges(tmp_path / "out")
-        sys.modules.pop("viewsphere.labels.edges")
-    for table in tables:
-        table.cache_clear()
+def test_several_labels_are_one_file_of_the_package_and_are_listed_without_import(shipped, tmp_path):
+    shipped("edges", EDGES)
+    assert set(TWINS.split()) < set(plugins.names("labels")) and "edges" not in plugins.names("labels")
+    assert "viewsphere.labels.edges" not in sys.modules
+    _has_edges(tmp_path / "out")
 
 
 @pytest.mark.parametrize(
@@ -268,9 +280,8 @@ def test_labels_of_a_file_that_are_not_those_of_its_entry_points_are_refused(lab
         (EDGES.replace("LABELS = ", "NAME = 'edges'\nLABELS = EDGES = "), ""),
     ],
 )
-def test_names_of_shipped_labels_stand_in_the_text(monkeypatch, tmp_path, code, message):
-    (tmp_path / "edges.py").write_text(code)
-    monkeypatch.setattr(labels, "__path__", [*labels.__path__, str(tmp_path)])
+def test_names_of_shipped_labels_stand_in_the_text(shipped, code, message):
+    shipped("edges", code)
     if message:
         with pytest.raises(PluginError, match=message):
             plugins.names("labels")

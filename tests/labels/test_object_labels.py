@@ -15,7 +15,7 @@ from viewsphere.geometry.box import FACES, box_vertices, clip_to_image
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
-from viewsphere.labels import REGULAR, annotated, context_of, labels_of, object_labels
+from viewsphere.labels import annotated, context_of, labels_of, object_labels, regular
 from viewsphere.labels.shared.placement import view_of
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
@@ -316,7 +316,7 @@ def test_an_object_that_fills_the_whole_field_of_a_lens():
 
 def test_the_regular_labels_are_those_that_are_not_on_request():
     """Frames import these by name; a label that this list lacked would be missing in all data sets."""
-    assert {label.name for label in object_labels() if not label.on_request} == REGULAR
+    assert {label.name for label in object_labels() if not label.on_request} == regular()
     assert labels_of(("amodal",)) == tuple(label for label in object_labels() if not label.on_request or label.name == "amodal")
 
 
