@@ -45,7 +45,7 @@ def frame_report(dataset: Dataset, chosen: Chosen, positions: range, recomputed:
     proofs = _Proofs(dataset, chosen, recomputed or Recomputed(dataset))
     for position, index, read in _frames(dataset, positions):
         if isinstance(read, Sample):
-            for name, messages in proofs.findings(position, read):
+            for name, messages in proofs.of_frame(position, read):
                 proofs.count(name, index, messages)
         else:
             proofs.findings.append(Finding("files", index, read))
@@ -67,7 +67,7 @@ class _Proofs:
         names = (*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name)))
         self._checked: dict[str, dict[int, None]] = {name: {} for name in names}
 
-    def findings(self, position: int, sample: Sample) -> Iterator[tuple[str, list[str]]]:
+    def of_frame(self, position: int, sample: Sample) -> Iterator[tuple[str, list[str]]]:
         """Every proof of a frame, and its findings."""
         yield from _proofs(self._models, sample)
         yield "shot", _carried_out(partial(_as_shot, self._dataset, self._scenery, sample))
