@@ -117,8 +117,7 @@ def pick(piece: Primitive, vertices: NDArray[np.integer]) -> Primitive:
 def assemble(
     folder: ModelFolder, pieces: Sequence[Primitive], materials: Sequence[Material], facts: FileFacts
 ) -> tuple[Mesh, FileFacts]:
-    """Join pieces into one mesh, parts in order of first appearance, unused parts, materials and images left
-    out.
+    """Join pieces into one mesh, with its parts in order of first appearance and without unused materials and images.
 
     Triangles without area are dropped with a warning; a zero or NaN normal becomes the mean of its faces' normals, with a
     warning too. Raises ModelError for NaN and infinite coordinates, and when no triangle is left or there are too many.

@@ -340,40 +340,44 @@ def _write_video(source: Path, file: Path, draw: list[str], sequence: str | None
     say(f"wrote {file} ({many}, {made.seconds:g} s)")
 
 
+DataSetFolder = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", help="Folder of the data set, or a URL (s3://...).", show_default=False, callback=at),
+]
+RenderWorkers = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        help="Processes; default: one a core, none for short work. 0: this one. With --ray: most CPUs; default: all.",
+        show_default=False,
+    ),
+]
+ShardOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="K/N",
+        help="Render only the K-th of N fixed shares of the shots, K from 0: for job arrays.",
+        show_default=False,
+    ),
+]
+RayAddress = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Render on a Ray cluster: auto, HOST:PORT or ray://HOST:PORT.", show_default=False),
+]
+
+
 def render(
     recipe: Annotated[Path | None, typer.Argument(help="Recipe (YAML).", show_default=False)] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="Folder of the data set, or a URL (s3://...).", show_default=False, callback=at),
-    ] = None,
+    output: DataSetFolder = None,
     changes: Changes = None,
     format_: Formats = None,
     format_option: FormatOptions = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            help="Processes; default: one a core, none for short work. 0: this one. With --ray: most CPUs; default: all.",
-            show_default=False,
-        ),
-    ] = None,
+    workers: RenderWorkers = None,
     keep_going: Annotated[bool, typer.Option(help="Skip unusable models.")] = False,
     append: Annotated[bool, typer.Option("--append", help="Add models, poses and channels to a finished data set.")] = False,
     durability: Durability = None,
-    shard: Annotated[
-        str | None,
-        typer.Option(
-            metavar="K/N",
-            help="Render only the K-th of N fixed shares of the shots, K from 0: for job arrays.",
-            show_default=False,
-        ),
-    ] = None,
-    ray: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="Render on a Ray cluster: auto, HOST:PORT or ray://HOST:PORT.", show_default=False
-        ),
-    ] = None,
+    shard: ShardOption = None,
+    ray: RayAddress = None,
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:
@@ -387,7 +391,7 @@ def render(
         from viewsphere.run.shards import shard_named
         from viewsphere.store import Store
 
-        share = None if shard is None else shard_named(shard)
+        chosen_shard = None if shard is None else shard_named(shard)
         loaded = load_recipe(recipe, changes)
         asked = asked_formats(format_)
         planned = make_plan(loaded)
@@ -407,7 +411,7 @@ def render(
                 formats=formats,
                 keep_going=keep_going,
                 append=append,
-                shard=share,
+                shard=chosen_shard,
                 ray=ray,
                 listener=bar.show,
             )

@@ -97,10 +97,7 @@ def generate(
     planned = prepare(recipe)
     wanted = _asked(recipe, formats)
     store = Store(located(out))
-    if workers != 0 and not store.place.is_shared():
-        raise UserError(
-            f"{store.root}: expected workers 0, as other processes do not see this process's memory; found {workers or cores()}"
-        )
+    _check_reach(store, workers)
     portion = replace(to_append(planned, store) if append else to_render(planned, store), shard=own_shard).remembering(store)
     wanted += _others(wanted, store) if portion.number else ()
     check_formats(planned, wanted, portion.record.channels)
@@ -116,16 +113,30 @@ def generate(
             due = tuple(_due(wanted, portion, rendered > 0, store))
             notes += export(store.root, due, workers=0 if ray else cores() if workers is None else workers, listener=tell)
             store.forget_failures()
-            wanted = tuple({entry.name: entry for entry in (*wanted, *due)}.values()) if own_shard.is_all else due
+            wanted = _united(wanted, due) if own_shard.is_all else due
     summary = Summary(store.root, len(dataset), rendered, skipped, 0.0, (), notes)
     if left_over is not None and not left_over.complete:
-        warnings, notes = _warnings(planned, dataset), (*notes, _left_to_others(portion, left_over))
-        seconds = time.monotonic() - begun
-        return replace(summary, seconds=seconds, notes=notes, warnings=warnings, missing=left_over.missing)
-    notes += tuple(_remarks(portion, dataset, wanted, nothing_added=append and not rendered))
-    misses = materials_not_found(recipe, [s for s in planned.model_specs if s.key not in skipped], store)
-    warnings, seconds = _warnings(planned, dataset, misses), time.monotonic() - begun
-    return replace(summary, seconds=seconds, formats=tuple(options_of(wanted)), notes=notes, warnings=warnings)
+        notes += (_left_to_others(portion, left_over),)
+        summary = replace(summary, notes=notes, warnings=_warnings(planned, dataset), missing=left_over.missing)
+    else:
+        notes += tuple(_remarks(portion, dataset, wanted, nothing_added=append and not rendered))
+        misses = materials_not_found(recipe, [s for s in planned.model_specs if s.key not in skipped], store)
+        warnings = _warnings(planned, dataset, misses)
+        summary = replace(summary, formats=tuple(options_of(wanted)), notes=notes, warnings=warnings)
+    return replace(summary, seconds=time.monotonic() - begun)
+
+
+def _check_reach(store: Store, workers: int | None) -> None:
+    """Raise UserError for a store in this process's memory if several processes are to render."""
+    if workers != 0 and not store.place.is_shared():
+        raise UserError(
+            f"{store.root}: expected workers 0, as other processes do not see this process's memory; found {workers or cores()}"
+        )
+
+
+def _united(wanted: Iterable[FormatEntry], due: Iterable[FormatEntry]) -> tuple[FormatEntry, ...]:
+    """The formats of both, each once; those that are due have their own options."""
+    return tuple({entry.name: entry for entry in (*wanted, *due)}.values())
 
 
 def _rendered(

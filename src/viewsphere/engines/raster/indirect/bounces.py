@@ -223,16 +223,8 @@ def _baked(lighting: _Lighting) -> Bounces:
     light, views = np.zeros_like(bounces.light), np.zeros((len(bounces.light), NODES, 4), np.float32)
     bounces = bounces._replace(light=light, views=views.reshape(-1, 4), floor=np.zeros_like(bounces.floor))
     off = SHADOWS / seen.volumes[0].grid.cells
-    lit = patches.lit(
-        bounce_scene.which,
-        bounce_scene.surfaces,
-        bounce_scene.textures,
-        bounce_scene.floor,
-        surrounding.albedo,
-        seen.tree,
-        lighting.lights,
-        off,
-    )
+    scene = bounce_scene.which, bounce_scene.surfaces, bounce_scene.textures, bounce_scene.floor
+    lit = patches.lit(*scene, surrounding.albedo, seen.tree, lighting.lights, off)
     directions = seen.volumes[0].rays.directions
     sky, weights = sky_along(surrounding, directions), irradiance_weights(directions)
     emissive = emissive_triangles_of(bounce_scene.which, bounce_scene.surfaces, patches, lit.emitted, TURNS)
