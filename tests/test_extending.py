@@ -723,6 +723,11 @@ TYPO = EXAMPLES["One row an object"]
     ("code", "message"),
     [
         (TYPO.replace("channels=", "chanels="), r"FormatSpec\.chanels: 'chanels' is unknown; did you mean 'channels'\?"),
+        (
+            TYPO.replace("about=__doc__, ", "").replace("writer=", "wrter=").replace("verify=", "verfy="),
+            r"FormatSpec\.wrter: 'wrter' is unknown; did you mean 'writer'\?.*\n"
+            r".*FormatSpec\.verfy: 'verfy' is unknown; .*\n.*FormatSpec\.about: expected a value; found nothing$",
+        ),
         (TYPO.replace("verify=", "verfy="), r"FormatSpec\.verfy: 'verfy' is unknown; did you mean 'verify'\?"),
         (TYPO.replace('("rgb",)', '"rgb"'), r"FormatSpec\.channels: expected a list; found 'rgb'"),
         (TYPO.replace("FORMAT =", "FORMATS ="), r"expected FORMAT = FormatSpec\(\.\.\.\); found no FORMAT"),

@@ -70,18 +70,29 @@ class WorkerDied(ViewsphereError):
 
 
 class BlenderError(ViewsphereError):
-    """Blender answered that it cannot do what it was asked; it lives, and can be asked again."""
+    """Blender answered that it cannot do what it was asked; it lives, and can be asked again. `reason` is the message without
+    the name of Blender's exception, `how` the whole one.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.how, self.reason = message, message.partition(": ")[2]
 
 
 class BlenderDied(ViewsphereError):
     """Blender crashed, or hung and was ended; only another one can be asked.
 
-    `signal` names what ended it, such as SIGKILL; None where that is not how it ended, or it hung.
+    `how` is the message without the end of Blender's log. `signal` names the signal that ended it, such as SIGKILL; None where
+    there was none, or it hung. `is_late`: it was ended because it hung.
     """
 
-    def __init__(self, message: str, signal: str | None = None) -> None:
-        super().__init__(message)
-        self.signal = signal
+    def __init__(self, how: str, signal: str | None = None, *, log: str = "", is_late: bool = False) -> None:
+        super().__init__(f"{how}; its log ends with: {log}" if log else how)
+        self.how, self.signal, self.is_late = how, signal, is_late
+
+
+class NotKeptError(AttributeError):
+    """An object lacks a field, or its data set does not keep it."""
 
 
 def joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:

@@ -134,7 +134,7 @@ def _graphics(process: BlenderProcess) -> Graphics:
     try:
         return Graphics(process.ask("draw", DRAW_S, renderer="workbench")["driver"])
     except (BlenderError, BlenderDied) as error:
-        return Graphics(problem=f"{str(error).partition('; its log')[0]}: {GRAPHICS}")
+        return Graphics(problem=f"{error.how}: {GRAPHICS}")
 
 
 def missing_libraries(said: str) -> tuple[Library, ...]:

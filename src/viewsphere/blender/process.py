@@ -164,10 +164,10 @@ class BlenderProcess:
             return BlenderDied(f"Blender was ended before `{do}` was asked")
         said = " | ".join(self._last_lines()) or "nothing"
         if seconds >= timeout_s:
-            return BlenderDied(f"Blender hung (no answer in {timeout_s:g} s) of `{do}`; its log ends with: {said}")
+            return BlenderDied(f"Blender hung (no answer in {timeout_s:g} s) of `{do}`", log=said, is_late=True)
         by = _signal(status)
         how = f"exit status {status}" if by is None else f"signal {by}"
-        return BlenderDied(f"Blender died ({how}) after {seconds:.1f} s of `{do}`; its log ends with: {said}", by)
+        return BlenderDied(f"Blender died ({how}) after {seconds:.1f} s of `{do}`", by, log=said)
 
     def _last_lines(self) -> list[str]:
         """The last lines that this Blender wrote to its log."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import StoreError
+from viewsphere.errors import NotKeptError, StoreError
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import picture_of
 from viewsphere.model.instant import Viewpoint
@@ -115,7 +115,7 @@ class ObjectAnnotation:
         try:
             return self.__dict__["extra"][name]
         except KeyError:
-            raise AttributeError(
+            raise NotKeptError(
                 f"an object has no {name!r}, or its data set does not keep it: add it to the recipe's annotations"
             ) from None
 

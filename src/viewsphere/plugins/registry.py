@@ -200,17 +200,21 @@ def _module_of(kind: Kind, name: str) -> Any:
     found = _found(kind).get(name)
     if found is None:
         raise _unknown(SEAMS[kind].constant.lower(), name, names(kind))
-    return _imported(found, name) if found.is_third_party else importlib.import_module(found.module)
+    return _imported(found, name)
 
 
 def _imported(found: _Found, name: str) -> Any:
-    """Return the object that a third party's entry point names; any failure is an error of the plug-in."""
+    """Return a plug-in's module, or the object that its entry point names. A spec that is not valid is an error of the plug-in;
+    so is any failure of a third party's.
+    """
     try:
         module = importlib.import_module(found.module)
         return attrgetter(found.attribute)(module) if found.attribute else module
     except PluginError as error:
         raise PluginError("\n".join(f"{_file(found.module)}: {line}" for line in str(error).splitlines())) from error
     except Exception as error:
+        if not found.is_third_party:
+            raise
         said = f"{type(error).__name__}: {error}".strip().replace("\n", " ")
         raise PluginError(f"{_file(found.module)}: plug-in {name} cannot be imported: {said}") from error
 

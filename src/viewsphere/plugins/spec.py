@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from viewsphere.errors import PluginError, RecipeError
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.quantity import quantity
-from viewsphere.model.validation_errors import explained, report
+from viewsphere.model.validation_errors import dotted, explained, report
 from viewsphere.model.validation_errors import read_options as read_as
 from viewsphere.plugins.registry import Kind
 
@@ -38,8 +38,7 @@ class Spec(Frozen):
         try:
             made = handler(data)
         except ValidationError as error:
-            lines = report(explained(error, tuple(cls.model_fields)), data).splitlines()
-            raise PluginError("\n".join(f"{cls.__name__}.{line}" for line in lines)) from None
+            raise PluginError(_lines(cls, error, data)) from None
         for name, field in cls.model_fields.items():
             count = _values(field, made.takes_options)
             if count is not None and getattr(made, name) is not None:
@@ -88,6 +87,15 @@ class SpecWithOptions(Spec):
         if given:
             raise RecipeError(f"{field}: expected no options, {name} has none; found {', '.join(given)}")
         return ()
+
+
+def _lines(spec: type[Spec], error: ValidationError, data: Any) -> str:
+    """A line for each mistake, unknown fields first: a missing field is often the one that was meant."""
+    fields = tuple(spec.model_fields)
+    unknown = {dotted((str(each["loc"][0]),)) for each in error.errors() if each["type"] == "extra_forbidden"}
+    lines = report(explained(error, fields), data).splitlines()
+    lines.sort(key=lambda line: line.partition(":")[0] not in unknown)
+    return "\n".join(f"{spec.__name__}.{line}" for line in lines)
 
 
 def _values(field: FieldInfo, takes_options: bool) -> int | None:

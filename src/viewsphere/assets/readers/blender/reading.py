@@ -134,7 +134,7 @@ def asked(folder: ModelFolder, process: BlenderProcess, do: str, /, **told: Any)
     try:
         return process.ask(do, seconds, file=str(folder.model.resolve()), kind=kind, root=root, **told)
     except BlenderError as error:
-        said = str(error).partition(": ")[2].removesuffix(", see console for detail")
+        said = error.reason.removesuffix(", see console for detail")
         raise folder.error(f"Blender cannot read it: {said}") from None
     except BlenderDied as error:
         raise folder.error(why_no_answer(error, seconds)) from None
@@ -142,10 +142,9 @@ def asked(folder: ModelFolder, process: BlenderProcess, do: str, /, **told: Any)
 
 def why_no_answer(died: BlenderDied, seconds: float) -> str:
     """The message for a Blender that ended, after so many seconds, instead of answering about a file."""
-    said = str(died).partition("; its log")[0]
-    if died.signal == "SIGXCPU" or said.startswith("Blender hung"):
+    if died.signal == "SIGXCPU" or died.is_late:
         return endings.too_slow(seconds)
-    how = died.signal if died.signal in endings.FROM_OUTSIDE else said
+    how = died.signal if died.signal in endings.FROM_OUTSIDE else died.how
     return endings.ended("Blender, which reads it,", how, limits.MAX_READ_BYTES)
 
 

@@ -37,7 +37,7 @@ def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int
     try:
         return stage.keeper.insist(partial(_rendered, stage, view), stage.named)
     except BlenderError as error:
-        raise UserError(f"{stage.named}: {str(error).partition(': ')[2]}") from error
+        raise UserError(f"{stage.named}: {error.reason}") from error
     finally:
         stage.keeper.forget()  # the numbers are not those of the file
 

@@ -113,8 +113,9 @@ class Keeper:
             process.ask("draw", FIRST_SECONDS, renderer=options.renderer)
         except (BlenderError, BlenderDied) as error:
             self.drop()
-            how = str(error).partition("; its log")[0]
-            raise UserError(f"engine: {options.title} cannot draw on this machine ({how}): {GRAPHICS}, or use cycles") from None
+            raise UserError(
+                f"engine: {options.title} cannot draw on this machine ({error.how}): {GRAPHICS}, or use cycles"
+            ) from None
         self._drawing.add(options.renderer)
 
     def insist(self, ask: Callable[[], Answer], named: str) -> Answer:
@@ -352,7 +353,7 @@ class Arrangement:
         try:
             process.ask("render", FRAME_SECONDS, camera=request, out=str(out), **told)
         except BlenderError as error:
-            raise ModelError(f"{self.named}: {str(error).partition(': ')[2]}") from error
+            raise ModelError(f"{self.named}: {error.reason}") from error
         return {"picture": load_array(out)} | {name: load_array(out.with_suffix(f".{name}.npy")) for name in wanted}
 
     @cached_property

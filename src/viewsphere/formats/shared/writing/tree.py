@@ -17,7 +17,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from viewsphere.errors import UserError
+from viewsphere.errors import NotKeptError, UserError
 from viewsphere.files import open_file
 from viewsphere.formats.shared.writing.export_files import Content, Expected, check_files, put, same_bytes
 from viewsphere.formats.shared.writing.paper import json_bytes
@@ -169,10 +169,8 @@ def _lacking_told(tree: Tree, sample: Sample) -> Generator[None]:
             lacking = f"expected channel {error.args[0]}, found none: leave this format out"
             raise UserError(f"{tree.dataset.root}: frame {sample.index}: {lacking}") from None
         raise
-    except AttributeError as error:
-        if str(error).startswith("an object has no "):
-            raise UserError(f"{tree.dataset.root}: frame {sample.index}: {error}") from None
-        raise
+    except NotKeptError as error:
+        raise UserError(f"{tree.dataset.root}: frame {sample.index}: {error}") from None
 
 
 def _nowhere(pieces: list[Piece]) -> None:
