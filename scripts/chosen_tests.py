@@ -85,8 +85,8 @@ class Text:
 
     @property
     def scans(self) -> bool:
-        """Return whether it goes through the files of `src/viewsphere`, by that path or by the package's `__file__`."""
-        package = {"src", "viewsphere"} <= self.strings or {"viewsphere", "__file__"} <= self.names
+        """Return whether it goes through the files of `src`, by that path or by the package's `__file__`."""
+        package = "src" in self.strings or {"viewsphere", "__file__"} <= self.names
         return package and not SCANS.isdisjoint(self.names)
 
     @property

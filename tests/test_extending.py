@@ -413,6 +413,37 @@ def test_a_part_that_changed_is_found(tmp_path):
         generate(parts_recipe("parts:*"), tmp_path / "out", append=True)
 
 
+PEG = example("Pegs that stand on a foot.")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("home=", "hom=", r"ZooFamily\.hom: 'hom' is unknown; did you mean 'home'\?"),
+        ('home="table"', 'home="tabel"', r"ZooFamily\.home: 'tabel' is unknown; did you mean 'table'\?"),
+        (
+            '"household item"',
+            '"houshold item"',
+            r"ZooFamily\.classes: 'houshold item' is unknown; did you mean",
+        ),
+        ('{"": "household item"}', '{"stem": "pole"}', r"ZooFamily\.classes: expected the class of all other parts"),
+        ("random=peg_random,\n", "", r"ZooFamily\.random: expected a value; found nothing"),
+        ("random=peg_random", "random=lambda: None", r"ZooFamily\.random: expected a function of 1 value; found"),
+        (
+            "random=peg_random",
+            "random=peg_random, rooms=len",
+            r"ZooFamily\.draw: expected a function, whose parameters rooms takes",
+        ),
+    ],
+)
+def test_a_faulty_family_is_refused_where_it_is_named_and_nowhere_else(install, old, new, message):
+    file = install("families", "peg", PEG.replace(old, new))
+    with pytest.raises(PluginError, match=f"^{re.escape(str(file))}: {message}"):
+        zoo.family("peg")
+    assert "car" in zoo.family_names()
+    assert plan(small_recipe()).frames
+
+
 def test_a_package_of_plug_ins_is_listed_and_one_that_is_broken_breaks_nothing_else(tmp_path, monkeypatch):
     for name, code in (("good", ""), ("bad", "1 / 0")):
         site = tmp_path / name

@@ -21,7 +21,7 @@ from viewsphere.store.shots import moving
 
 SOURCE = sorted(
     file
-    for file in (ROOT / "src" / "viewsphere").rglob("*.py")
+    for file in (ROOT / "src").rglob("*.py")
     if "worker" not in file.parts  # Blender's, whose files nobody compares
 )
 POSIX_ONLY = {"fcntl", "resource", "pwd", "grp", "termios", "pty", "tty", "posix"}

@@ -254,7 +254,7 @@ def templates():
 
 
 def texts():
-    for file in (ROOT / "src" / "viewsphere").rglob("*.py"):
+    for file in (ROOT / "src").rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text("utf-8"))):
             if isinstance(node, ast.JoinedStr):
                 yield "".join(str(v.value) if isinstance(v, ast.Constant) else "..." for v in node.values)

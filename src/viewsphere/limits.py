@@ -82,7 +82,7 @@ class Limits:
     MAX_ALL_TEXTURE_PIXELS = Limit(1 << 29, "pixels of all textures of a model; 2 GiB as RGBA")
     MIN_SIZE = Limit(1e-4, "metres, the longest side of a model at least")
     MAX_SIZE = Limit(1e5, "metres, the longest side of a model at most")
-    MAX_MODELS = Limit(100_000, "models of the zoo's that an entry of a recipe counts")
+    MAX_MODELS = Limit(100_000, "models that an entry of a recipe draws")
     MAX_ENTRIES = Limit(1_000_000, "files and folders that a folder or a pattern of `source` walks")
     MAX_RECIPE_VALUES = Limit(200_000, "values of a recipe: by aliases a few lines can stand for billions")
     MAX_RECIPE_BYTES = Limit(10_000_000, "bytes of a recipe, and of each that it extends")

@@ -230,7 +230,7 @@ def test_a_place_file_stands_with_its_origin_under_the_target(tmp_path):
 def test_mistakes_are_said_before_anything_is_read(tmp_path, tiny):
     assert "scene.place: 'zoo:neighborhood' is unknown; did" in error(scene={"place": "zoo:neighborhood"})
     assert "did you mean 'zoo:neighbourhood'" in error(scene={"place": "zoo:neighborhood"})
-    assert f"scene.place: expected zoo:<place> or a model file; found none at {tmp_path}" in error(
+    assert f"scene.place: expected a place, such as zoo:flat, or a model file; found none at {tmp_path}" in error(
         scene={"place": str(tmp_path / "none.glb")}
     )
     assert "company.count: expected at most 5, as there are 6 models; found 6" in error(scene={"company": 6})

@@ -92,7 +92,7 @@ def _new_again(format_: str, source: Path, folder: Path | None) -> None:
     made = make_again(format_, source, folder or Path(f"{source.resolve().stem}-again"))
     for note in made.notes:
         say(f"note: {note}", err=True)
-    what = quantity(made.models, "model") if made.models else "a model of the zoo's, as the data set has none"
+    what = quantity(made.models, "model") if made.models else "a stand-in model, as the data set has none"
     say(f"wrote {made.recipe}: {quantity(made.shots, 'shot')}, {what}; next: viewsphere preview {made.recipe}")
 
 
@@ -154,7 +154,7 @@ def inspect(
     unit: Annotated[
         str | None, typer.Option(help="Unit of the file: m, cm, mm, in, ft or metres in one; default: the file's.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed for a zoo family.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed for a model that is drawn, such as zoo:car.")] = 0,
     rig: Annotated[
         Path | None,
         typer.Option(help="Instead of a model: a recipe; shows its sensors and writes <recipe>-rig.glb.", show_default=False),

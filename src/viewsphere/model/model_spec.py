@@ -54,7 +54,7 @@ class ModelSpec(OmitNone):
     fps: float | None = None  # frames of an animated file that make a second, where that is not what the file says
     clip: str | None = None  # name of the animation that is played, where the file has several
     shown: tuple[str, ...] = ()  # objects of a .blend file that are read although renders do not show them
-    size: Size | None = None  # that a zoo family is built to, where it can be
+    size: Size | None = None  # that a drawn model is built to, where it can be
     parts: Parts | None = None  # what is taken of it, when it is read and normalised
     sidecar: str | None = None  # absolute path of the file that says symmetries and keypoints, where it is not beside its own
     symmetries: Literal["found"] | None = None  # whether they are looked for where none are declared

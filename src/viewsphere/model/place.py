@@ -15,7 +15,7 @@ from viewsphere.model.scene import Matrix4, Vector
 
 @dataclass(frozen=True)
 class PlacePiece:
-    """One thing of a place: the member of a zoo family that `seed` draws, as `ModelSpec(source="zoo:<family>", seed=seed)`
+    """One thing of a place: the member of a family that `seed` draws, as a `ModelSpec` of the place's source
     names it with centring and scale "as_is". Pieces of one family and seed are instances of one mesh.
 
     name is unique in its place; world_from_piece is rigid.

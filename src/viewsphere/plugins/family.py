@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, InstanceOf, field_validator, model_validator
 
+from viewsphere.errors import PluginError
 from viewsphere.model.classes import STUFF_IDS
 from viewsphere.model.keypoints import At
 from viewsphere.model.model_spec import Size
@@ -35,7 +36,7 @@ class ZooFamily(Spec):
         default={"": "scenery"},
         description="stuff classes by part, for models without labels of their own; `''` (scenery by default): all other parts",
     )
-    keypoints: Mapping[str, At] = Field(default={}, description="named points, as places in the boxes around parts")
+    keypoints: Mapping[str, InstanceOf[At]] = Field(default={}, description="named points, as places in the boxes around parts")
     skeleton: tuple[tuple[str, str], ...] = Field(default=(), description="lines between the points")
     sized: Callable[[Rng, Size], Any] | None = Field(
         default=None, description="`sized(rng, (width, height, length))`: a model of this size"
@@ -66,5 +67,5 @@ class ZooFamily(Spec):
     def _check_draw(self) -> ZooFamily:
         needing = next((name for name in ("surfaces", "rooms") if getattr(self, name) is not None), None)
         if needing and self.draw is None:
-            raise ValueError(f"expected draw, whose parameters {needing} takes; found none")
+            raise PluginError(f"ZooFamily.draw: expected a function, whose parameters {needing} takes; found none")
         return self

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, InstanceOf
 
 from viewsphere.errors import UserError
 from viewsphere.model.credit import Credit
@@ -73,7 +73,7 @@ class SourceSpec(Spec):
     roles: Mapping[Role, str] = Field(
         default={}, description="names of models that viewsphere itself uses: `example`, `table`, `box`"
     )
-    downloads: Mapping[str, Download] = Field(
+    downloads: Mapping[str, InstanceOf[Download]] = Field(
         default={}, description="data that better models need, by name; `viewsphere doctor --setup` fetches them"
     )
 
@@ -109,6 +109,11 @@ def place_of(text: str) -> PlaceSpec | None:
 def place_names() -> tuple[str, ...]:
     """All places of all sources, such as `zoo:town`, sorted."""
     return tuple(f"{prefix}:{name}" for prefix, spec in sources().items() for name in spec.places())
+
+
+def with_roads() -> str:
+    """The places of all sources that have roads, in words, for messages; `a file` where there are none."""
+    return " or ".join(name for name in place_names() if (place := place_of(name)) is not None and place.roads) or "a file"
 
 
 def model_names() -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from viewsphere.model.omit_none import OmitNone
 from viewsphere.model.validation_errors import shown
 from viewsphere.plugins import prefix_of
 from viewsphere.plugins.place import PlaceSpec
-from viewsphere.plugins.source import place_names, place_of
+from viewsphere.plugins.source import place_of, with_roads
 from viewsphere.recipe.draws import CountDrawn, CountOrNone, Drawn, is_random, span
 from viewsphere.recipe.layout import LAYOUT, ORIENTATION, Layout, Orientation, Spot, placer_of, spots_of
 from viewsphere.recipe.models import Unit
@@ -33,8 +33,8 @@ class PlaceEntry(OmitNone):
 
     OMIT_IF_NONE = ("parked", "walkers", "motion")
 
-    source: str = Field(min_length=1, description="zoo:<place>, such as zoo:neighbourhood, or a model file")
-    draw: Draw = Field(default="fixed", description=f"for a zoo place and turn: {DRAWS}")
+    source: str = Field(min_length=1, description="a place, such as zoo:neighbourhood, or a model file")
+    draw: Draw = Field(default="fixed", description=f"for a place of a source, and turn: {DRAWS}")
     labels: Labels = Field(default="background", description=LABELS)
     turn: Drawn[Number] = Field(
         default=0.0, description="rotation of the place about the vertical through the targets, degrees"
@@ -46,11 +46,11 @@ class PlaceEntry(OmitNone):
     category: str = Field(default="", max_length=200, description="for a file with labels: own")
     parked: Drawn[Portion] | None = Field(
         default=None,
-        description="for a zoo place with roads: share of parking bays and driveways with a car; default: 0.4 in "
-        "zoo:town, 0 in zoo:neighbourhood",
+        description="for a place with roads: share of parking bays and driveways with a car; default: 0.4 in zoo:town, 0 in "
+        "zoo:neighbourhood",
     )
     walkers: CountOrNone | None = Field(
-        default=None, description="for a zoo place with roads: number of people on its pavements; default: 0"
+        default=None, description="for a place with roads: number of people on its pavements; default: 0"
     )
     motion: Annotated[dict[Annotated[str, Field(min_length=1)], MotionsField], Field(min_length=1)] | None = Field(
         default=None,
@@ -83,18 +83,13 @@ class PlaceEntry(OmitNone):
         given = [name for name in ("parked", "walkers") if getattr(self, name) is not None]
         if given and not self.has_roads:
             raise ValueError(
-                f"`{given[0]}` needs a place with roads, and {self.source} has none. Use {_with_roads()}, or remove "
-                f"`{given[0]}`"
+                f"`{given[0]}` needs a place with roads, and {self.source} has none. Use {with_roads()}, or remove `{given[0]}`"
             )
         return self
 
     @model_validator(mode="after")
     def _check(self) -> PlaceEntry:
         if self.prefix:
-            if not self.source.isascii() or not self.source[len(self.prefix) + 1 :].isidentifier():
-                raise ValueError(
-                    f"expected the name of a place, such as {next(iter(place_names()), 'none')}; found {self.source!r}"
-                )
             given = [name for name in OF_FILES if getattr(self, name) != type(self).model_fields[name].default]
             if given:
                 raise ValueError(f"expected a file beside {given[0]}; found {self.source!r}")
@@ -108,10 +103,6 @@ class PlaceEntry(OmitNone):
         elif (self.labels == "own") != bool(self.category):
             raise ValueError("expected category and labels: own together, for a file; found one of them")
         return self
-
-
-def _with_roads() -> str:
-    return " or ".join(name for name in place_names() if (place := place_of(name)) is not None and place.roads)
 
 
 class CompanyEntry(OmitNone):

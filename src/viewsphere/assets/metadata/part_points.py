@@ -1,4 +1,4 @@
-"""Named points of models that are known by the names of their parts: those of the zoo."""
+"""Named points of models that are known by the names of their parts: those of families."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Positive
 from viewsphere.model.validation_errors import one_of
 from viewsphere.plugins.motion import MotionSpec
+from viewsphere.plugins.source import with_roads
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
 
 ANY = "any"
@@ -83,7 +84,7 @@ def _lane(name: str, start: Start) -> Lane:
     lanes = {lane.name: lane for lane in start.lanes}
     if not lanes:
         raise RecipeError(
-            f"{start.field}.lane: expected a place with lanes, such as scene.place: zoo:neighbourhood; found none: set one, or "
+            f"{start.field}.lane: expected a place with lanes, such as scene.place: {with_roads()}; found none: set one, or "
             "list points"
         )
     if name == ANY:

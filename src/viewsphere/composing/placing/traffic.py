@@ -21,6 +21,7 @@ from viewsphere.model.numbers import Length, Portion, Strength
 from viewsphere.model.place import Bay, Lane, stretches
 from viewsphere.model.scene import Matrix4
 from viewsphere.plugins.placer import PlacerSpec
+from viewsphere.plugins.source import with_roads
 from viewsphere.recipe.draws import Drawn, drawn
 
 Float = NDArray[np.float64]
@@ -96,8 +97,8 @@ def _roads(room: Room, shapes: Sequence[Shape], reach: float) -> _Roads:
     """The part of the place that is used; raises RecipeError where it has no lanes, or none within reach."""
     if not room.lanes:
         raise RecipeError(
-            f"{room.field}.layout: traffic needs a scene.place with lanes, and this one has none. Use zoo:town, "
-            "zoo:neighbourhood, or a file with objects named lane"
+            f"{room.field}.layout: traffic needs a scene.place with lanes, and this one has none. Use {with_roads()}, "
+            "or a file with objects named lane"
         )
     lanes = _steps(room.lanes, reach)
     if not len(lanes):

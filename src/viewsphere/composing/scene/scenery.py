@@ -259,7 +259,7 @@ def _file_spec(recipe: Recipe, entry: PlaceEntry) -> ModelSpec:
     except ModelError as error:
         raise RecipeError(f"scene.place: {error}") from None
     if not file.is_file():
-        raise RecipeError(f"scene.place: expected zoo:<place> or a model file; found none at {file}")
+        raise RecipeError(f"scene.place: expected a place, such as {place_names()[0]}, or a model file; found none at {file}")
     return ModelSpec(
         key=scenery_key(path.stem, "/".join((file.name, *inside))),
         source=path.as_posix(),
