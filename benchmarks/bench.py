@@ -33,7 +33,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.engines import Stage
 from viewsphere.engines.raster import staging
 from viewsphere.engines.raster.shading import painting
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import annotated, context_of, observe
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
@@ -180,7 +180,7 @@ def drawn(stage: Stage, instant: int, camera: Camera) -> tuple[Geometry, Visibil
 
 def one_frame(clock: Clock, shot: Shot, instant: int, stage: Stage, mesh: Mesh) -> Sample:
     """Time one frame stage by stage, without writing its files."""
-    boxes = [box_vertices(*mesh.bounds)]
+    boxes = [Box3d.between(*mesh.bounds).corners]
     now, camera = shot.instants[instant], shot.camera(instant)
     geometry, visibility = clock("truth: raster", lambda: drawn(stage, instant, camera))
     names = ["depth", "instances", "normals"]

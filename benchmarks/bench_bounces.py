@@ -20,7 +20,7 @@ from viewsphere import Recipe, plan
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines import raster
 from viewsphere.engines.raster.staging import RasterStage
-from viewsphere.geometry.box import FACES, box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
@@ -56,8 +56,8 @@ THING = (((2.85, 0.85, 0), (3.15, 1.15, 0.3), (0.7, 0.7, 0.7)),)
 @lru_cache
 def boxes(solids: tuple[Any, ...], roughness: float = 0.8) -> Mesh:
     """Boxes with flat faces, each of its own colour, the first one of this roughness."""
-    faces = np.array([face for a, b, c, d in FACES.values() for face in ((a, b, c), (a, c, d))])
-    corners = np.concatenate([box_vertices(low, high)[faces] for low, high, _ in solids]).astype(np.float32)
+    faces = np.array([face for a, b, c, d in Box3d.numbered_faces().values() for face in ((a, b, c), (a, c, d))])
+    corners = np.concatenate([Box3d.between(low, high).corners[faces] for low, high, _ in solids]).astype(np.float32)
     a, b, c = corners.transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -22,7 +22,7 @@ from bench_scene import write_reference
 from viewsphere import Recipe, plan, plugins
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.engines.shared.blender.staging import CyclesStage
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import annotated, context_of, observe
 from viewsphere.model.shot import Shot
 from viewsphere.plugins.engine import EngineSpec
@@ -99,7 +99,7 @@ def ours(shot: Shot, stages: Stages, pictures: Path | None = None) -> Costs:
 
     stage = engine.stage(shot, stages.model)
     spent()
-    boxes = [box_vertices(*mesh.bounds)]
+    boxes = [Box3d.between(*mesh.bounds).corners]
     color: list[float] = []
     labels: list[float] = []
     for number, instant, sensor in shot.samples:

@@ -17,7 +17,7 @@ import numpy as np
 from viewsphere import Recipe, plan
 from viewsphere.assets.cache import load_normalised
 from viewsphere.composing.physics import STEP_S, World
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.planning.samplers.shared.random import scene_laid
@@ -40,7 +40,7 @@ LAYOUTS: dict[str, dict[str, Any]] = {
 @lru_cache
 def box_of(spec: ModelSpec, step: TimeStep | None = None) -> Any:
     """The box of a model."""
-    return box_vertices(*load_normalised(spec).bounds)
+    return Box3d.between(*load_normalised(spec).bounds).corners
 
 
 def main() -> None:

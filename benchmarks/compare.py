@@ -31,7 +31,7 @@ from viewsphere.blender.interpreter import find_blender
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.engines.shared.blender.requests import laid_with_slabs
 from viewsphere.errors import ViewsphereError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
@@ -160,7 +160,7 @@ def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
         )
         for i, (key, (_, (x, y, z))) in enumerate(zip(meshes, case.models, strict=True), 1)
     )
-    corners = np.concatenate([box_vertices(*mesh.bounds) + np.array(at) for mesh, at in case.models])
+    corners = np.concatenate([Box3d.between(*mesh.bounds).corners + np.array(at) for mesh, at in case.models])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     x, y, z = middle.tolist()
     pose = Viewpoint(index=0, azimuth_deg=case.azimuth_deg, elevation_deg=case.elevation_deg, distance=case.distance)

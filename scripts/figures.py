@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import orbit_rotation
 
 Points = NDArray[np.float64]
 
 INK, PALE, RED, GREEN, BLUE, FACE = "#263238", "#b0bec5", "#c62828", "#2e7d32", "#1565c0", "#80cbc4"
 AXES = ((RED, "x"), (GREEN, "y"), (BLUE, "z"))
-BOX = box_vertices((-1, -1, -1), (1, 1, 1))
+BOX = Box3d.between((-1, -1, -1), (1, 1, 1)).corners
 EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 FRONT = (1, 5, 6, 2)
 

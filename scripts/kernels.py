@@ -83,10 +83,10 @@ def used() -> set[str]:
 def tiny(recipe: Any) -> dict[str, Any]:
     """The features of a recipe's first shot, and the kernels that a tiny frame of it calls."""
     from viewsphere import plan
-    from viewsphere.geometry.box import box_vertices
+    from viewsphere.geometry.box3d import Box3d
     from viewsphere.run.shots import precompile as warm
 
-    shot = next(iter(plan(recipe).shots(lambda *_: box_vertices((-0.5,) * 3, (0.5,) * 3))))
+    shot = next(iter(plan(recipe).shots(lambda *_: Box3d.between((-0.5,) * 3, (0.5,) * 3).corners)))
     warm.load_kernels(shot)
     return {"features": sorted(warm.features(shot)), "used": sorted(used())}
 

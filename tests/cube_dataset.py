@@ -10,7 +10,7 @@ from viewsphere.assets.appearance.description import appearance_of
 from viewsphere.assets.exporting.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.composing.viewpoints.camera import looking
-from viewsphere.geometry.box import FACES, box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.diameter import diameter
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.labels import annotated, context_of, observe, sample_values
@@ -32,7 +32,7 @@ from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.shot_views import views_of
 
 HALVES = ((0, 1, 2), (0, 2, 3))
-TRIANGLES = np.array([[face[i] for i in half] for face in FACES.values() for half in HALVES], np.int32)
+TRIANGLES = np.array([[face[i] for i in half] for face in Box3d.numbered_faces().values() for half in HALVES], np.int32)
 CHANNELS = still_channels()
 FEW = ("rgb", "depth", "instances")
 """For tests of what is in none of the others, which take half the time."""
@@ -43,7 +43,7 @@ CATEGORIES = (Category(1, "hair_drier", "appliance"), Category(2, "gizmo", ""), 
 
 def block(width: float, length: float, height: float) -> Mesh:
     half = np.array([width, length, height]) / 2
-    vertices = box_vertices(-half, half).astype(np.float32)
+    vertices = Box3d.between(-half, half).corners.astype(np.float32)
     normals = (vertices / np.linalg.norm(vertices, axis=1, keepdims=True)).astype(np.float32)
     zeros = np.zeros(len(TRIANGLES), np.int32)
     return Mesh(vertices, TRIANGLES, normals, zeros, zeros)
@@ -76,7 +76,7 @@ def placed(offsets: dict[int, tuple[float, float, float]]) -> tuple[Thing, ...]:
 def render(shot: Shot):
     meshes = [MESHES[int(p.model.key[-1])] for p in shot.things]
     geometry = build_geometry(shot.things, meshes, shot.scene.ground is not None, shot.label_alpha)
-    boxes = [box_vertices(*m.bounds) for m in meshes]
+    boxes = [Box3d.between(*m.bounds).corners for m in meshes]
     files = [f"store/models/{p.model.key}/{p.model.key}.obj" for p in shot.things]
     views = views_of(shot, lambda thing: MESHES[int(thing.model.key[-1])])
     for number, instant, sensor in shot.samples:
@@ -159,7 +159,7 @@ def make(
             export_glb(mesh, folder / f"{s.key}.glb")
             info = ModelInfo(
                 s.key, s.category, s.supercategory, s.category_id, f"store/models/{s.key}/{s.key}.obj",
-                f"store/models/{s.key}/{s.key}.glb", box_vertices(low, high), (width, height, length), s.real_size,
+                f"store/models/{s.key}/{s.key}.glb", Box3d.between(low, high).corners, (width, height, length), s.real_size,
                 mesh.parts, len(mesh.triangles), "d", diameter=diameter(mesh.vertices),
                 looks=appearance_of(mesh) if annotations else None,
             )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from shots import still_shot
 from truth_scenes import LENSES, cube, lens, mesh_of, random_soup, sphere
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.geometry.rotation import random_rotation, rigid
 from viewsphere.labels import annotated, context_of, observe
@@ -58,7 +58,7 @@ def pictured(things, meshes, camera, names, ground=True, around=None):
     visibility = rasterize(geometry, camera)
     channels = observe(geometry, camera, visibility, names, around)
     objects = [thing for thing in things if thing.id]
-    boxes = [box_vertices(*mesh.bounds) for mesh in meshes[: len(objects)]]
+    boxes = [Box3d.between(*mesh.bounds).corners for mesh in meshes[: len(objects)]]
     pose = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=4)
     shot = still_shot(things, camera.intrinsics, [pose])
     files = [f"store/models/{thing.model.key}.obj" for thing in objects]

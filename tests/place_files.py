@@ -10,9 +10,10 @@ import numpy as np
 
 from viewsphere.assets.exporting.glb import glb_bytes
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.geometry.box import FACES, box_vertices
+from viewsphere.geometry.box3d import Box3d
 
-TRIANGLES = np.array([[f[i] for i in half] for f in FACES.values() for half in ((0, 1, 2), (0, 2, 3))], np.int32)
+FACES = Box3d.numbered_faces().values()
+TRIANGLES = np.array([[f[i] for i in half] for f in FACES for half in ((0, 1, 2), (0, 2, 3))], np.int32)
 HOUSE = ((3.0, 2.0, -0.1), (6.0, 5.0, 3.0))
 
 
@@ -20,8 +21,8 @@ def blocks(*corners) -> Mesh:
     """One part a block, given by its lowest and highest corner; faces outwards."""
     vertices, triangles, normals, parts = [], [], [], []
     for part, (low, high) in enumerate(corners):
-        box = box_vertices(low, high)
-        for face in FACES.values():
+        box = Box3d.between(low, high).corners
+        for face in FACES:
             a, b, c, d = (box[i] for i in face)
             normal = np.cross(b - a, d - a)
             outward = np.sign(np.dot(normal, (a + c) / 2 - box.mean(axis=0)))

@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 from viewsphere.composing.physics import World, body_of
 from viewsphere.composing.placing import Shape
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
 
@@ -19,7 +19,7 @@ def spec(key):
 
 
 def shape_of(points):
-    return Shape(box_vertices(points.min(axis=0), points.max(axis=0)), lambda: points)
+    return Shape(Box3d.around(points).corners, lambda: points)
 
 
 def solids(count, seed=0, scale=1.0):

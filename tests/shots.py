@@ -3,7 +3,7 @@
 import numpy as np
 
 from viewsphere.composing.viewpoints.camera import looking
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.rig import Rig
@@ -17,7 +17,7 @@ AHEAD = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1)
 
 def unit_box(_, step=None):
     """The box of any model."""
-    return box_vertices((-0.5,) * 3, (0.5,) * 3)
+    return Box3d.between((-0.5,) * 3, (0.5,) * 3).corners
 
 
 def still_shot(things, lens=SMALL, viewpoints=(AHEAD,), focus=(0, 0, 0), split="train", finish=None, **more) -> Shot:

@@ -13,7 +13,7 @@ from viewsphere.assets.animation.timeline import Blenders, Timeline
 from viewsphere.assets.scene_file import SceneFile, SceneObject
 from viewsphere.composing.scene.blend_scene import BlendScenery
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 
 
 def thing(name, parent=None, collections=(), place=(0, 0, 0), shown=True, **properties):
@@ -138,7 +138,7 @@ def planes(tmp_path, monkeypatch):
 
 def in_turn(recipe):
     """The number of the plane that each shot shows, in the data set's order."""
-    shots = plan(recipe).shots(lambda spec, step=None: box_vertices((-0.5, -0.5, 0), (0.5, 0.5, 1)))
+    shots = plan(recipe).shots(lambda spec, step=None: Box3d.between((-0.5, -0.5, 0), (0.5, 0.5, 1)).corners)
     return [("plane1", "plane0").index(name) for shot in shots for name in shot.scene.blend.hidden]
 
 

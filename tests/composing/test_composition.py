@@ -6,7 +6,7 @@ import pytest
 from place_files import write_picture, write_place
 from viewsphere.composing.scene import scenery
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.place import Place, PlacePiece, standing
 from viewsphere.model.shot import Shot
 from viewsphere.planning.distances import Distances
@@ -18,7 +18,7 @@ from viewsphere.recipe.recipe import Recipe
 def box_of(spec, step=None):
     """A box by the key alone: no mesh is needed."""
     size = 1 + sum(spec.key.encode()) % 7 / 10
-    return box_vertices((-size / 2, -size, -size / 3), (size / 2, size, size / 3))
+    return Box3d.between((-size / 2, -size, -size / 3), (size / 2, size, size / 3)).corners
 
 
 def recipe(models=6, **fields):

@@ -8,7 +8,7 @@ from small import small_recipe
 from viewsphere.assets.cache import load_normalised
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.planning.plan import plan
 from viewsphere.run.generate import generate
 
@@ -61,7 +61,7 @@ def test_distractors_fall_with_the_others():
     assert all(len(sample.objects) == 2 for sample in vs.render(recipe(*models, **fields)))
     planned = plan(recipe(*models, **fields))
     assert planned.max_objects == 2 and len(planned.distractors) == 2
-    shot = planned.shot(0, lambda spec, step=None: box_vertices(*load_normalised(spec).bounds))
+    shot = planned.shot(0, lambda spec, step=None: Box3d.between(*load_normalised(spec).bounds).corners)
     assert [thing.id for thing in shot.things] == [1, 2, 0, 0]
     assert all(len(set(thing.motion.poses)) > 1 for thing in shot.things)
 

@@ -15,7 +15,7 @@ from viewsphere.composing.physics import Board
 from viewsphere.composing.placing import Room, Shape, footprint
 from viewsphere.composing.seeds import generator
 from viewsphere.errors import RecipeError, StoreError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.validation_errors import read_options
 from viewsphere.planning.plan import plan
@@ -36,7 +36,7 @@ def fallen(shapes, name="fall", seed=0, given=None, **room):
 
 
 def rectangle(width, length):
-    return footprint(box_vertices((-width / 2, -length / 2, 0.0), (width / 2, length / 2, 0.0)), IDENTITY)
+    return footprint(Box3d.between((-width / 2, -length / 2, 0.0), (width / 2, length / 2, 0.0)).corners, IDENTITY)
 
 
 def test_things_lie_still_on_the_floor():
@@ -171,7 +171,7 @@ def test_things_fall_into_what_is_concave_where_parts_collide(tmp_path, monkeypa
         [trimesh.creation.box((w, n, h), trimesh.transformations.translation_matrix(at)) for at, (w, n, h) in SIDES]
     )
     points, triangles = np.array(whole.vertices), np.array(whole.faces, np.int32)
-    trough = Shape(box_vertices(points.min(axis=0), points.max(axis=0)), lambda: points, lambda: (points, triangles))
+    trough = Shape(Box3d.around(points).corners, lambda: points, lambda: (points, triangles))
     small, found = solids(2, scale=0.5), []
     for collide in ("hulls", "parts"):
         poses = fallen(small, taken=((trough, IDENTITY),), given={"collide": collide, "spread": [0.3, 0.3]})

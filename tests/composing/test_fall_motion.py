@@ -15,7 +15,7 @@ from viewsphere.composing.layouts import Carried
 from viewsphere.composing.placing import Room, Way
 from viewsphere.composing.seeds import generator
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.scene import IDENTITY
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.placer import PlacerSpec
@@ -23,7 +23,7 @@ from viewsphere.plugins.placer import PlacerSpec
 
 @lru_cache
 def box_of(model, step=None):
-    return box_vertices(*load_normalised(model).bounds)
+    return Box3d.between(*load_normalised(model).bounds).corners
 
 
 def ways(shapes, seed=0, **given):

@@ -19,14 +19,14 @@ from viewsphere.composing.motion import Lane, Start, check_motion, check_motions
 from viewsphere.composing.placing import standing
 from viewsphere.composing.seeds import generator
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.file import read
 from viewsphere.recipe.motion import MotionEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere_zoo.places.neighbourhood import neighbourhood
 
-BOX = box_vertices((-1.0, -2.0, -0.5), (1.0, 2.0, 0.5))
+BOX = Box3d.between((-1.0, -2.0, -0.5), (1.0, 2.0, 0.5)).corners
 PLACED = standing(BOX, 3.0, 4.0, 30.0)
 KINDS = ("clip", "constant", "fall", "keyframes", "oscillate", "path", "random", "spline")
 TIMES = np.arange(51) / 25

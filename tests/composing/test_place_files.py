@@ -12,7 +12,7 @@ from viewsphere.assets.cache import load
 from viewsphere.assets.normalise import rotation
 from viewsphere.composing.scene.scenery import free_floor, is_indoors, place_lanes, place_pieces, place_surfaces
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import random_rotation, rigid, transform
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
@@ -27,7 +27,7 @@ def read_here(monkeypatch, tmp_path):
 
 
 def box_of(spec, step=None):
-    return box_vertices((-0.2, -0.3, 0.0), (0.2, 0.3, 0.4))
+    return Box3d.between((-0.2, -0.3, 0.0), (0.2, 0.3, 0.4)).corners
 
 
 def recipe(source, place=None, **fields):

@@ -13,13 +13,13 @@ from viewsphere.composing.scene.scenery import place_lanes, place_pieces
 from viewsphere.composing.seeds import generator
 from viewsphere.composing.viewpoints.sequence_poses import poses_of
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere_zoo.families.street import lanes
 
-BOX = box_vertices((-1.0, -2.0, 0.0), (1.0, 2.0, 1.5))
+BOX = Box3d.between((-1.0, -2.0, 0.0), (1.0, 2.0, 1.5)).corners
 
 
 def recipe(place="zoo:neighbourhood", **fields):

@@ -24,7 +24,7 @@ from viewsphere.composing.placing.shared.footprint import Outline, first_crowded
 from viewsphere.composing.placing.shared.spot import Others
 from viewsphere.composing.seeds import generator
 from viewsphere.errors import MissingExtraError, RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
@@ -53,7 +53,7 @@ def alone(name, shapes, keys, seed=0, names=(), **room):
 
 def box(width, length, height=1.0, x=0.0, y=0.0, z=0.0):
     half = np.array([width, length, height]) / 2
-    return box_vertices(np.array([x, y, z]) - half, np.array([x, y, z]) + half)
+    return Box3d.between(np.array([x, y, z]) - half, np.array([x, y, z]) + half).corners
 
 
 def polygon(vertices, move):
@@ -276,8 +276,8 @@ def test_a_listed_layout_is_taken_as_it_is_and_refused_where_two_meet():
 
 @pytest.mark.slow
 def test_all_stay_on_the_free_floor_or_it_is_said():
-    free = footprint(box_vertices((-3.0, -50.0, 0.0), (3.0, 50.0, 0.0)), standing(np.zeros((8, 3))))
-    square = footprint(box_vertices((-2.5, -2.5, 0.0), (2.5, 2.5, 0.0)), standing(np.zeros((8, 3))))
+    free = footprint(Box3d.between((-3.0, -50.0, 0.0), (3.0, 50.0, 0.0)).corners, standing(np.zeros((8, 3))))
+    square = footprint(Box3d.between((-2.5, -2.5, 0.0), (2.5, 2.5, 0.0)).corners, standing(np.zeros((8, 3))))
     boxes, keys = [box(1.8, 4.4)] * 5, [f"m{i}" for i in range(5)]
     for seed in range(20):
         moves = place("scatter", boxes, keys, seed, gap=0.3, free=free)
@@ -388,7 +388,7 @@ PLACER = PlacerSpec(place=place)
 
     def box_of(spec, step=None):
         if spec.key not in boxes:
-            boxes[spec.key] = box_vertices(*load_normalised(spec).bounds)
+            boxes[spec.key] = Box3d.between(*load_normalised(spec).bounds).corners
         return boxes[spec.key]
 
     things = plan(recipe("leaning")).shot(0, box_of).things

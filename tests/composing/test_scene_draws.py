@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.scene import (
     AreaLight,
     Background,
@@ -69,7 +69,7 @@ def finishes(scene, folder=Path(), **fields):
 
 
 def box_of(spec, step=None):
-    return box_vertices((-1.0, -2.0, -0.5), (1.0, 2.0, 1.5))
+    return Box3d.between((-1.0, -2.0, -0.5), (1.0, 2.0, 1.5)).corners
 
 
 def test_a_recipe_without_a_word_on_its_scene_has_the_default_one():

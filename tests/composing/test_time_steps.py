@@ -7,7 +7,7 @@ import pytest
 
 from viewsphere.assets.animation.timeline import Blenders, Timeline
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.scene import Floor
 from viewsphere.planning.distances import Distances
 from viewsphere.planning.extension import extend, whole
@@ -46,7 +46,7 @@ def frame_of(spec, step):
 
 def box_of(spec, step=None):
     """A box that is as high as the frame says."""
-    return box_vertices((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0 + frame_of(spec, step) / 100))
+    return Box3d.between((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0 + frame_of(spec, step) / 100)).corners
 
 
 def error(*models, **fields):
@@ -159,7 +159,7 @@ def test_time_steps_are_added_to_those_there_are():
 
 def test_a_camera_inside_at_any_time_step_is_found():
     def growing(spec, step=None):
-        return box_vertices((-0.5, -0.5, 0.0), (0.5, 0.5 if frame_of(spec, step) < 30 else 9.0, 1.0))
+        return Box3d.between((-0.5, -0.5, 0.0), (0.5, 0.5 if frame_of(spec, step) < 30 else 9.0, 1.0)).corners
 
     planned = plan(recipe(viewpoints={"azimuth": [0, 180], "distance": 5, "elevation": 0}))
     problem = Distances(planned, growing).problem(planned.subjects[0])

@@ -12,7 +12,7 @@ from shots import camera_of
 from viewsphere.composing.viewpoints.camera import distance_problem
 from viewsphere.composing.viewpoints.pose_numbers import pose_names
 from viewsphere.composing.viewpoints.poses import poses
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.planning.plan import plan
@@ -207,7 +207,7 @@ def test_a_tilt_rolls_the_camera_clockwise_seen_from_behind():
 
 
 def test_a_camera_inside_the_model_is_a_problem():
-    box = box_vertices(np.array([-1.0, -2.0, -0.5]), np.array([1.0, 2.0, 0.5]))
+    box = Box3d.between(np.array([-1.0, -2.0, -0.5]), np.array([1.0, 2.0, 0.5])).corners
 
     def problem(**values):
         return distance_problem(Viewpoint(**{"index": 7, "azimuth_deg": 0, "elevation_deg": 0, "distance": 1.5, **values}), box)
@@ -234,7 +234,7 @@ def views_of(names, viewpoints, **changes):
     """Of each model its viewpoints."""
     models = [{"source": "zoo:mug", "name": name, "category": "mug"} for name in names]
     planned = plan(Recipe(models=models, viewpoints=viewpoints, **changes))
-    boxes = lambda spec, step=None: box_vertices((-0.05, -0.05, 0), (0.05, 0.05, 0.1))  # noqa: E731
+    boxes = lambda spec, step=None: Box3d.between((-0.05, -0.05, 0), (0.05, 0.05, 0.1)).corners  # noqa: E731
     shots = {row.subject.removesuffix("_000"): planned.shot(row, boxes) for row in planned.rows}
     return {key: [now.viewpoint for now in shot.instants] for key, shot in shots.items()}
 

@@ -12,7 +12,7 @@ from viewsphere.assets.cache import load_normalised
 from viewsphere.composing.layouts import stable_turn, stable_ways
 from viewsphere.composing.placing.volume import apart
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import random_rotation, transform
 from viewsphere.planning.plan import plan
 
@@ -34,7 +34,7 @@ def test_a_side_that_separates_is_a_proof():
     rng, said = np.random.default_rng(3), set()
     for _ in range(60):
         a, b = (
-            transform(random_rotation(rng), box_vertices((-1, -0.6, -0.4), (1, 0.6, 0.4))) + rng.uniform(-1.3, 1.3, 3)
+            transform(random_rotation(rng), Box3d.between((-1, -0.6, -0.4), (1, 0.6, 0.4)).corners) + rng.uniform(-1.3, 1.3, 3)
             for _ in "ab"
         )
         gap = -depth(a, b)
@@ -106,7 +106,7 @@ def test_models_lie_in_a_scene():
     planned = plan(small_recipe(scenes=scenes, scene={"ground": True}, splits={"by": "frame"}))
 
     def box_of(model, step=None):
-        return box_vertices(*load_normalised(model).bounds)
+        return Box3d.between(*load_normalised(model).bounds).corners
 
     ups = []
     for row in planned.rows:

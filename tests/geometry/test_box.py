@@ -3,22 +3,14 @@ import pytest
 
 from lens_limits import lens_limit
 from quick import quick
-from viewsphere.geometry.box import (
-    EDGES,
-    FACES,
-    VERTEX_SIGNS,
-    box_size,
-    box_vertices,
-    clip_to_image,
-    is_behind,
-    overlap,
-    projected_bounds,
-)
+from viewsphere.geometry.box import clip_to_image, is_behind, overlap, projected_bounds
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, project
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.pose_category import SIDES, pose_category
 from viewsphere.model.camera import Camera, Intrinsics
 
+FACES, EDGES, VERTEX_SIGNS = (Box3d.layout()[name] for name in ("faces", "edges", "signs"))
 CUBE_TRIANGLES = np.array([(f[a], f[b], f[c]) for f in FACES.values() for a, b, c in ((0, 1, 2), (0, 2, 3))], np.int32)
 
 
@@ -33,14 +25,14 @@ def bounds_of(camera, vertices, triangles=CUBE_TRIANGLES):
 
 
 def test_vertices_and_faces_are_those_of_the_design():
-    v = box_vertices((-1, -2, -3), (4, 5, 6))
+    v = Box3d.between((-1, -2, -3), (4, 5, 6)).corners
     assert v[0].tolist() == [4, 5, -3]
     assert v[1].tolist() == [4, -2, -3]
     assert v[2].tolist() == [-1, -2, -3]
     assert v[3].tolist() == [-1, 5, -3]
     np.testing.assert_array_equal(v[4:, :2], v[:4, :2])
     assert np.all(v[4:, 2] == 6)
-    assert box_size(v) == (5, 9, 7)
+    assert Box3d(v).size == (5, 9, 7)
     sides = {
         "bottom": (2, -3),
         "top": (2, 6),
@@ -65,14 +57,14 @@ def test_faces_go_round_and_edges_are_the_twelve():
 
 
 def test_a_cube_seen_head_on():
-    bounds, whole = bounds_of(camera_at(), box_vertices((-0.5,) * 3, (0.5,) * 3))
+    bounds, whole = bounds_of(camera_at(), Box3d.between((-0.5,) * 3, (0.5,) * 3).corners)
     half = 0.5 / 3.5 * 500
     np.testing.assert_allclose(bounds, (320 - half, 240 - half, 320 + half, 240 + half), rtol=1e-14)
     assert whole
 
 
 def test_only_vertices_of_triangles_count():
-    vertices = np.vstack([box_vertices((-0.5,) * 3, (0.5,) * 3), [[100, 0, 0]]])
+    vertices = np.vstack([Box3d.between((-0.5,) * 3, (0.5,) * 3).corners, [[100, 0, 0]]])
     np.testing.assert_array_equal(bounds_of(camera_at(), vertices)[0], bounds_of(camera_at(), vertices[:8])[0])
 
 
@@ -88,7 +80,7 @@ def test_triangles_that_cross_the_camera_plane_are_cut():
 
 
 def test_what_is_behind_the_camera_has_no_box():
-    bounds, whole = bounds_of(camera_at(distance=-4.0), box_vertices((-0.5,) * 3, (0.5,) * 3))
+    bounds, whole = bounds_of(camera_at(distance=-4.0), Box3d.between((-0.5,) * 3, (0.5,) * 3).corners)
     assert bounds is None
     assert not whole
 
@@ -226,7 +218,7 @@ def test_what_surrounds_the_camera_fills_a_fisheye(limit_folds):
     lens = lens_parameters("fisheye", coefficients=(-0.04 if limit_folds else 0.0, 0.0, 0.0, 0.0))
     intrinsics = Intrinsics(width=640, height=640, fx=90.0, fy=90.0, cx=320.0, cy=320.0, distortion=lens)
     camera = Camera(intrinsics, np.eye(3), np.zeros(3))
-    bounds, whole = bounds_of(camera, box_vertices((-1.0,) * 3, (1.1,) * 3))
+    bounds, whole = bounds_of(camera, Box3d.between((-1.0,) * 3, (1.1,) * 3).corners)
     limit = lens_limit(lens)
     radius = 90 * (limit + lens.coefficients[0] * limit**3)
     assert not whole
@@ -269,7 +261,7 @@ def test_pose_categories_at_45_degrees(k):
 
 
 def test_pose_categories_name_the_side_that_is_seen():
-    v = box_vertices((-1, -1, -1), (1, 1, 1))
+    v = Box3d.between((-1, -1, -1), (1, 1, 1)).corners
     for azimuth in (0, 90, 180, 270):
         eye = orbit_center(np.radians(azimuth), 0.0, 10.0)
         nearest = min(FACES, key=lambda f: np.linalg.norm(v[list(FACES[f])].mean(0) - eye))
@@ -303,7 +295,7 @@ def test_a_box_is_behind_where_none_of_its_corners_is_in_front():
     for _ in range(200):
         camera = camera_at(rng.uniform(0, 360), rng.uniform(-80, 80), 2.0)
         low = rng.uniform(-6, 5, 3)
-        corners = box_vertices(low, low + rng.uniform(0.1, 3, 3))
+        corners = Box3d.between(low, low + rng.uniform(0.1, 3, 3)).corners
         depth = corners @ camera.R[2] + camera.t[2]
         behind = is_behind(camera, np.stack([corners.min(axis=0), corners.max(axis=0)]))
         assert behind == (depth.max() < 1e-6)

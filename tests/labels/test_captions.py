@@ -9,7 +9,7 @@ import pytest
 import viewsphere as vs
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import labels
 from viewsphere.labels.referring import Scene
 from viewsphere.labels.shared.captions.english import listed, number, plural, with_article
@@ -22,7 +22,7 @@ SIZE = (300, 300)
 
 def seen(id, category="chair", box=(0, 0, 30, 30), at=(0, 0, 0), half=0.5, distance=None, **more):
     """A visible object with a cube's 3D box around a place of the world."""
-    cube = box_vertices(np.subtract(at, half), np.add(at, half))
+    cube = Box3d.between(np.subtract(at, half), np.add(at, half)).corners
     area = int((box[2] - box[0]) * (box[3] - box[1]))
     view = SimpleNamespace(distance=distance or 10.0, azimuth_deg=0.0, elevation_deg=0.0)
     own = {"category": category, "category_id": 1, "visibility": 1.0, "truncation": 0.0, "area": area, "view": view}

@@ -11,7 +11,8 @@ import pytest
 from proven import close, equal
 from shots import still_shot
 from viewsphere.assets.mesh import Mesh
-from viewsphere.geometry.box import FACES, box_vertices, clip_to_image
+from viewsphere.geometry.box import clip_to_image
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
@@ -27,12 +28,12 @@ from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize
 
 HALVES = ((0, 1, 2), (0, 2, 3))
-TRIANGLES = np.array([[face[i] for i in half] for face in FACES.values() for half in HALVES], np.int32)
+TRIANGLES = np.array([[face[i] for i in half] for face in Box3d.numbered_faces().values() for half in HALVES], np.int32)
 LENS = Intrinsics(width=160, height=120, fx=125, fy=125, cx=80, cy=60)
 
 
 def block(low, high):
-    vertices = box_vertices(low, high).astype(np.float32)
+    vertices = Box3d.between(low, high).corners.astype(np.float32)
     normals = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
     zeros = np.zeros(len(TRIANGLES), np.int32)
     return Mesh(vertices, TRIANGLES, normals.astype(np.float32), zeros, zeros)
@@ -61,7 +62,7 @@ def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_de
     shot = still_shot(things, intrinsics, [pose], category_deg=category_deg, annotations=asked)
     geometry = build_geometry(things, meshes, ground, 0.01)
     visibility = rasterize(geometry, camera)
-    boxes = [box_vertices(*m.bounds) for m in meshes]
+    boxes = [Box3d.between(*m.bounds).corners for m in meshes]
     objects = annotated(context_of(shot, 0, camera, geometry, visibility, boxes, [f"MODELS/{s.key}.glb" for s in specs]))
     return objects, camera, geometry, visibility, pose
 
@@ -247,7 +248,7 @@ def test_boxes_of_what_crosses_the_camera_plane_are_exact(seed):
     model = block(low, (low[0] + rng.uniform(0.2, 1), rng.uniform(-3, 3), low[2] + rng.uniform(0.2, 1)))
     pose = Viewpoint(index=0, azimuth_deg=rng.uniform(-25, 25), elevation_deg=rng.uniform(-25, 25), distance=4)
     (found,), camera, geometry, *_ = scene([model], [at()], pose)
-    expected = cut_hull(geometry.vertices, [FACES[name] for name in FACES], camera)
+    expected = cut_hull(geometry.vertices, list(Box3d.numbered_faces().values()), camera)
     assert found.box2d_unclipped is None or expected == pytest.approx(found.box2d_projected)
     assert (expected is None) == (found.box2d_projected is None)
     if expected:

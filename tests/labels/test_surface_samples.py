@@ -14,7 +14,7 @@ from truth_scenes import LENSES, mesh_of
 from viewsphere import generate, plan
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels import annotated, channels, context_of, observe
@@ -41,7 +41,7 @@ def sampled(seed, lens_name, count=200, move=None, ground=False):
     view, neighbours = views.view(0, 0), views.neighbours(0, 0)
     rows = observe(view.geometry, camera, view.visibility, ["instances", "depth", "surface_samples"], neighbours, shot.labels)
     objects = [thing for thing in things if thing.id]
-    boxes = [box_vertices(*own[thing.model.key].bounds) for thing in objects]
+    boxes = [Box3d.between(*own[thing.model.key].bounds).corners for thing in objects]
     told = annotated(context_of(shot, 0, camera, view.geometry, view.visibility, boxes, ["m.obj"] * len(objects)))
     return Sample(0, "train", camera, None, told, rows, {}), view
 

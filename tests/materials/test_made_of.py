@@ -17,7 +17,7 @@ from viewsphere.assets.primitive import face_normals
 from viewsphere.assets.srgb import linear
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.materials import brick as brick_module
 from viewsphere.materials import metres, surface
 from viewsphere.materials.brick import Brick
@@ -149,7 +149,7 @@ def made_of(**fields):
     }
     views = {"azimuth": 30, "elevation": 20, "distance": 4}
     found = plan(recipe_of(scene=scene, **{"viewpoints": views, **fields})).shots(
-        lambda spec, step=None: box_vertices((-1, -1, 0), (1, 1, 1))
+        lambda spec, step=None: Box3d.between((-1, -1, 0), (1, 1, 1)).corners
     )
     shots = [Shot.model_validate_json(shot.model_dump_json()) for shot in found]
     return [(shot.scene.ground.material, shot.scene.ground.tile, shot.things[0].repaints[0].texture) for shot in shots]

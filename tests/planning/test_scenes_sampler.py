@@ -17,7 +17,7 @@ from viewsphere.check import check
 from viewsphere.composing.placing import footprint
 from viewsphere.composing.viewpoints.poses import SpherePoses
 from viewsphere.errors import PluginError, RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.shot import Shot
 from viewsphere.planning.extension import extend, whole
@@ -32,7 +32,7 @@ from viewsphere.store import Store
 def box_of(spec, step=None):
     """A box of its own for every model."""
     w, n, h = (0.2 + 0.05 * ((sum(spec.key.encode()) + i) % 7) for i in range(3))
-    return box_vertices((-w, -n, 0.0), (w, n, h))
+    return Box3d.between((-w, -n, 0.0), (w, n, h)).corners
 
 
 def recipe(count=12, models=9, **changes):

@@ -11,12 +11,12 @@ from small import small_recipe, still_channels
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.channel import PICTURES
 from viewsphere.model.sample import Sample
 from viewsphere.planning.plan import plan
 
-BOX = box_vertices((-0.1, -0.1, 0), (0.1, 0.1, 0.3))
+BOX = Box3d.between((-0.1, -0.1, 0), (0.1, 0.1, 0.3)).corners
 DARK = {"sun": {"elevation": 12, "strength": 1.0}, "effects": {"read_noise": 0.3}}
 BOTH = {"day": {"effects": {"read_noise": 0.3}}, "dark": DARK}
 LABELS = [name for name in still_channels() if name not in PICTURES]

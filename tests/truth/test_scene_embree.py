@@ -9,7 +9,7 @@ from test_embree import compare, embree, trace, turned
 from quick import quick
 from shots import still_shot
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import annotated, context_of, observe
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
@@ -110,7 +110,7 @@ def test_masks_boxes_and_visible_shares_of_a_whole_scene():
     hidden, cut, clear = 0, 0, 0
     for camera in cameras("pinhole", 8, 200, 150):
         shot = still_shot(things, camera.intrinsics)
-        boxes = [box_vertices(*m.bounds) for m in meshes[:3]]
+        boxes = [Box3d.between(*m.bounds).corners for m in meshes[:3]]
         found = annotated(context_of(shot, 0, camera, geometry, rasterize(geometry, camera), boxes, ["m"] * 3))
         assert [o.id for o in found] == [1, 2, 3]
         triangle, _ = trace(whole, camera)
@@ -145,7 +145,7 @@ def test_scenery_hides_and_is_not_labelled():
     spec = ModelSpec(key="m", source="m", category="thing", category_id=1)
     things = (Thing(id=1, model=spec), Thing(id=0, model=spec, scenery=True))
     shot = still_shot(things, camera.intrinsics)
-    boxes = [box_vertices(*cube().bounds)]
+    boxes = [Box3d.between(*cube().bounds).corners]
     (o,) = annotated(context_of(shot, 0, camera, geometry, rasterize(geometry, camera), boxes, ["m"]))
     assert (o.visibility, o.truncation) == (0.5, 0.0)
     assert o.box2d is not None and o.box2d[0] == 32

@@ -21,7 +21,7 @@ from viewsphere.check.failure import failure
 from viewsphere.codecs.png_tiff import decode_png
 from viewsphere.errors import UserError
 from viewsphere.files import open_text, read_bytes
-from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.diameter import diameter
 from viewsphere.scratch import temporary
 from viewsphere.store import Category, Dataset, ModelInfo
@@ -90,7 +90,7 @@ def _library(obj: Path, name: str) -> str | None:
 
 
 def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
-    box, materials = box_vertices(*mesh.bounds), tuple(material.name for material in mesh.materials)
+    box, materials = Box3d.between(*mesh.bounds).corners, tuple(material.name for material in mesh.materials)
     if info.materials not in ((), materials):
         yield f"expected the materials {', '.join(materials)} of the GLB, found {', '.join(info.materials)}"
     if info.body_parts != mesh.body_parts:
@@ -100,8 +100,8 @@ def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
         yield f"expected {len(mesh.triangles)} triangles, as the GLB has, found {info.triangles}"
     if not np.array_equal(info.box3d_object, box):
         yield "expected the 3D box of the GLB, found another"
-    if info.size != box_size(box):
-        yield f"expected size {box_size(box)} of the GLB, found {info.size}"
+    if info.size != Box3d(box).size:
+        yield f"expected size {Box3d(box).size} of the GLB, found {info.size}"
     if info.diameter is None:
         return
     if info.diameter != (across := diameter(mesh.corners)):

@@ -17,7 +17,7 @@ from viewsphere.composing.physics.packages import check_packages
 from viewsphere.composing.placing import Draws, Piece, Room, Shape, Way
 from viewsphere.composing.scene.scenery import composed
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import random_rotation, rigid, rotation_about
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
@@ -182,7 +182,7 @@ def _placer(layout: Layout, field: str) -> tuple[PlacerSpec, tuple[Any, ...]]:
 
 def _box(spec: ModelSpec) -> Float:
     vertices = _vertices(spec)
-    return box_vertices(vertices.min(axis=0), vertices.max(axis=0))
+    return Box3d.around(vertices).corners
 
 
 def _vertices(spec: ModelSpec) -> Float:

@@ -40,6 +40,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.refusals import known_views, lenses, pinhole
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -127,7 +128,7 @@ class Nyc3dCars(Tree):
 
     def _vehicle(self, sample: Sample, o: ObjectAnnotation) -> Iterator[Any]:
         assert o.box2d is not None
-        corners = transform(self._earth_from_world, o.box3d[:4])
+        corners = transform(self._earth_from_world, Box3d(o.box3d).faces["bottom"])
         middle = corners.mean(axis=0)
         latitude, longitude, _ = _globe(middle)
         front = transform(self._earth_from_world[:3, :3], -o.world_from_object[:3, 1])

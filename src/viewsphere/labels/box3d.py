@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewsphere.geometry.box import EDGES, FACES
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import rigid, transform
 from viewsphere.labels.shared.drawing.colors import color_of
@@ -75,17 +75,14 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Every object's box, its front face filled, in a darker tone of its colour."""
     for o in sample.objects:
         red, green, blue = (int(0.55 * c) for c in color_of(o.id))
-        corners = o.box3d_pixels * scale
-        points = {i: tuple(p) for i, p in enumerate(corners.tolist()) if np.isfinite(p).all()}
-        front = [points[i] for i in FACES["front"] if i in points]
-        if len(front) == 4:
-            pen.polygon(front, fill=(red, green, blue, 70))
-        for a, b in EDGES:
-            if a in points and b in points:
-                pen.line((points[a], points[b]), fill=(red, green, blue, 255), width=2)
+        box = Box3d(o.box3d_pixels * scale)
+        if np.isfinite(box.faces["front"]).all():
+            pen.polygon([(x, y) for x, y in box.faces["front"].tolist()], fill=(red, green, blue, 70))
+        for (x0, y0), (x1, y1) in (edge.tolist() for edge in box.edges if np.isfinite(edge).all()):
+            pen.line(((x0, y0), (x1, y1)), fill=(red, green, blue, 255), width=2)
 
 
-_EIGHT = "vertices, ordered as in `viewsphere.geometry.box`"
+_EIGHT = "vertices, ordered as in `viewsphere.geometry.box3d`"
 
 LABEL = ObjectLabel.from_placement(
     of,

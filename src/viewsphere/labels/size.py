@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from viewsphere.geometry.box import box_size
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels.shared.drawing.lines import notes
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
@@ -17,7 +17,7 @@ TOLERANCE = 1e-9
 
 def of(placement: Placement) -> Mapping[str, Any]:
     """The 3D box's extents, and the model's true size."""
-    return {"size": box_size(placement.box), "real_size": placement.facts.real_size}
+    return {"size": Box3d(placement.box).size, "real_size": placement.facts.real_size}
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels.shared.drawing.colors import color_of
@@ -116,7 +117,7 @@ def _in_picture(sample: Sample, rows: Array) -> Iterator[str]:
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """Every point that is seen, in its object's colour, with a short line along its normal."""
     rows, camera = sample.channels["surface_samples"], sample.camera
-    size = {o.id: float(np.sqrt(((o.box3d_object[4] - o.box3d_object[2]) ** 2).sum())) for o in sample.objects}
+    size = {o.id: float(np.sqrt((Box3d(o.box3d_object).diagonal ** 2).sum())) for o in sample.objects}
     length = np.array([0.04 * size.get(i, 0.0) for i in rows["object"].tolist()])
     ends, _ = project(camera.intrinsics, transform(camera.R, rows["point"] + length[:, None] * rows["normal"]) + camera.t)
     radius = max(1.0, scale * camera.width / 400)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import product, rotation_vector, transform
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.drawing.lines import in_space
@@ -36,7 +37,7 @@ def compute(context: LabelContext, i: int) -> Mapping[str, Any]:
     that of its surface does not.
     """
     placement = context.placement(i)
-    middle = (placement.box[2] + placement.box[4]) / 2
+    middle = Box3d(placement.box).center
     known = [(m.seconds, np.array(m.poses[i])) for m in map(context.get, AROUND) if m and m.poses[i]]
     if len(known) < 2:
         return dict.fromkeys(FIELDS)
@@ -75,7 +76,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     """A line from the middle of each object's box to where that is half a second later."""
     for o in sample.objects:
         if o.velocity is not None:
-            center = (o.box3d[2] + o.box3d[4]) / 2
+            center = Box3d(o.box3d).center
             in_space(pen, sample, scale, np.array([center, center + AHEAD * o.velocity]), color_of(o.id), 3)
 
 

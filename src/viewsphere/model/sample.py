@@ -65,7 +65,7 @@ class ObjectAnnotation:
     they do not meet; `box2d_unclipped` is the same box unclipped, None where the model reaches behind the
     camera (or out of a distorted lens' field of view). The 3D box is tight and object-aligned: (8, 3) in the object's, the
     world's and the camera's axes (metres) and (8, 2) in pixels, NaN where the lens does not show the
-    vertex, as behind the camera; vertex order and faces as in `viewsphere.geometry.box`. `visibility` is
+    vertex, as behind the camera; vertex order and faces as in `viewsphere.geometry.box3d`. `visibility` is
     visible pixels over all the pixels the object alone would cover, those outside the image included (BOP's
     visib_fract, on a canvas of three times the image's width and height); `truncation` is the share of all
     these pixels that lies outside the image.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError, ViewsphereError
-from viewsphere.geometry.box import EDGES, FACES, VERTEX_SIGNS
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import drawings, is_shown
 from viewsphere.report.facts import facts, finished
 from viewsphere.report.frames import frame_data
@@ -125,7 +125,7 @@ def conventions() -> dict[str, Any]:
     """Return the page's constants, equal for all data sets: colours of layers; vertices, edges and faces of boxes."""
     return {
         "keys": {drawing.name: drawing.key for drawing in drawings() if drawing.key},
-        "box": {"faces": FACES, "edges": EDGES, "signs": VERTEX_SIGNS},
+        "box": Box3d.layout(),
     }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.geometry.box import FACES
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import stand_in_for
 from viewsphere.model.camera import Camera
 from viewsphere.model.instant import Viewpoint
@@ -81,5 +81,5 @@ def _corners(o: ObjectAnnotation) -> list[list[float | None] | None]:
 def _faces_seen(o: ObjectAnnotation) -> list[str]:
     """Names of the box's faces that are turned towards the camera."""
     middle = o.box3d_camera.mean(axis=0)
-    centers = {name: o.box3d_camera[list(corners)].mean(axis=0) for name, corners in FACES.items()}
+    centers = {name: corners.mean(axis=0) for name, corners in Box3d(o.box3d_camera).faces.items()}
     return [name for name, center in centers.items() if float((center - middle) @ center) < 0]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from viewsphere.assets.mesh import Image, Material, Mesh
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.indoors import coverings, openings, walls
 from viewsphere_zoo.indoors.draws import flat, single
@@ -95,7 +95,7 @@ def draw(rng: np.random.Generator) -> Interior:
 
 def rooms(p: Interior) -> tuple[Float, ...]:
     """The air of its rooms and of the doors between them, each a box (8, 3), metres."""
-    inside = [box_vertices((*room.low, 0.0), (*room.high, p.height)) for room in p.rooms]
+    inside = [Box3d.between((*room.low, 0.0), (*room.high, p.height)).corners for room in p.rooms]
     return (*inside, *(_threshold(room, o) for room in p.rooms for o in room.openings if o.opens == "door"))
 
 
@@ -106,7 +106,7 @@ def _threshold(room: Room, o: Opening) -> Float:
     beyond = 0.1  # of the wall's thickness: rooms and doors overlap, so that no camera is between them
     ends = [(x + s * right - INNER * k * up, y + s * up + INNER * k * right) for s in o.span for k in (-beyond, 1 + beyond)]
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
-    return box_vertices((*low, o.foot), (*high, o.foot + o.height))
+    return Box3d.between((*low, o.foot), (*high, o.foot + o.height)).corners
 
 
 def _joinery(p: Interior) -> Joinery:

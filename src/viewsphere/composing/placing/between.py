@@ -11,6 +11,7 @@ from pydantic import Field
 
 from viewsphere.composing.placing import Draws, Room, Shape, draws_of, footprint, standing
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
@@ -57,7 +58,7 @@ def place(
     for slot, (spec, shape) in enumerate(zip(cast, shapes, strict=True)):
         draws = rng(str(slot), spec.key)
         most = drawn(options.aside, draws_of(rng, str(slot), spec.key))
-        size = (shape.box[4] - shape.box[2])[:2]
+        size = Box3d(shape.box).diagonal[:2]
         half = float(np.linalg.norm(size)) / 2
         for number in range(TRIES):
             side, turn = (2 * draws.random() - 1) * most * (width + half), 360 * draws.random()

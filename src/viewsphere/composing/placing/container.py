@@ -13,7 +13,7 @@ from viewsphere.composing.physics import Board, body_of
 from viewsphere.composing.placing import Draws, Piece, Room, Shape, Way, draws_of, footprint
 from viewsphere.composing.placing.shared.dropping import Drop, Ground, Matter, poses_of, ways_of
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.open_box import boards
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
@@ -63,7 +63,7 @@ def _fallen(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], rng:
         walls = [Board(at, (a / 2, b / 2, c / 2)) for at, (a, b, c) in boards(*size)]
         thick = walls[0].half[2] * 2
         inner = (width / 2 - thick, length / 2 - thick)
-        within = footprint(box_vertices((-inner[0], -inner[1], 0.0), (*inner, 0.0)), IDENTITY)
+        within = footprint(Box3d.between((-inner[0], -inner[1], 0.0), (*inner, 0.0)).corners, IDENTITY)
         under = [Board((0.0, 0.0, -thick), (width, length, thick))] if room.below else []
         ground = Ground((*walls, *under), within, height)
         return Drop(cast, room, shapes, rng, options, ground, within).rested()
@@ -76,7 +76,7 @@ def _size(shapes: Sequence[Shape], rng: Draws, options: Options) -> tuple[float,
     if options.size is not None:
         width, length, height = drawn(options.size, draws_of(rng))
         return width, height, length
-    volume = sum(math.prod(box_size(shape.box)) for shape in shapes) / ROOMY
+    volume = sum(math.prod(Box3d(shape.box).size) for shape in shapes) / ROOMY
     longest = max(shape.length for shape in shapes)
     wide = round(max((2.5 * volume) ** (1 / 3), 1.2 * longest), 3)
     return wide, round(0.5 * wide, 3), round(0.8 * wide, 3)

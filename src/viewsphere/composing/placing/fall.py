@@ -12,7 +12,7 @@ from pydantic import Field
 from viewsphere.composing.physics import Board
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, Way, draws_of, footprint
 from viewsphere.composing.placing.shared.dropping import Drop, Ground, Matter, poses_of, ways_of
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Length
@@ -69,7 +69,7 @@ def _region(room: Room, shapes: Sequence[Shape], rng: Draws, options: Options) -
         around = [*room.prints, *(footprint(shape.box, IDENTITY) for shape in shapes)]
         wide = long = math.sqrt(LOOSE * sum(float(4 * own.half.prod()) for own in around))
     if room.free is None:
-        return footprint(box_vertices((-wide / 2, -long / 2, 0.0), (wide / 2, long / 2, 0.0)), IDENTITY)
+        return footprint(Box3d.between((-wide / 2, -long / 2, 0.0), (wide / 2, long / 2, 0.0)).corners, IDENTITY)
     return Footprint(room.free.center, room.free.axes, np.minimum((wide / 2, long / 2), room.free.half))
 
 

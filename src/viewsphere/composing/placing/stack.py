@@ -17,7 +17,7 @@ from viewsphere.composing.placing import Draws, Room, Shape, draws_of, footprint
 from viewsphere.composing.placing.shared.dropping import MOST_OVERLAP, Matter, poses_of
 from viewsphere.composing.placing.shared.spot import Others, free_spot
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
@@ -130,7 +130,7 @@ def _tried(world: World, shapes: Sequence[Shape], slots: tuple[int, ...], own: n
     # Only piles of which nothing fell are of use: the way down of what did is not worth its time.
     calm = world.settle(ends=lambda: bool(fallen())) and world.deepest <= MOST_OVERLAP
     points = np.concatenate([transform(np.array(p), shapes[s].hull) for p, s in zip(world.poses, slots, strict=True)])
-    box = box_vertices(points.min(axis=0), points.max(axis=0))
+    box = Box3d.around(points).corners
     return _Pile(slots, world.poses, len(slots) - len(fallen()) if calm else 1, box)
 
 

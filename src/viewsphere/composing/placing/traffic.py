@@ -14,6 +14,7 @@ from viewsphere.composing.placing import Draws, Footprint, Room, Shape, draws_of
 from viewsphere.composing.placing.shared.crowd import Crowd
 from viewsphere.composing.scene.scenery import composed
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
@@ -134,7 +135,7 @@ def _clear(poses: Iterator[Matrix4], room: Room, shape: Shape, others: Crowd) ->
 def _in_bays(draws: np.random.Generator, bays: Sequence[Bay], shape: Shape) -> Iterator[Matrix4]:
     """Poses in the middles of bays that are large enough, headed as these are."""
     width, length = _size(shape)
-    x, y = (-(shape.box[4] + shape.box[2])[:2] / 2).tolist()
+    x, y = (-Box3d(shape.box).center[:2]).tolist()
     for i in draws.permutation(len(bays)).tolist():
         if width <= bays[i].size[0] + OVERHANG and length <= bays[i].size[1]:
             yield composed(bays[i].world_from_bay, standing(shape.box, x, y))
@@ -171,7 +172,7 @@ def _beside(half: float, width: float, bay: float) -> float:
 
 def _size(shape: Shape) -> tuple[float, float]:
     """Width and length."""
-    width, length = (shape.box[4] - shape.box[2])[:2].tolist()
+    width, length = Box3d(shape.box).diagonal[:2].tolist()
     return width, length
 
 

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from viewsphere.composing.placing import Draws, Room, Shape, draws_of
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_size
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import rigid, rotation_about, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
@@ -71,8 +71,8 @@ def _extent(shapes: Sequence[Shape], rng: Draws, options: Options) -> tuple[Floa
     height = drawn(options.height, draws_of(rng, "height"))
     if options.size is not None:
         return np.array(drawn(options.size, draws_of(rng, "size"))), height
-    volume = sum(math.prod(box_size(shape.box)) for shape in shapes) / ROOMY
-    longest = max(float(np.linalg.norm(shape.box[4] - shape.box[2])) for shape in shapes)
+    volume = sum(math.prod(Box3d(shape.box).size) for shape in shapes) / ROOMY
+    longest = max(float(np.linalg.normBox3d(shape.box).diagonal) for shape in shapes)
     return np.full(3, max(volume ** (1 / 3), 1.2 * longest)), height
 
 

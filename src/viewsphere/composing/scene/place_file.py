@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.paths.inside import split_source
 from viewsphere.assets.scene_annotations import FLOOR, INDOORS, LANE, SURFACE, Annotation, kind_of, naturally, own_name
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.hull import convex_hull, smallest_rectangle
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
@@ -62,7 +62,7 @@ class FileFloor:
     def box(self) -> Float:
         """Corners (8, 3) in its frame."""
         width, length = self.size
-        return box_vertices((-width / 2, -length / 2, 0.0), (width / 2, length / 2, 0.0))
+        return Box3d.between((-width / 2, -length / 2, 0.0), (width / 2, length / 2, 0.0)).corners
 
     def has(self, point: Vector) -> bool:
         """Return whether a point in the place's axes is on it."""

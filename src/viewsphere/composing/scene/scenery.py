@@ -20,7 +20,7 @@ from viewsphere.composing.scene.pictures import IMAGE_SUFFIXES, files_in, propor
 from viewsphere.composing.scene.place_file import FileOffers, offers_of
 from viewsphere.composing.seeds import Names, generator, scene_generators, share
 from viewsphere.errors import ModelError, RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Bay, Lane, Place, Surface, Traffic
@@ -219,7 +219,7 @@ def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footpr
     if rectangle is None:
         return None
     x0, y0, x1, y1 = rectangle
-    return footprint(box_vertices((x0, y0, 0.0), (x1, y1, 0.0)), _turned(recipe, entry, names))
+    return footprint(Box3d.between((x0, y0, 0.0), (x1, y1, 0.0)).corners, _turned(recipe, entry, names))
 
 
 def _floor_of_file(recipe: Recipe, entry: PlaceEntry, names: Names) -> Footprint | None:
@@ -335,7 +335,7 @@ def plane_pieces(
             rng = generator(recipe.seed, "plane", *purpose)
             path = images[i][int(rng.integers(len(images[i])))]
             half = entry.height * proportions(path) / 2
-            box = box_vertices((-half, 0.0, 0.0), (half, 0.0, entry.height))
+            box = Box3d.between((-half, 0.0, 0.0), (half, 0.0, entry.height)).corners
             move = _plane_spot(f"scene.planes[{i}]", entry, rng, box, standing_there)
             standing_there.append(footprint(box, move))
             yield SceneryPiece(plane_spec(recipe, entry, path, category_id), move, entry.labels)

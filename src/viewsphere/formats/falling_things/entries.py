@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.box import box_size
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid, transform
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import ObjectAnnotation
 from viewsphere.store import ModelInfo
 
 CM = 100.0
-CUBOID = (6, 5, 1, 2, 7, 4, 0, 3)
-"""Our vertices of a box in FAT's order."""
+CUBOID = ((-1, -1, 1), (1, -1, 1), (1, -1, -1), (-1, -1, -1), (-1, 1, 1), (1, 1, 1), (1, 1, -1), (-1, 1, -1))
+"""The sides of a box's corners in FAT's order."""
 
 OBJECT_FROM_FAT = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
 """FAT's x is the object's right, our -x; its y is down, our -z; its z is ahead, our -y."""
@@ -54,7 +54,7 @@ def annotation(o: ObjectAnnotation, k: NDArray[np.float64], matrix: str) -> dict
     center = o.box3d_object.mean(axis=0)
     pose = compose(o.camera_from_object, rigid(OBJECT_FROM_FAT, center))
     pose[:3, 3] *= CM
-    middle, corners, box = pose[:3, 3], o.box3d_camera[list(CUBOID)] * CM, box_of(o)
+    middle, corners, box = pose[:3, 3], Box3d(o.box3d_camera).at(CUBOID) * CM, box_of(o)
     assert box is not None
     inside = 1 - o.truncation
     return {
@@ -91,7 +91,7 @@ def lens_settings(name: str, lens: Intrinsics) -> dict[str, Any]:
 
 def model_settings(info: ModelInfo, name: str, number: int) -> dict[str, Any]:
     """A class of _object_settings.json, and its number."""
-    width, height, length = box_size(info.box3d_object)
+    width, height, length = Box3d(info.box3d_object).size
     turn = OBJECT_FROM_FAT.T * CM
     fixed = rigid(turn, -transform(turn, info.box3d_object.mean(axis=0)))
     return {

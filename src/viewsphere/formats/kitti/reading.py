@@ -27,7 +27,7 @@ from viewsphere.formats.shared.reading.image_lists import (
 )
 from viewsphere.formats.shared.reading.placed_objects import placed
 from viewsphere.formats.shared.reading.posed_pictures import picture_inside
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import rigid
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -240,4 +240,4 @@ def _standing(solid: tuple[float, ...], camera: Camera | None) -> dict[str, Any]
     c, s = np.cos(turn), np.sin(turn)
     world_from_object = rigid([[s, -c, 0], [c, s, 0], [0, 0, 1]], [x, z, height / 2 - y])
     camera_from_world = rigid(LEVEL, np.zeros(3)) if camera is None else rigid(camera.R, camera.t)
-    return placed(box_vertices(-half, half), world_from_object, camera_from_world, camera and camera.intrinsics)
+    return placed(Box3d.between(-half, half).corners, world_from_object, camera_from_world, camera and camera.intrinsics)

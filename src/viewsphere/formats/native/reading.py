@@ -18,7 +18,7 @@ from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
-from viewsphere.geometry.box import box_size
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.lenses import read_parameters
 from viewsphere.geometry.mask import encode_rle, mask_box, mask_polygons
 from viewsphere.labels import channels
@@ -159,7 +159,7 @@ def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) ->
         obj=file.name,
         glb=glb.name if glb.is_file() else file.name,
         box3d_object=box,
-        size=box_size(box),
+        size=Box3d(box).size,
         real_size=(_number(width), _number(height), _number(length)) if width and height and length else None,
         parts=(),
         triangles=0,

@@ -10,6 +10,7 @@ import numpy as np
 from viewsphere.formats.nuscenes.names import category_of, token
 from viewsphere.formats.nuscenes.story import neighbours
 from viewsphere.formats.shared.mounting import CAMERA_FROM_LIDAR, Float, centred, mounted, unmoved
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, product, quaternion_from_matrix
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.rig import Rig
@@ -70,7 +71,7 @@ def box(o: ObjectAnnotation) -> Record:
     """The middle, the size and the rotation of an object's box in the world."""
     width, height, length = o.size
     turn = product(o.world_from_object[:3, :3], OBJECT_FROM_BOX)
-    middle = (o.box3d[2] + o.box3d[4]) / 2
+    middle = Box3d(o.box3d).center
     return {
         "translation": middle.tolist(),
         "size": [width, length, height],

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.formats.vkitti.names import Names, object_colors
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import product
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -73,12 +74,12 @@ def stand(axes: Float, bottom: Float) -> Stand:
 
 def in_camera(o: ObjectAnnotation) -> Stand:
     """Return the position and rotation of an object in the camera's axes."""
-    return stand(o.camera_from_object[:3, :3], o.box3d_camera[:4])
+    return stand(o.camera_from_object[:3, :3], Box3d(o.box3d_camera).faces["bottom"])
 
 
 def in_world(o: ObjectAnnotation) -> Stand:
     """Return the position and rotation of an object in the world whose y points down."""
-    return stand(product(OURS.T, o.world_from_object[:3, :3]), product(o.box3d[:4], OURS))
+    return stand(product(OURS.T, o.world_from_object[:3, :3]), product(Box3d(o.box3d).faces["bottom"], OURS))
 
 
 def alpha(where: Stand) -> float:

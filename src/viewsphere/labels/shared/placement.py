@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.appearance import Appearance
 from viewsphere.model.camera import Camera
@@ -129,7 +130,7 @@ class Placement:
     @cached_property
     def view(self) -> ObjectView:
         """The camera as the object sees it, around the centre of its box."""
-        return view_of(self.camera_from_object, (self.box[2] + self.box[4]) / 2)
+        return view_of(self.camera_from_object, Box3d(self.box).center)
 
 
 def view_of(camera_from_object: Float, center: Float) -> ObjectView:

@@ -17,7 +17,7 @@ from viewsphere.assets.exporting.export import export_deforming, export_glb, exp
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError, each
 from viewsphere.files import read_bytes
-from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import ShotAppearance, labels, requires
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
@@ -146,7 +146,7 @@ class Models:
 
     def _info(self, spec: ModelSpec, mesh: Mesh, step: TimeStep | None = None) -> ModelInfo:
         """Return the metadata of a model, or of one of its time steps."""
-        frame, box, metadata = step and step.frame, box_vertices(*mesh.bounds), self.stages.metadata(spec, step)
+        frame, box, metadata = step and step.frame, Box3d.between(*mesh.bounds).corners, self.stages.metadata(spec, step)
         obj, glb = model_files(spec.key, frame)
         return ModelInfo(
             key=spec.key_at(frame),
@@ -156,7 +156,7 @@ class Models:
             obj=obj,
             glb=glb,
             box3d_object=box,
-            size=box_size(box),
+            size=Box3d(box).size,
             real_size=self.stages.real_size(spec, step),
             parts=mesh.parts,
             triangles=len(mesh.triangles),

@@ -20,7 +20,7 @@ from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.errors import UserError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.kernels import entries
 from viewsphere.kernels.digests import package_digest
 from viewsphere.kernels.garbage import pause_collection
@@ -84,7 +84,7 @@ def precompile_for(recipe: Recipe, tell: Told) -> None:
 
 def sketched(recipe: Recipe) -> Shot:
     """The first shot of a recipe as if all models were a metre large: it calls the same kernels, and no model is read."""
-    return next(iter(prepare(recipe).shots(lambda key, step=None: box_vertices((-0.5,) * 3, (0.5,) * 3))))
+    return next(iter(prepare(recipe).shots(lambda key, step=None: Box3d.between((-0.5,) * 3, (0.5,) * 3).corners)))
 
 
 def told_to(listener: Listener) -> Told:
@@ -266,7 +266,7 @@ def _render(shot: Shot) -> None:
         return card
 
     stage = engine.staged(shot, load)
-    boxes = [box_vertices(*card.bounds)] * len(shot.objects)
+    boxes = [Box3d.between(*card.bounds).corners] * len(shot.objects)
     views = ShotViews(shot, stage.at, lambda thing: card)
     for number in shot.samples:
         sample = render_sample(views, number, stage, boxes, [None] * len(boxes), [lambda: ModelMetadata(1.0)] * len(boxes))

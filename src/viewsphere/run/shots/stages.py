@@ -18,7 +18,7 @@ from viewsphere.assets.metadata.model_metadata import metadata_of, with_body_par
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
-from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import FollowedPoints, annotated, context_of, labels, observe, requires, sample_values
 from viewsphere.model.channel import PASSES
 from viewsphere.model.metadata import ModelMetadata
@@ -86,7 +86,7 @@ class Stages:
         if known:
             return known
         if name not in self._boxes:
-            self._boxes[name] = box_vertices(*mesh.bounds)
+            self._boxes[name] = Box3d.between(*mesh.bounds).corners
         held = sum(map(_size, self._models.values()))
         while held > WARM_BYTES and len(self._models) > 1:
             held -= _size(self._models.pop(next(iter(self._models))))
@@ -124,7 +124,7 @@ class Stages:
             return spec.real_size
         name = _name(spec, step)
         if name not in self._sizes:
-            self._sizes[name] = box_size(self.box(spec.model_copy(update={"scale": "as_is"}), step))
+            self._sizes[name] = Box3d(self.box(spec.model_copy(update={"scale": "as_is"}), step)).size
         return self._sizes[name]
 
     def read_ahead(self, planned: Plan, specs: Sequence[ModelSpec]) -> None:

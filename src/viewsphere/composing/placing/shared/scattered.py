@@ -14,6 +14,7 @@ from viewsphere.composing.placing import Draws, Footprint, Room, Shape, footprin
 from viewsphere.composing.placing.shared.crowd import TakenMap, inner_class
 from viewsphere.composing.placing.shared.spot import Cover, Others
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.hull import convex_hull
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
@@ -70,7 +71,7 @@ def scattered(
 
 def _check_size(spec: ModelSpec, shape: Shape, floor: Footprint | None, field: str) -> None:
     """Raise RecipeError for a model that is larger than the floor, however it is turned."""
-    size = (shape.box[4] - shape.box[2])[:2]
+    size = Box3d(shape.box).diagonal[:2]
     if floor is None or (size.min() <= 2 * floor.half.min() and size.max() <= 2 * np.linalg.norm(floor.half)):
         return
     (width, length), (across, along) = size.tolist(), (2 * floor.half).tolist()
@@ -84,7 +85,7 @@ def _reach(floor: Footprint | None, room: Room, shapes: Sequence[Shape]) -> floa
     """Metres from the middle to the farthest spot: the end of the floor, or, where that is nearer, twice the side of a square
     that holds the models however they are turned.
     """
-    widths = [float(np.linalg.norm((shape.box[4] - shape.box[2])[:2])) + room.gap for shape in shapes]
+    widths = [float(np.linalg.norm(Box3d(shape.box).diagonal[:2])) + room.gap for shape in shapes]
     heap = 2 * float(np.linalg.norm(widths))
     if floor is not None:
         return float(np.abs(floor.corners).max())

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import MissingExtraError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
 
 Float = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Shape:
             vertices, triangles = surface() if surface else (self.vertices(), np.zeros((0, 3), np.int32))
             return transform(rotation, vertices), triangles
 
-        return Shape(box_vertices(points.min(axis=0), points.max(axis=0)), lambda: points, turned_surface)
+        return Shape(Box3d.around(points).corners, lambda: points, turned_surface)
 
     @property
     def length(self) -> float:

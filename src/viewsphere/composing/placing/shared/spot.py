@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.composing.placing.shared.crowd import Crowd, TakenMap
 from viewsphere.composing.placing.shared.footprint import Footprint, Outline, standing
 from viewsphere.composing.placing.shared.room import Room
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 TRIES = 2000
@@ -76,7 +77,7 @@ def _radii(room: Room, box: Float, others: Others) -> Float:
     """Radii of the circle that grows, one for each try: boxes are no nearer than the first; a hull is somewhere in its box."""
     if not others.crowd.covers:
         return np.zeros(TRIES)
-    narrowest, first = float((box[4] - box[2])[:2].min() / 2), others.crowd.covers[0]
+    narrowest, first = float(Box3d(box).diagonal[:2].min() / 2), others.crowd.covers[0]
     start = room.gap + (narrowest / 4 if isinstance(first, Outline) else float(first.half.min()) + narrowest)
     radii = np.multiply.accumulate(np.array([start, *[1 + GROWTH] * (TRIES - 1)]))
     if room.free is not None:

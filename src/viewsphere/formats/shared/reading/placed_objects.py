@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.box import box_size
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, transform
@@ -29,7 +29,7 @@ def placed(box: Float, world_from_object: Float, camera_from_world: Float, lens:
     if lens is not None:
         with np.errstate(over="ignore"):
             pixels, _ = project(lens, in_camera)
-    view = view_of(camera_from_object, np.nan_to_num((box[2] + box[4]) / 2))
+    view = view_of(camera_from_object, np.nan_to_num(Box3d(box).center))
     return {
         "box3d_object": box,
         "box3d": transform(world_from_object, box),
@@ -41,5 +41,5 @@ def placed(box: Float, world_from_object: Float, camera_from_world: Float, lens:
         "quaternion": quaternion_from_matrix(camera_from_object[:3, :3]),
         "view": view,
         "pose_category": pose_category(view.azimuth_deg, view.elevation_deg),
-        "size": box_size(box),
+        "size": Box3d(box).size,
     }

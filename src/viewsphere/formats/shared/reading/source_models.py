@@ -11,7 +11,7 @@ import numpy as np
 
 from viewsphere.assets.exporting.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
-from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.store import Category, ModelInfo
 from viewsphere.store.foreign import ForeignModel
 
@@ -19,7 +19,7 @@ from viewsphere.store.foreign import ForeignModel
 def foreign_model(mesh: Mesh, key: str, category: Category, **said: Any) -> ForeignModel:
     """A model of a category in its object's axes, metres, with what else the data set has `said` of it, such as `keypoints`."""
     vertices = mesh.vertices.astype(np.float64)
-    box, digest = box_vertices(vertices.min(axis=0), vertices.max(axis=0)), hashlib.sha256(repr(said).encode())
+    box, digest = Box3d.around(vertices).corners, hashlib.sha256(repr(said).encode())
     for array in (mesh.vertices, mesh.triangles):
         digest.update(array.tobytes())
     info = ModelInfo(
@@ -30,7 +30,7 @@ def foreign_model(mesh: Mesh, key: str, category: Category, **said: Any) -> Fore
         obj=f"{key}.obj",
         glb=f"{key}.glb",
         box3d_object=box,
-        size=box_size(box),
+        size=Box3d(box).size,
         real_size=None,
         parts=mesh.parts,
         triangles=len(mesh.triangles),

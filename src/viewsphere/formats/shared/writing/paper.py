@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.geometry.box import FACES
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.camera import Camera
 from viewsphere.store import ModelInfo
 
@@ -28,8 +28,8 @@ def json_bytes(value: Any) -> bytes:
 def faces(points: NDArray[np.float64]) -> dict[str, dict[str, list[float] | None]]:
     """A box's vertices (8, n) as {face: {vertex: [coordinates]}}, None for a vertex that is NaN."""
     values = [None if math.isnan(p[0]) else p for p in points.tolist()]
-    named = zip(("ground", *list(FACES)[1:]), FACES.values(), strict=True)
-    return {name: {str(v): values[v] for v in face} for name, face in named}
+    named = Box3d.numbered_faces().items()
+    return {"ground" if name == "bottom" else name: {str(v): values[v] for v in face} for name, face in named}
 
 
 def vehicles(models: Iterable[ModelInfo]) -> dict[str, dict[str, Any]]:

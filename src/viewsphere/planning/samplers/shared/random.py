@@ -17,7 +17,7 @@ from viewsphere.composing.redraws import SAME_MODELS, fewer, least_objects, redr
 from viewsphere.composing.scene.scenery import draw_names, place_surfaces, scenery_key
 from viewsphere.composing.seeds import generator, share, shares
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Surface
@@ -122,7 +122,8 @@ def _laid(root: SamplingContext, redraw: int, subject: str, pose: str | None, bo
         free = None if context.composition is None else context.composition.free_floor(subject, pose, redraw)
     else:
         free = footprint(
-            box_vertices((-stand.size[0] / 2, -stand.size[1] / 2, 0), (stand.size[0] / 2, stand.size[1] / 2, 0)), IDENTITY
+            Box3d.between((-stand.size[0] / 2, -stand.size[1] / 2, 0), (stand.size[0] / 2, stand.size[1] / 2, 0)).corners,
+            IDENTITY,
         )
     world_from_room = IDENTITY if stand is None else stand.world_from_surface
     built = None if context.composition is None else context.composition.built(subject, pose, redraw, world_from_room)
