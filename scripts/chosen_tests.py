@@ -147,12 +147,13 @@ class Modules:
 
     def _implied(self) -> dict[str, set[str]]:
         """By the module that loads them: the plug-ins that a recipe means without naming them, and the program for Blender."""
-        samplers, readers, lights, worker = (
+        samplers, readers, lights, lenses, worker = (
             {module for module in self.all if module.startswith(f"{package}.")}
             for package in (
                 SEAMS["samplers"].package,
                 SEAMS["readers"].package,
                 SEAMS["lights"].package,
+                SEAMS["lenses"].package,
                 "viewsphere.blender.worker",
             )
         )
@@ -163,6 +164,7 @@ class Modules:
             "viewsphere.planning.plan": samplers,
             "viewsphere.assets.readers": readers,
             "viewsphere.recipe.lights": lights,
+            "viewsphere.geometry.lenses": lenses,
             "viewsphere.planning.checks.models": defaults,
             "viewsphere.run.shots.stages": defaults,
             "viewsphere.blender.process": worker,

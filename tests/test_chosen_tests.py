@@ -29,7 +29,7 @@ def chosen():
     [
         # imports, through other modules; a plug-in by its name; one of the labels that the small recipe lists
         ("src/viewsphere/geometry/box.py", ["tests/geometry/test_box.py", "tests/formats/test_coco.py"],
-         ["tests/geometry/test_curve.py"]),
+         ["tests/geometry/test_hull.py"]),
         ("src/viewsphere/formats/tum/reading.py", ["tests/formats/test_tum.py"],
          ["tests/formats/test_coco.py", "tests/zoo/test_chair.py"]),
         ("src/viewsphere_zoo/families/boat.py", ["tests/zoo/test_boat.py"],
