@@ -64,16 +64,16 @@ def check(
     Raises MissingExtraError for `rays` True without embreex, and, before any work, for `against_cycles` without Blender.
     """
     compared = Compared(dataset) if against_cycles else None
-    found, is_readable = _of_store(dataset)
+    report_of_store, is_readable = _of_store(dataset)
     if not is_readable:
-        return replace(found, not_run={"all other proofs": "the records of models cannot be read"})
+        return replace(report_of_store, not_run={"all other proofs": "the records of models cannot be read"})
     if fast:
-        return joined([found, _of_digests(dataset)])
+        return joined([report_of_store, _of_digests(dataset)])
     positions = _spread(range(len(dataset)), frames)
     chosen = _chosen(dataset, positions, sample, repaint, rays)
     is_whole, names = len(positions) == len(dataset), exports(dataset)
     recomputed = Recomputed(dataset)
-    reports = [found, _of_models(dataset), _of_recipes(dataset, recomputed, sample)]
+    reports = [report_of_store, _of_models(dataset), _of_recipes(dataset, recomputed, sample)]
     reports += _reports(dataset, positions, chosen, names if is_whole else (), workers, recomputed)
     if compared is not None:
         reports.append(_by_cycles(compared, dataset, _spread(positions, against_cycles)))

@@ -111,8 +111,8 @@ def near(kept: NDArray[np.int32], seen: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Return whether a pixel of `kept` (H, W), or one of the eight around it, is what is seen there (H, W)."""
     padded = np.pad(kept, 1, mode="edge")
     height, width = kept.shape
-    found = np.zeros(kept.shape, np.bool_)
+    mask = np.zeros(kept.shape, np.bool_)
     for dy in range(3):
         for dx in range(3):
-            found |= padded[dy : dy + height, dx : dx + width] == seen
-    return found
+            mask |= padded[dy : dy + height, dx : dx + width] == seen
+    return mask

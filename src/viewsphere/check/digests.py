@@ -13,14 +13,14 @@ from viewsphere.store.shots.manifest import Manifest
 
 def damaged(dataset: Dataset) -> tuple[int, dict[Path, list[str]]]:
     """Return the number of files in the manifests of finished shots and models, and the errors of each damaged folder."""
-    folders, found = _folders(dataset), dict[Path, list[str]]()
+    folders, damages = _folders(dataset), dict[Path, list[str]]()
     with ThreadPoolExecutor(AT_ONCE) as pool:
         counts = 0
         for folder, (count, messages) in zip(folders, pool.map(_damage, folders), strict=True):
             counts += count
             if messages:
-                found[folder] = messages
-    return counts, found
+                damages[folder] = messages
+    return counts, damages
 
 
 def _damage(folder: Path) -> tuple[int, list[str]]:

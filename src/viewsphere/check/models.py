@@ -84,9 +84,9 @@ def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]
 def _library(obj: Path, name: str) -> str | None:
     """The file of materials that a time step's OBJ names, without its suffix: the model's or a step's; None for any other."""
     with open_text(obj) as file:
-        found = re.fullmatch(r"mtllib (.+)\.mtl\n", next(islice(file, 1, None), ""))
+        match = re.fullmatch(r"mtllib (.+)\.mtl\n", next(islice(file, 1, None), ""))
     known = re.compile(rf"{re.escape(name)}(-f-?\d+)?")
-    return found[1] if found and known.fullmatch(found[1]) else None
+    return match[1] if match and known.fullmatch(match[1]) else None
 
 
 def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
@@ -94,8 +94,8 @@ def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
     if info.materials not in ((), materials):
         yield f"expected the materials {', '.join(materials)} of the GLB, found {', '.join(info.materials)}"
     if info.body_parts != mesh.body_parts:
-        found = ", ".join(info.body_parts) or "none"
-        yield f"expected the parts of a body {', '.join(mesh.body_parts) or 'none'}, as the GLB has, found {found}"
+        parts = ", ".join(info.body_parts) or "none"
+        yield f"expected the parts of a body {', '.join(mesh.body_parts) or 'none'}, as the GLB has, found {parts}"
     if info.triangles != len(mesh.triangles):
         yield f"expected {len(mesh.triangles)} triangles, as the GLB has, found {info.triangles}"
     if not np.array_equal(info.box3d_object, box):

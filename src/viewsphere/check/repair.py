@@ -64,11 +64,11 @@ class _Mending:
         """Keys of models that were changed, are missing, or contradict one another or their source."""
         plan, store = self._dataset.plan, self._dataset.store
         folders = damaged(self._dataset)[1]
-        found = {key for key in plan.models if store.model_folder(key) in folders}.union(lacking_models(self._dataset))
-        if not found:
-            found.update(key for key, _ in differing(self._dataset, []))
-            found.update(key for key, _ in Sources(self._dataset, Recomputed(self._dataset)).contradictions(plan.models))
-        return (key for key in plan.models if key in found)
+        keys = {key for key in plan.models if store.model_folder(key) in folders}.union(lacking_models(self._dataset))
+        if not keys:
+            keys.update(key for key, _ in differing(self._dataset, []))
+            keys.update(key for key, _ in Sources(self._dataset, Recomputed(self._dataset)).contradictions(plan.models))
+        return (key for key in plan.models if key in keys)
 
     def damaged_shots(self) -> Iterator[str]:
         """Keys of shots that are not as they were written, or are missing."""

@@ -115,12 +115,12 @@ def status(folder: DataFolder, json_: AsJson = False) -> None:
     """
     from viewsphere.run.status import status as found_in
 
-    found = found_in(folder)
+    progress = found_in(folder)
     if json_:
-        print_json(found.to_json())
+        print_json(progress.to_json())
     else:
-        print_status(found)
-    if not found.complete:
+        print_status(progress)
+    if not progress.complete:
         raise typer.Exit(3)
 
 
@@ -237,8 +237,8 @@ def _proof(dataset: Dataset, frames: int) -> Proof:
     from viewsphere.check import check as prove
     from viewsphere.report import Proof
 
-    found = prove(dataset, frames=frames)
-    return Proof(found.ok, found.checked, tuple(map(str, found.findings)), found.notes, found.verdict, found.not_run)
+    report = prove(dataset, frames=frames)
+    return Proof(report.ok, report.checked, tuple(map(str, report.findings)), report.notes, report.verdict, report.not_run)
 
 
 def _frames_asked(text: str | None) -> int | None:

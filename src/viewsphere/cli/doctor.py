@@ -51,11 +51,11 @@ def doctor(
         if name not in downloads:
             raise UserError(f"--setup: {one_of(name, tuple(downloads))}")
         downloads[name].fetch(lambda line: say(line, err=True))
-    found = examine()
+    facts = examine()
     if json_:
-        print_json(found)
+        print_json(facts)
         return
-    for name, value in _lines(found):
+    for name, value in _lines(facts):
         say(f"{name:{LEFT}} {value}")
 
 
@@ -128,13 +128,13 @@ def _speed() -> dict[str, Any] | None:
 
 def _extras() -> dict[str, list[str]]:
     """Packages of each extra of this installation, except Blender's, which may lie in another interpreter."""
-    found: dict[str, list[str]] = {}
+    extras: dict[str, list[str]] = {}
     for requirement in requires("viewsphere") or ():
         extra = re.search(r"""extra == ['"]([\w-]+)['"]""", requirement)
         package = re.match(r"[\w.-]+", requirement)
         if extra and package and extra[1] != "blender":
-            found.setdefault(extra[1], []).append(package[0])
-    return found
+            extras.setdefault(extra[1], []).append(package[0])
+    return extras
 
 
 def _extra(name: str, packages: list[str]) -> dict[str, Any]:

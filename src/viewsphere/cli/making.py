@@ -103,19 +103,19 @@ def _new_start(folder: Path, kind: str) -> None:
         raise UserError(f"--kind: {one_of(kind, kinds())}")
     file = folder if folder.suffix in {".yaml", ".yml"} else folder / "recipe.yaml"
     models = _models_in(file.parent)
-    found = {file if name == "recipe.yaml" else file.parent / name: text for name, text in start(kind).items()}
+    files = {file if name == "recipe.yaml" else file.parent / name: text for name, text in start(kind).items()}
     if models:
-        found[file] = with_models(found[file], file.parent.absolute().name, models)
-    for path in found:
+        files[file] = with_models(files[file], file.parent.absolute().name, models)
+    for path in files:
         if path.exists():
             raise UserError(f"{path}: expected a new file, found one that exists: choose another folder")
     with ExitStack() as undo:
-        for path, text in found.items():
+        for path, text in files.items():
             write_whole(path, text.encode())
             undo.callback(path.unlink)
         undo.pop_all()
     of = f" of {quantity(sum(one.number for one in models), 'model file')}" if models else ""
-    say(f"wrote {' and '.join(map(str, found))}{of}; next: viewsphere preview {file}")
+    say(f"wrote {' and '.join(map(str, files))}{of}; next: viewsphere preview {file}")
 
 
 def _models_in(folder: Path) -> tuple[FoundFiles, ...]:

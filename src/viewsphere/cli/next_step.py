@@ -28,7 +28,7 @@ def for_command(name: str) -> str:
     """A message of the arguments that a command expects, with an example made of files found here."""
     data = _near("*/store/plan.json", "store/plan.json")
     folder = data[0].parent.parent if data else Path("cars-ds")
-    found = f"found {folder} here" if data else "no data set yet? `viewsphere render` makes one"
+    advice = f"found {folder} here" if data else "no data set yet? `viewsphere render` makes one"
     match name:
         case "new":
             return "new: expected a folder for the recipe; found none\nit need not exist; next: viewsphere new cars"
@@ -50,9 +50,9 @@ def for_command(name: str) -> str:
             need = "convert: expected a folder, --from and --to; found none"
             return f"{need}\nnext: viewsphere convert my-photos --from coco --to yolo -o photos"
         case "export":
-            return f"export: expected a data set and --format; found none\n{found}; next: viewsphere export {folder} -f coco"
+            return f"export: expected a data set and --format; found none\n{advice}; next: viewsphere export {folder} -f coco"
         case _:
-            return f"{name}: expected a data set; found none\n{found}; next: viewsphere {name} {folder}"
+            return f"{name}: expected a data set; found none\n{advice}; next: viewsphere {name} {folder}"
 
 
 def _models() -> tuple[str, ...]:

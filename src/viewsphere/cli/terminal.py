@@ -123,8 +123,8 @@ def print_report(report: Report, repaired: Sequence[str] = ()) -> None:
         say(f"repaired: {line}")
     failed = Counter(finding.check for finding in report.findings)
     for name, count in report.checked.items():
-        found = quantity(failed[name], "finding") if failed[name] else "ok"
-        say(f"{name:17} {found:14} {count:,} checked")
+        outcome = quantity(failed[name], "finding") if failed[name] else "ok"
+        say(f"{name:17} {outcome:14} {count:,} checked")
     for name, reason in report.not_run.items():
         say(f"not run: {name}: {reason}")
     for note in report.notes:

@@ -31,8 +31,8 @@ class Sweep(Frozen):
         if any(a >= b for a, b in zip(self.moments, self.moments[1:], strict=False)):
             raise ValueError(f"expected moments that increase; found {self.moments}")
         if not self.motion.lasts(count):
-            found = f"{len(self.motion.poses)} and {len(self.motion.steps)}"
-            raise ValueError(f"expected one pose and one time step, or one a moment ({count}); found {found}")
+            counts = f"{len(self.motion.poses)} and {len(self.motion.steps)}"
+            raise ValueError(f"expected one pose and one time step, or one a moment ({count}); found {counts}")
         return self
 
     def pose(self, moment: float) -> Matrix4 | None:

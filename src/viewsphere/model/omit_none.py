@@ -14,8 +14,8 @@ class OmitNone(Frozen):
 
     @model_serializer(mode="wrap")
     def _without_unsaid(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        found: dict[str, Any] = handler(self)
+        plain: dict[str, Any] = handler(self)
         for name in self.OMIT_IF_NONE:
             if getattr(self, name) is None:
-                found.pop(name, None)
-        return found
+                plain.pop(name, None)
+        return plain

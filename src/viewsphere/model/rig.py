@@ -67,8 +67,8 @@ class Rig(Frozen):
     def rectified(self) -> tuple[Pair, ...]:
         """The pairs of sensors with equal pinhole lenses and equal axes, of which one stands along the other's x axis."""
         numbered = permutations(enumerate(self.sensors), 2)
-        found = ((i, j, _baseline(left, right)) for (i, left), (j, right) in numbered)
-        return tuple(Pair(i, j, baseline) for i, j, baseline in found if baseline is not None)
+        pairs = ((i, j, _baseline(left, right)) for (i, left), (j, right) in numbered)
+        return tuple(Pair(i, j, baseline) for i, j, baseline in pairs if baseline is not None)
 
     def partner(self, sensor: int) -> tuple[str, float] | None:
         """Name of the first sensor that is rectified with another one, counted from 0, and the metres between them; or None."""

@@ -70,8 +70,8 @@ class Shot(Frozen):
         lens = self.rig.sensors[0].intrinsics
         for now in self.instants:
             if now.intrinsics and (now.intrinsics.width, now.intrinsics.height) != (lens.width, lens.height):
-                found = f"{now.intrinsics.width} x {now.intrinsics.height}"
-                raise ValueError(f"expected pictures of {lens.width} x {lens.height} at all instants; found {found}")
+                size = f"{now.intrinsics.width} x {now.intrinsics.height}"
+                raise ValueError(f"expected pictures of {lens.width} x {lens.height} at all instants; found {size}")
         return self
 
     @model_validator(mode="after")
@@ -98,8 +98,8 @@ class Shot(Frozen):
 
     def targets(self, together: bool) -> tuple[Thing, ...]:
         """Return the subjects of the shot's pictures: the frame's model, or `together` all models of a random scene."""
-        found = tuple(thing for thing in self.things if thing.is_target)
-        return found if together else found[:1]
+        targets = tuple(thing for thing in self.things if thing.is_target)
+        return targets if together else targets[:1]
 
     @property
     def samples(self) -> Iterator[tuple[int, int, int]]:
@@ -113,8 +113,8 @@ class Shot(Frozen):
         shot does not have it.
         """
         wanted = self.instants[instant].index + offset
-        found = bisect_left(self.instants, wanted, key=lambda one: one.index)
-        return found if found < len(self.instants) and self.instants[found].index == wanted else None
+        place = bisect_left(self.instants, wanted, key=lambda one: one.index)
+        return place if place < len(self.instants) and self.instants[place].index == wanted else None
 
     def things_at(self, instant: int) -> tuple[Thing, ...]:
         """Return the things as they are at an instant, counted from 0 in the shot: standing still there, or not there."""

@@ -92,8 +92,8 @@ def one_of(name: object, known: Sequence[str]) -> str:
 
 def different(one: Mapping[str, Any], other: Mapping[str, Any], most: int = 5) -> list[str]:
     """The fields, `most` at most, in which two plain recipes differ, as `viewpoints.azimuth`; further ones as a number."""
-    found = [dotted(steps) for steps in _different(one, other, ())]
-    return found if len(found) <= most else [*found[:most], f"{len(found) - most} more"]
+    paths = [dotted(steps) for steps in _different(one, other, ())]
+    return paths if len(paths) <= most else [*paths[:most], f"{len(paths) - most} more"]
 
 
 def _different(one: Any, other: Any, steps: Path) -> Iterator[Path]:
@@ -177,13 +177,13 @@ def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails], fields: Sequen
 
 def report(error: ValidationError, data: object, marks: Marks | None = None) -> str:
     """Return the mistakes, a line each in the file's order: `recipe.yaml:12: models[0].categry: expected ...`."""
-    found: list[tuple[Place, str]] = []
+    lines: list[tuple[Place, str]] = []
     for e in error.errors(include_url=False):
         path = _path_in(data, e["loc"]) + _below(e)
         place = marks.place(path) if marks else Place("", 0)
         where = f"{place} " if marks else ""
-        found.append((place, f"{where}{dotted(path)}: {_words(e, ())}"))
-    return "\n".join(dict.fromkeys(text for _, text in sorted(found, key=lambda f: f[0])))
+        lines.append((place, f"{where}{dotted(path)}: {_words(e, ())}"))
+    return "\n".join(dict.fromkeys(text for _, text in sorted(lines, key=lambda f: f[0])))
 
 
 def read_options(kind: type[Options], given: Mapping[str, Any], field: str) -> Options:

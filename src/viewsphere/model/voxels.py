@@ -168,9 +168,9 @@ class VoxelGrid:
     @classmethod
     def of(cls, runs: NDArray[Any], grid: Grid) -> Self:
         """The cells of runs (N,) of `RUN`; raises ValueError where these are more or fewer than the grid has."""
-        count, found = math.prod(grid.size), int(runs["length"].sum(dtype=np.uint64))
-        if found != count:
-            raise ValueError(f"voxels: expected runs of {count:,} cells, found {found:,}")
+        count, filled = math.prod(grid.size), int(runs["length"].sum(dtype=np.uint64))
+        if filled != count:
+            raise ValueError(f"voxels: expected runs of {count:,} cells, found {filled:,}")
 
         def whole(name: str) -> NDArray[Any]:
             return np.repeat(runs[name], runs["length"]).reshape(grid.size)

@@ -56,14 +56,14 @@ def shown_steps(recipe: Recipe, number: int, spec: ModelSpec, line: Timeline) ->
     is drawn.
     """
     assert recipe.time is not None
-    found: dict[int, TimeStep] = {}
+    steps: dict[int, TimeStep] = {}
     for field, motions in playing(recipe, number):
         clips = tuple(entry for _, entry in listed(motions, field) if entry.kind == "clip")
         if any(map(_is_drawn, clips)):
             return tuple(TimeStep(frame=frame, seconds=line.seconds(frame)) for frame in range(line.first, line.last + 1))
         if clips:
-            found |= {step.frame: step for step in _played(clips, spec, line, recipe.time, field)}
-    return tuple(found[frame] for frame in sorted(found))
+            steps |= {step.frame: step for step in _played(clips, spec, line, recipe.time, field)}
+    return tuple(steps[frame] for frame in sorted(steps))
 
 
 def _played(clips: tuple[MotionEntry, ...], spec: ModelSpec, line: Timeline, time: TimeEntry, field: str) -> list[TimeStep]:

@@ -33,8 +33,8 @@ def credits_of(specs: Iterable[ModelSpec], said: Mapping[str, Credit]) -> dict[s
     Raises RecipeError, which names file and line, for a table that cannot be used.
     """
     table, source = cache(_read), cache(lambda prefix: source_of(f"{prefix}:"))
-    found = {spec.key: said.get(spec.key) or _looked_up(spec, table, source) for spec in specs}
-    return {key: credit for key, credit in found.items() if credit is not None}
+    credits = {spec.key: said.get(spec.key) or _looked_up(spec, table, source) for spec in specs}
+    return {key: credit for key, credit in credits.items() if credit is not None}
 
 
 def unlicensed(keys: Iterable[str], known: Mapping[str, Credit]) -> Iterator[str]:

@@ -125,8 +125,8 @@ class Distances:
 
 
 def _standing(poses: Sequence[int], views: Poses) -> tuple[Float, Float]:
-    found = [views.view(i) for i in poses]
-    values = np.array([(view.azimuth, view.elevation, view.distance) for view in found])
+    viewpoints = [views.view(i) for i in poses]
+    values = np.array([(view.azimuth, view.elevation, view.distance) for view in viewpoints])
     azimuth, elevation = np.radians(values[:, :2]).T
     level = np.cos(elevation)
     direction = np.stack([level * np.sin(azimuth), -level * np.cos(azimuth), np.sin(elevation)], axis=1)

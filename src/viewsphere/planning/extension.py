@@ -95,12 +95,12 @@ class DatasetPart(Sendable):
     def _needed(self) -> frozenset[str]:
         """Keys of the models that may be in the shots; no more of these are looked at than it takes to find all models."""
         around = () if self.plan.composition is None else self.plan.composition.models
-        found, every = {spec.key for spec in around}, {spec.key for spec in self.plan.kept_specs}
+        needed, every = {spec.key for spec in around}, {spec.key for spec in self.plan.kept_specs}
         for row in self._told_apart:
-            found.update(spec.key for spec in self.cast(row))
-            if every <= found:
+            needed.update(spec.key for spec in self.cast(row))
+            if every <= needed:
                 break
-        return frozenset(found)
+        return frozenset(needed)
 
     @property
     def _told_apart(self) -> Iterator[Row]:
@@ -256,15 +256,15 @@ def _splits(parts: Sequence[Part]) -> dict[str, str]:
 
 def _categories(planned: Plan, there: PlanRecord) -> tuple[Category, ...]:
     """The data set's, then the recipe's new ones, numbered on; a category is known by its name."""
-    found = {category.name: category for category in reversed(there.categories)}  # imported ones may share a name
+    categories = {category.name: category for category in reversed(there.categories)}  # imported ones may share a name
     added: list[Category] = []
     number = max((category.id for category in there.categories), default=0)
     for category in planned.categories:
-        known = found.get(category.name)
+        known = categories.get(category.name)
         if known is None:
             number += 1
-            found[category.name] = replace(category, id=number)
-            added.append(found[category.name])
+            categories[category.name] = replace(category, id=number)
+            added.append(categories[category.name])
         elif known.supercategory != category.supercategory:
             raise RecipeError(
                 f"models: expected supercategory {known.supercategory!r} for category {category.name!r}, as the data set has; "

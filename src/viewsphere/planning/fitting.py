@@ -108,8 +108,8 @@ def _check_settings(planned: Plan, own: Settings, part: Part) -> None:
     added = [name for name in own if part.settings and name not in part.settings and name in (RIG, *SHOWN)]
     for name in (*part.settings, *added):
         if OF not in name and own.get(name) != part.settings.get(name) and (name in own or not name.startswith(VARIED)):
-            found = planned.recipe.model_dump(mode="json")
-            values = [_value(recipe, name) for recipe in (part.recipe, found)]
+            settings = planned.recipe.model_dump(mode="json")
+            values = [_value(recipe, name) for recipe in (part.recipe, settings)]
             differ = f"{values[0]}, as the data set has; found {values[1]}"
             if values[0] == values[1]:
                 differ = "what the data set has; found another"

@@ -82,19 +82,19 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
     Raises RecipeError for files not found, models that a table of sizes lacks, and categories with two supercategories, each
     kind of all models together; and for two models of one key.
     """
-    found = each(lambda i: tuple(_found(recipe, i)), range(len(recipe.models)))
+    models_of_entries = each(lambda i: tuple(_found(recipe, i)), range(len(recipe.models)))
     ids = {c.name: c.id for c in categories(recipe)}
     table, hint = cache(_read_sizes), Nearest()
 
-    def numbered(found: _Found) -> tuple[ModelSpec, int]:
-        entry = recipe.models[found.entry]
-        if found.is_file:
-            _check_file(entry, found)
-        category = _category(entry, found.source)
+    def numbered(model: _Found) -> tuple[ModelSpec, int]:
+        entry = recipe.models[model.entry]
+        if model.is_file:
+            _check_file(entry, model)
+        category = _category(entry, model.source)
         spec = ModelSpec(
-            key=found.key,
-            source=found.source,
-            seed=int(generator(recipe.lasting_seed, found.source, found.key).integers(2**63)) if found.is_drawn else None,
+            key=model.key,
+            source=model.source,
+            seed=int(generator(recipe.lasting_seed, model.source, model.key).integers(2**63)) if model.is_drawn else None,
             category=category,
             supercategory=entry.supercategory,
             category_id=ids[category] if entry.is_labelled else 0,
@@ -102,19 +102,19 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             forward=entry.forward,
             unit=None if entry.unit is None else unit_metres(entry.unit),
             centring=entry.centring,
-            scale=_scale(recipe, entry, found.key),
-            real_size=_real_size(recipe, found, table, hint),
+            scale=_scale(recipe, entry, model.key),
+            real_size=_real_size(recipe, model, table, hint),
             confined=entry.confined,
-            sidecar=_sidecar(recipe, found.entry),
+            sidecar=_sidecar(recipe, model.entry),
             symmetries="found" if entry.symmetries == "found" else None,
             keypoints=entry.keypoints,
             faces="as_file" if entry.faces == "as_file" else None,
             color=entry.color,
             material=entry.material,
         )
-        return spec, found.entry
+        return spec, model.entry
 
-    return tuple(each(numbered, _with_unique_keys([*chain.from_iterable(found)])))
+    return tuple(each(numbered, _with_unique_keys([*chain.from_iterable(models_of_entries)])))
 
 
 def files_below(folder: Path) -> Iterator[tuple[str, int, str]]:
@@ -122,8 +122,8 @@ def files_below(folder: Path) -> Iterator[tuple[str, int, str]]:
     folder's name in words; those that only Blender reads are among them.
     """
     endings = {f".{suffix}" for suffix in suffixes()}
-    found = (file for file in _shown(folder, "new") if file.suffix.lower() in endings and file.is_file())
-    groups = Counter((file.parent, file.suffix) for file in found)
+    files = (file for file in _shown(folder, "new") if file.suffix.lower() in endings and file.is_file())
+    groups = Counter((file.parent, file.suffix) for file in files)
     for (parent, suffix), count in sorted(groups.items()):
         pattern = (parent.relative_to(folder) / f"*{suffix}").as_posix()
         yield pattern, count, re.sub(r"[_-]+", " ", parent.absolute().name).strip() or "model"
@@ -181,15 +181,15 @@ def _expanded(recipe: Recipe, index: int) -> tuple[tuple[Named, tuple[str, ...]]
     """The names of an entry that sources know, each with the single models that it stands for; none for an entry of files.
     Raises RecipeError for an unknown name.
     """
-    found: list[tuple[Named, tuple[str, ...]]] = []
+    expanded: list[tuple[Named, tuple[str, ...]]] = []
     for source in recipe.models[index].names:
         named = source_of(source)
         assert named is not None
         try:
-            found.append((named, named.spec.expand(named.name)))
+            expanded.append((named, named.spec.expand(named.name)))
         except UserError as error:
             raise RecipeError(f"models[{index}].source: {named.prefix}: {error}") from None
-    return tuple(found)
+    return tuple(expanded)
 
 
 def _single(recipe: Recipe, index: int) -> Iterator[str]:
@@ -297,9 +297,9 @@ def left_out(recipe: Recipe) -> Iterator[str]:
 
 def _matching(folder: Path, source: str, where: str) -> list[Path]:
     path = _path(folder, source)
-    found = _candidates(folder, source, where)
+    candidates = _candidates(folder, source, where)
     wanted = _wanted(path)
-    matches = found if found == [path] else [f for f in found if f.suffix.lower() in wanted and f.is_file()]
+    matches = candidates if candidates == [path] else [f for f in candidates if f.suffix.lower() in wanted and f.is_file()]
     if not matches:
         endings, unread = ", ".join(sorted(_read_here())), _unread(folder, source, where)
         hint = f"; {_naming(folder, unread)}" if unread else ""
@@ -318,8 +318,8 @@ def _unread(folder: Path, source: str, where: str) -> set[Path]:
     others = {f".{suffix}" for suffix in suffixes(by_blender=True)} - _wanted(path)
     if has_magic(source) and path.suffix.lower() in _read_here():
         return set()  # every file that such a pattern means ends as it does
-    found = _candidates(folder, source, where)
-    unread = () if found == [path] else (f for f in found if f.suffix.lower() in others and f.is_file())
+    candidates = _candidates(folder, source, where)
+    unread = () if candidates == [path] else (f for f in candidates if f.suffix.lower() in others and f.is_file())
     return {_normal(f) for f in unread}
 
 

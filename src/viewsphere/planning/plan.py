@@ -148,29 +148,29 @@ class Plan(Shown, SamplingContext):
     def split_counts(self) -> dict[str, int]:
         """Split -> number of its frames; of hashed ones what is expected, where there are more than `COUNTED` to hash."""
         by, drawn = self.recipe.splits.by, self.recipe.scenes is not None and self.recipe.splits.by == "model"
-        found = Counter({name: 0 for name in self.splits})
+        counts = Counter({name: 0 for name in self.splits})
         if by in ("model", "scene", "sequence") and not (drawn and len(self.taken) > COUNTED):
             for block in self.blocks:
                 for subject in block.subjects:
-                    found[self.split(subject, block.positions[0][0])] += block.size * block.each
+                    counts[self.split(subject, block.positions[0][0])] += block.size * block.each
         elif drawn:
             some = Counter(self.split(subject, 0) for subject in self.taken[:COUNTED])
-            found = Counter(quotas({name: some[name] / COUNTED for name in self.splits}, self.frames))
+            counts = Counter(quotas({name: some[name] / COUNTED for name in self.splits}, self.frames))
         elif by == "pose" and len(self.blocks) == 1 and self.poses <= COUNTED:
             for pose in numbers(self.blocks[0].positions):
-                found[self.split(self.taken[0], pose)] += len(self.taken) * len(self.rig.sensors)
+                counts[self.split(self.taken[0], pose)] += len(self.taken) * len(self.rig.sensors)
         elif self.frames <= COUNTED:
             taken = (self.split(s, i) for block in self.blocks for s in block.subjects for i in numbers(block.positions))
-            found.update(chain.from_iterable(repeat(name, len(self.rig.sensors)) for name in taken))
+            counts.update(chain.from_iterable(repeat(name, len(self.rig.sensors)) for name in taken))
         else:
-            found = Counter(expected(self.recipe.splits, self.frames))
-        return {name: found[name] for name in self.splits}
+            counts = Counter(expected(self.recipe.splits, self.frames))
+        return {name: counts[name] for name in self.splits}
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """The warnings about settings that are probably unintended."""
         by = self.recipe.splits.by
-        found = [
+        warnings = [
             f"split {name!r} is empty: too few {by}s for its share; list models for it, or split by something else"
             for name, count in self.split_counts.items()
             if count == 0
@@ -178,20 +178,20 @@ class Plan(Shown, SamplingContext):
         scene = self.recipe.scene
         lowest = self.pose_list.lowest_elevation + min(span(scene.jitter.elevation)[0], 0.0)
         if lowest < 0 and (scene.has_ground or scene.place is not None):
-            found.append(
+            warnings.append(
                 f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
             )
         doubts: Iterator[str] = out_of_view(self.recipe, self.pose_list, self.intrinsics)
         for name, recipe in self.recipe.conditions.items():
-            found += (
+            warnings += (
                 message.replace("scene", f"variations.{name}", 1) if name else message for message in _unlit(recipe.scene)
             )
         doubts = chain(doubts, hidden_background(scene, self.pose_list, self.intrinsics))
         doubts = chain(doubts, too_small(self.recipe, self.pose_list, self.intrinsics))
         if self.blend is not None:
-            found += self.blend.warnings
-        found += left_out(self.recipe)
-        return tuple(map(self.recipe.locate, (*self.recipe.warnings, *found, *doubts)))
+            warnings += self.blend.warnings
+        warnings += left_out(self.recipe)
+        return tuple(map(self.recipe.locate, (*self.recipe.warnings, *warnings, *doubts)))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -226,8 +226,8 @@ class Plan(Shown, SamplingContext):
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
         """The blocks of subjects and their poses, time step by time step, each for all sensors."""
-        found = (replace(block, each=len(self.rig.sensors)) for block in self.sampler.blocks(self))
-        return tuple(replace(block, subjects=self._taken(block.subjects)) for block in found)
+        blocks = (replace(block, each=len(self.rig.sensors)) for block in self.sampler.blocks(self))
+        return tuple(replace(block, subjects=self._taken(block.subjects)) for block in blocks)
 
     @cached_property
     def taken(self) -> tuple[str, ...]:

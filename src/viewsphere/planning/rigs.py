@@ -61,11 +61,11 @@ def _mounted(sensors: Mapping[str, tuple[Intrinsics, Float]]) -> Rig:
     (_, first), *_ = sensors.values()
     back = None if np.array_equal(first, np.eye(4)) else _inverse(first)
     poses = (pose if back is None else compose(back, pose) for _, pose in sensors.values())
-    found = zip(sensors.items(), poses, strict=True)
+    mounted = zip(sensors.items(), poses, strict=True)
     return Rig(
         sensors=tuple(
             Sensor(name=name, intrinsics=lens, rig_from_sensor=_matrix(pose) if i else IDENTITY)
-            for i, ((name, (lens, _)), pose) in enumerate(found)
+            for i, ((name, (lens, _)), pose) in enumerate(mounted)
         )
     )
 
@@ -150,10 +150,10 @@ def _pose(name: str, entry: SensorEntry) -> Float:
     first = entry.rotation[0]
     if isinstance(first, tuple):
         written = np.array(entry.rotation, np.float64)
-        found = nearest_rotation(written)
-        if found is None or np.abs(found - written).max() > SKEWED:
+        rotation = nearest_rotation(written)
+        if rotation is None or np.abs(rotation - written).max() > SKEWED:
             raise RecipeError(f"rig.sensors.{name}.rotation: expected a rotation; found a matrix that is none")
-        return rigid(found, entry.position)
+        return rigid(rotation, entry.position)
     x, y, z = entry.rotation
     return rigid(_turned(float(x), float(y), float(z)), entry.position)  # pyright: ignore[reportArgumentType]
 
@@ -193,8 +193,8 @@ def _around(entry: SurroundRig) -> Iterator[tuple[str, Float]]:
 
 def _calibrated(recipe: Recipe, entry: RigFile, lens: Intrinsics) -> Rig:
     paths = [recipe.folder / Path(path).expanduser() for path in entry.path]
-    found = read_rig(paths, entry.format, entry.rectified)
-    return _mounted({one.name: (_sized(one, lens), one.rig_from_sensor) for one in found})
+    calibrated = read_rig(paths, entry.format, entry.rectified)
+    return _mounted({one.name: (_sized(one, lens), one.rig_from_sensor) for one in calibrated})
 
 
 def _sized(found: Calibrated, lens: Intrinsics) -> Intrinsics:

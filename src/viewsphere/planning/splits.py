@@ -34,10 +34,10 @@ def dealt(splits: Splits, seed: int, keys: Iterable[str], kept: Mapping[str, str
     """
     shares = shared(splits)
     listed = {key: name for name, some in splits.shares.items() if isinstance(some, tuple) for key in some}
-    found = {key: kept.get(key) or listed.get(key, "") for key in keys}
-    rest = sorted((share(seed, "split", key), key) for key, name in found.items() if not name)
+    split_of = {key: kept.get(key) or listed.get(key, "") for key in keys}
+    rest = sorted((share(seed, "split", key), key) for key, name in split_of.items() if not name)
     names = (name for name, count in quotas(shares, len(rest)).items() for _ in range(count))
-    return found | {key: name for (_, key), name in zip(rest, names, strict=True)}
+    return split_of | {key: name for (_, key), name in zip(rest, names, strict=True)}
 
 
 def quotas(shares: Mapping[str, float], count: int) -> dict[str, int]:
@@ -45,14 +45,14 @@ def quotas(shares: Mapping[str, float], count: int) -> dict[str, int]:
     shares.
     """
     exact = {name: share * count for name, share in shares.items()}
-    found = {name: int(number + 1e-9) for name, number in exact.items()}
-    by_remainder = sorted(exact, key=lambda name: found[name] - exact[name])
-    for name in by_remainder[: count - sum(found.values())]:
-        found[name] += 1
-    for name in [name for name, number in found.items() if not number and count >= len(found)]:
-        found[max(found, key=lambda other: found[other])] -= 1
-        found[name] = 1
-    return found
+    quotas = {name: int(number + 1e-9) for name, number in exact.items()}
+    by_remainder = sorted(exact, key=lambda name: quotas[name] - exact[name])
+    for name in by_remainder[: count - sum(quotas.values())]:
+        quotas[name] += 1
+    for name in [name for name, number in quotas.items() if not number and count >= len(quotas)]:
+        quotas[max(quotas, key=lambda other: quotas[other])] -= 1
+        quotas[name] = 1
+    return quotas
 
 
 def expected(splits: Splits, count: int) -> dict[str, int]:

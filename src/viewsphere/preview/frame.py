@@ -57,12 +57,12 @@ def drawn(sample: Sample, draw: Sequence[str]) -> list[Drawing]:
 
 def extents(samples: Sequence[Sample], draw: Sequence[str]) -> Extents:
     """Return the common value ranges of the drawings of some samples."""
-    found: dict[str, list[Extent]] = {}
+    extents: dict[str, list[Extent]] = {}
     for sample in samples:
         for drawing in drawn(sample, draw):
             if drawing.extent:
-                found.setdefault(drawing.name, []).append(drawing.extent(sample))
-    return {name: (min(low for low, _ in pairs), max(high for _, high in pairs)) for name, pairs in found.items()}
+                extents.setdefault(drawing.name, []).append(drawing.extent(sample))
+    return {name: (min(low for low, _ in pairs), max(high for _, high in pairs)) for name, pairs in extents.items()}
 
 
 def draw_sample(

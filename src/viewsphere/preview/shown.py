@@ -120,8 +120,8 @@ def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Se
         chosen = [films[i] for i in np.linspace(0, len(films) - 1, rows).round().astype(int)]
         return [dataset[place] for film in chosen for i in film.spread(_each(count, rows, row)) for place in film.places[i]]
     picks = np.unique(np.linspace(0, len(dataset) - 1, min(count, len(dataset))).round().astype(int))
-    found = [dataset[int(i)] for i in picks]
-    return [sample for sample in found if is_shown(sample.files)] or found  # some sensors may keep labels alone
+    samples = [dataset[int(i)] for i in picks]
+    return [sample for sample in samples if is_shown(sample.files)] or samples  # some sensors may keep labels alone
 
 
 def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
@@ -143,11 +143,11 @@ def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
 def _grouped(steps: Sequence[Ranges], places: Sequence[int]) -> list[list[int]]:
     """The poses at some places of all time steps' poses, parted where the time step changes."""
     edges = list(accumulate(map(length, steps), initial=0))
-    found: list[tuple[int, int]] = []
+    groups: list[tuple[int, int]] = []
     for place in places:
         step = bisect_right(edges, place) - 1
-        found.append((step, nth(steps[step], place - edges[step])))
-    return [[pose for _, pose in group] for _, group in groupby(found, lambda pair: pair[0])]
+        groups.append((step, nth(steps[step], place - edges[step])))
+    return [[pose for _, pose in group] for _, group in groupby(groups, lambda pair: pair[0])]
 
 
 def _scaled(shot: Shot, width: int) -> dict[str, Any]:

@@ -62,6 +62,6 @@ def _words(side: str, azimuth_deg: float, axes: tuple[Axis, Axis] | None) -> str
 def facing(up: Axis, forward: Axis, azimuth_deg: float) -> Axis:
     """The file's axis that looks at a camera at an azimuth which is a multiple of 90 degrees."""
     a = math.radians(azimuth_deg)
-    found = np.array([math.sin(a), -math.cos(a), 0.0]) @ rotation(up, forward, "axes")
-    place = int(np.argmax(np.abs(found)))
-    return cast("Axis", ("+" if found[place] > 0 else "-") + "xyz"[place])
+    direction = np.array([math.sin(a), -math.cos(a), 0.0]) @ rotation(up, forward, "axes")
+    place = int(np.argmax(np.abs(direction)))
+    return cast("Axis", ("+" if direction[place] > 0 else "-") + "xyz"[place])

@@ -109,10 +109,10 @@ def _joined(path: Path, above: tuple[Path, ...], known: dict[str, _Layer]) -> _L
             )
         if not base.is_file():
             raise RecipeError(f"{where} extends: expected a recipe file; found none at {base}")
-        found = _extended(base, chain, known)
+        base_layer = _extended(base, chain, known)
         folder = _from(path.parent, base.parent)
-        data = found.data if folder == "." else reduce(lambda data, to: _rebased(data, to, folder), PATHS, found.data)
-        whole = _merged(whole, _Layer(data, found.places))
+        data = base_layer.data if folder == "." else reduce(lambda data, to: _rebased(data, to, folder), PATHS, base_layer.data)
+        whole = _merged(whole, _Layer(data, base_layer.places))
     return _merged(whole, layer)
 
 

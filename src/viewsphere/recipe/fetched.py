@@ -81,8 +81,8 @@ def _replace(target: Path, own: Path) -> None:
 
 
 def _digests(folder: Path) -> dict[str, str]:
-    found: dict[str, str] = {}
+    digests: dict[str, str] = {}
     for inside in files_below(folder):
         with open_file(folder / inside) as stream:
-            found[inside] = hashlib.file_digest(stream, "sha256").hexdigest()
-    return found
+            digests[inside] = hashlib.file_digest(stream, "sha256").hexdigest()
+    return digests

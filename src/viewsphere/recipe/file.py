@@ -102,8 +102,8 @@ def parse(text: str, source: str) -> tuple[Any, Marks]:
     except yaml.MarkedYAMLError as error:
         raise RecipeError(f"{source}:{syntax_error(text, error, _Loader)}") from None
     except _TooMany as error:
-        found = f"expected at most {loader.most:,} values (limit MAX_RECIPE_VALUES); found more"
-        raise RecipeError(f"{source}:{error}: {found}: write fewer, or set VIEWSPHERE_MAX_RECIPE_VALUES higher") from None
+        problem = f"expected at most {loader.most:,} values (limit MAX_RECIPE_VALUES); found more"
+        raise RecipeError(f"{source}:{error}: {problem}: write fewer, or set VIEWSPHERE_MAX_RECIPE_VALUES higher") from None
     except RecursionError:
         raise RecipeError(f"{source}: expected a recipe, found lists or mappings nested too deeply") from None
     return data, Marks(source, {steps: Place(source, line) for steps, line in reader.lines.items()})

@@ -39,10 +39,10 @@ def _hours(value: Any) -> Any:
     """The hours of a time of day in UTC, below 0 or above 24 if UTC has another date; numbers are returned unchanged."""
     if not isinstance(value, str):
         return value
-    found = _TIME.match(value)
-    if found is None or int(found[1]) > 24 or int(found[2]) > 59:
+    match = _TIME.match(value)
+    if match is None or int(match[1]) > 24 or int(match[2]) > 59:
         raise ValueError(f"expected a time and its distance from UTC, such as '14:30+02:00' or '12:30Z'; found {shown(value)}")
-    hour, minute, second, sign, hours, minutes = found.groups(default="0")
+    hour, minute, second, sign, hours, minutes = match.groups(default="0")
     east = timedelta(hours=int(hours), minutes=int(minutes)) * (-1 if sign == "-" else 1)
     return (timedelta(hours=int(hour), minutes=int(minute), seconds=int(second)) - east) / timedelta(hours=1)
 

@@ -142,8 +142,8 @@ class CameraEntry(Frozen):
     def _one_lens(self) -> CameraEntry:
         given = [name for name in LENSES if getattr(self, name) is not None]
         if len(given) != 1:
-            found = " and ".join(given) or "none"
-            raise ValueError(f"expected one of fov_deg, focal_px, focal_mm with sensor_mm, K, of_viewpoints; found {found}")
+            names = " and ".join(given) or "none"
+            raise ValueError(f"expected one of fov_deg, focal_px, focal_mm with sensor_mm, K, of_viewpoints; found {names}")
         if self.of_viewpoints and (self.size != type(self).model_fields["size"].default or self.distortion):
             raise ValueError("expected no size and no distortion beside of_viewpoints, which says both; found one")
         if (self.focal_mm is None) != (self.sensor_mm is None):

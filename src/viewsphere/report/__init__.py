@@ -133,11 +133,11 @@ def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[st
     """Meshes of models spread over the data set, with the cameras that saw them, or why there is none."""
     chosen = [dataset.models[i] for i in spread(len(dataset.models), MODELS)]
     most = min(MOST_TRIANGLES, TRIANGLES // max(1, len(chosen)))
-    found: list[dict[str, Any]] = []
+    models: list[dict[str, Any]] = []
     for done, info in enumerate(chosen, 1):
-        found.append(model_data(dataset, info, table, most))
+        models.append(model_data(dataset, info, table, most))
         tell("models", done, len(chosen))
-    return found
+    return models
 
 
 def model_data(dataset: Dataset, info: ModelInfo, table: FrameTable, most: int = MOST_TRIANGLES) -> dict[str, Any]:

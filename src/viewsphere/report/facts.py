@@ -33,13 +33,13 @@ class Timing:
 
 def finished(dataset: Dataset) -> list[tuple[float, int]]:
     """Return the time at which each finished shot was written, in seconds since 1970, and its number of frames."""
-    found: list[tuple[float, int]] = []
+    moments: list[tuple[float, int]] = []
     for row in dataset.rows:
         try:
-            found.append(((dataset.store.shot_folder(row.key) / "frames.json").stat().st_mtime, row.count))
+            moments.append(((dataset.store.shot_folder(row.key) / "frames.json").stat().st_mtime, row.count))
         except OSError:
             continue
-    return found
+    return moments
 
 
 def timing(found: list[tuple[float, int]]) -> Timing | None:

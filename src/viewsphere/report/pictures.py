@@ -101,9 +101,9 @@ def layers_within(
         probed = [_weight(_at(dataset, scale, within or {}, i)) for i in probes]
         if sum(probed) / max(1, len(probed)) * len(positions) > 0.97 * budget:
             continue
-        found = list(_all(dataset, positions, scale, progress, within or {}))
-        if sum(map(_weight, found)) <= budget:
-            return found
+        layers_of_frames = list(_all(dataset, positions, scale, progress, within or {}))
+        if sum(map(_weight, layers_of_frames)) <= budget:
+            return layers_of_frames
     raise UserError(
         f"report: expected pictures of at most {budget / 1e6:.1f} MB, found {len(positions):,} frames that need more: "
         "ask for fewer with --frames"
@@ -136,13 +136,13 @@ def layers(sample: Sample, scale: Scale, within: Mapping[str, Extent] | None = N
     `rgb` is the picture, with alpha where only the picture with alpha is kept; all others are transparent where they have no
     value.
     """
-    found: Layers = {}
+    layers: Layers = {}
     for name in layer_names(sample):
         drawn = layer(sample, name, scale, within)
-        found[name] = "data:image/webp;base64," + base64.b64encode(drawn.webp).decode("ascii")
+        layers[name] = "data:image/webp;base64," + base64.b64encode(drawn.webp).decode("ascii")
         if drawn.range is not None:
-            found[f"{name}Range"] = [number(end) for end in drawn.range]
-    return found
+            layers[f"{name}Range"] = [number(end) for end in drawn.range]
+    return layers
 
 
 @dataclass(frozen=True)

@@ -78,19 +78,19 @@ def _categories(dataset: Dataset, table: FrameTable) -> list[dict[str, Any]]:
 
 def _splits(dataset: Dataset, table: FrameTable) -> list[dict[str, Any]]:
     counts = np.bincount(table.frames["split"], minlength=len(table.splits)).tolist()
-    found = dict(zip(table.splits, counts, strict=True))
+    counts_by_split = dict(zip(table.splits, counts, strict=True))
     names = dict.fromkeys((*dataset.splits, *table.splits))
-    return [{"name": name, "frames": found.get(name, 0)} for name in names]
+    return [{"name": name, "frames": counts_by_split.get(name, 0)} for name in names]
 
 
 def _models(dataset: Dataset, table: FrameTable) -> list[dict[str, Any]]:
     counts = np.bincount(table.objects["model"], minlength=len(table.models)).tolist()
-    found = dict(zip(table.models, counts, strict=True))
+    counts_by_model = dict(zip(table.models, counts, strict=True))
     return [
         {
             "key": info.key,
             "category": info.category_id,
-            "objects": found.get(info.key, 0),
+            "objects": counts_by_model.get(info.key, 0),
             "triangles": info.triangles,
             "size": numbers(info.size),
             "parts": len(info.parts),
@@ -120,13 +120,13 @@ def _distributions(table: FrameTable, categories: Sequence[int]) -> list[dict[st
         ("truncation", "Truncated share", "outside the image", share),
         ("distance", "Distance", "m, camera to box centre", None),
     )
-    found: list[dict[str, Any]] = []
+    distributions: list[dict[str, Any]] = []
     for name, title, unit, fixed in rows:
         values = objects[name]
         known = np.isfinite(values)
         edges = nice_edges(values[known]) if fixed is None else fixed
         series = [_histogram(values[known & (objects["category"] == c)], edges) for c in categories]
-        found.append(
+        distributions.append(
             {
                 "name": name,
                 "title": title,
@@ -138,7 +138,7 @@ def _distributions(table: FrameTable, categories: Sequence[int]) -> list[dict[st
                 "median": number(float(np.median(values[known]))) if known.any() else None,
             }
         )
-    return found
+    return distributions
 
 
 def _histogram(values: NDArray[np.float32], edges: NDArray[np.float64]) -> list[int]:

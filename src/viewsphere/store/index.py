@@ -136,11 +136,11 @@ class Index(Sequence[Row]):
     @property
     def counts(self) -> Counter[str]:
         """Number of the rows of each subject, in order."""
-        found: Counter[str] = Counter()
+        counts: Counter[str] = Counter()
         for number, block in enumerate(self.blocks):
             for place, subject in enumerate(block.subjects):
-                found[subject] += len(self._own(number, place))
-        return found
+                counts[subject] += len(self._own(number, place))
+        return counts
 
     def samples_of(self, subject: str) -> int:
         """Number of the samples of a subject."""
@@ -305,20 +305,20 @@ def numbers(ranges: Ranges) -> Iterator[int]:
 
 def nth(ranges: Ranges, place: int) -> int:
     """The number at a place, counted from 0; raises IndexError past the end."""
-    found = _cut(ranges, place, place + 1)
-    return found[0][0]
+    ranges_of_one = _cut(ranges, place, place + 1)
+    return ranges_of_one[0][0]
 
 
 def _cut(ranges: Ranges, begin: int, end: int) -> Ranges:
     """The begin-th number to the one before the end-th."""
-    found: list[tuple[int, int]] = []
+    cut: list[tuple[int, int]] = []
     before = 0
     for first, stop in ranges:
         low, high = max(begin - before, 0) + first, min(end - before, stop - first) + first
         if low < high:
-            found.append((low, high))
+            cut.append((low, high))
         before += stop - first
-    return tuple(found)
+    return tuple(cut)
 
 
 def _offset(ranges: Ranges, number: int) -> int | None:

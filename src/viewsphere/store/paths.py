@@ -62,8 +62,8 @@ def _is_straight(root: Path, relative: str) -> bool:
 
 def files_inside(root: Path, folder: Path) -> Sequence[Path]:
     """The files that lie in a folder of the data set, sorted; raises StoreError as `file_inside` does."""
-    found = (file_inside(root, (folder / path.name).relative_to(root).as_posix()) for path in sorted(folder.iterdir()))
-    return tuple(file for file in found if file.is_file())
+    paths = (file_inside(root, (folder / path.name).relative_to(root).as_posix()) for path in sorted(folder.iterdir()))
+    return tuple(file for file in paths if file.is_file())
 
 
 def is_name(text: object) -> bool:

@@ -29,8 +29,8 @@ def parsed(text: str | bytes, parse_constant: Callable[[str], Any] | None = None
         if _HALF.search(text):
             json.dumps(value, ensure_ascii=False).encode()
     except UnicodeEncodeError as error:
-        found = ascii(error.object[error.start : error.end])
-        raise ValueError(f"half of a UTF-16 pair, {found:.40}, where a character is expected") from None
+        characters = ascii(error.object[error.start : error.end])
+        raise ValueError(f"half of a UTF-16 pair, {characters:.40}, where a character is expected") from None
     return value
 
 

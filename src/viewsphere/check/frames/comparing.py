@@ -51,9 +51,9 @@ def _passes(sample: Sample, name: str, array: NDArray[Any]) -> Iterator[str]:
 
 def ids(sample: Sample) -> Iterator[str]:
     """Objects are numbered from 1, each once, in order."""
-    found = [o.id for o in sample.objects]
-    if any(number < 1 for number in found) or found != sorted(set(found)):
-        yield f"expected objects 1, 2, ... in order, found {found}"
+    ids = [o.id for o in sample.objects]
+    if any(number < 1 for number in ids) or ids != sorted(set(ids)):
+        yield f"expected objects 1, 2, ... in order, found {ids}"
 
 
 def camera(sample: Sample) -> Iterator[str]:

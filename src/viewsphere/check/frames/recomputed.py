@@ -141,13 +141,13 @@ class Recomputed:
 
     def _judge(self, number: int, planned: Plan) -> None:
         """Note whether a part contradicts its recipe, or files that the recipe names changed since."""
-        found = tuple(self._against(number, planned))
-        beside = [path for path, _, _ in found if not path.endswith("digest") and not path.startswith("recipe")]
+        contradictions = tuple(self._against(number, planned))
+        beside = [path for path, _, _ in contradictions if not path.endswith("digest") and not path.startswith("recipe")]
         by_files = any(map(BY_FILES.search, beside)) or (not beside and _reads_tables(planned))
         if by_files and _names_files(self._record.parts[number].recipe):
             self.why_not[number] = "the files that the recipe names are others now"
         else:
-            self.refused[number] = tuple(in_words(iter(found), "plan.json", "the recipe"))
+            self.refused[number] = tuple(in_words(iter(contradictions), "plan.json", "the recipe"))
 
     def _against(self, number: int, last: Plan | None = None) -> Iterator[Difference]:
         """Differences of the data set's plan from that of so many recipes, and a `last` one, appended to one another."""

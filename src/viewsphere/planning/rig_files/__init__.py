@@ -31,11 +31,11 @@ def read_rig(paths: Sequence[Path], kind: str = "auto", rectified: bool = False)
         from viewsphere.planning.rig_files.kalibr import sensors
     else:
         from viewsphere.planning.rig_files.opencv import sensors
-    found = sensors(documents, rectified)
-    names = [one.name.casefold() for one in found]
+    calibrated = sensors(documents, rectified)
+    names = [one.name.casefold() for one in calibrated]
     if len(set(names)) < len(names):
-        raise RecipeError(f"{paths[0]}: expected sensors of different names; found {', '.join(one.name for one in found)}")
-    return found
+        raise RecipeError(f"{paths[0]}: expected sensors of different names; found {', '.join(one.name for one in calibrated)}")
+    return calibrated
 
 
 def _kind(path: Path, document: dict[str, Any]) -> str:

@@ -23,10 +23,10 @@ MODELS = ("plumb_bob", "rational_polynomial", "equidistant", "fisheye", "")
 
 def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[Calibrated, ...]:
     """A sensor of each file, named by its `camera_name`, or by the file; the first one's place is the rig's."""
-    found = [_camera(path, document, rectified) for path, document in documents.items()]
-    back = inverse(found[0].rig_from_sensor[:3, :3], found[0].rig_from_sensor[:3, 3])
-    first = Calibrated(found[0].name, found[0].lens, found[0].distortion, np.eye(4), found[0].size)
-    others = (Calibrated(c.name, c.lens, c.distortion, compose(back, c.rig_from_sensor), c.size) for c in found[1:])
+    calibrated = [_camera(path, document, rectified) for path, document in documents.items()]
+    back = inverse(calibrated[0].rig_from_sensor[:3, :3], calibrated[0].rig_from_sensor[:3, 3])
+    first = Calibrated(calibrated[0].name, calibrated[0].lens, calibrated[0].distortion, np.eye(4), calibrated[0].size)
+    others = (Calibrated(c.name, c.lens, c.distortion, compose(back, c.rig_from_sensor), c.size) for c in calibrated[1:])
     return first, *others
 
 

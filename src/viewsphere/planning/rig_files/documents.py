@@ -48,14 +48,14 @@ def read_document(path: Path) -> dict[str, Any]:
     if text.startswith("%YAML:"):
         text = text.partition("\n")[2]
     try:
-        found = yaml.load(text, _Loader)  # safe: the loader makes plain data alone
+        document = yaml.load(text, _Loader)  # safe: the loader makes plain data alone
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark else ""
         raise RecipeError(f"{path}{line}: expected YAML; found a mistake: {getattr(error, 'problem', error)}") from None
-    if not isinstance(found, dict):
-        raise RecipeError(f"{path}: expected a mapping; found {type(found).__name__}")
-    return cast("dict[str, Any]", found)
+    if not isinstance(document, dict):
+        raise RecipeError(f"{path}: expected a mapping; found {type(document).__name__}")
+    return cast("dict[str, Any]", document)
 
 
 def matrix(value: Any, where: str, shape: tuple[int, int] | None = None) -> Float:
@@ -65,19 +65,19 @@ def matrix(value: Any, where: str, shape: tuple[int, int] | None = None) -> Floa
         data = row(entry.get("data"), f"{where}.data")
         rows, columns = entry.get("rows"), entry.get("cols")
         if not isinstance(rows, int) or not isinstance(columns, int) or rows < 1 or rows * columns != len(data):
-            found = f"{rows!r:.40} x {columns!r:.40} and {len(data)} numbers"
-            raise RecipeError(f"{where}: expected rows x cols numbers; found {found}")
-        found = np.array(data, np.float64).reshape(rows, columns)
+            values = f"{rows!r:.40} x {columns!r:.40} and {len(data)} numbers"
+            raise RecipeError(f"{where}: expected rows x cols numbers; found {values}")
+        values = np.array(data, np.float64).reshape(rows, columns)
     elif isinstance(value, list):
         lines = [row(line, where) for line in cast("list[Any]", value)]
         if len({len(line) for line in lines}) != 1:
             raise RecipeError(f"{where}: expected rows of equal length; found {[len(line) for line in lines]}")
-        found = np.array(lines, np.float64)
+        values = np.array(lines, np.float64)
     else:
         raise RecipeError(f"{where}: expected a matrix; found {'nothing' if value is None else repr(value)[:40]}")
-    if shape is not None and found.shape != shape:
-        raise RecipeError(f"{where}: expected {shape[0]} x {shape[1]} numbers; found {found.shape[0]} x {found.shape[1]}")
-    return found
+    if shape is not None and values.shape != shape:
+        raise RecipeError(f"{where}: expected {shape[0]} x {shape[1]} numbers; found {values.shape[0]} x {values.shape[1]}")
+    return values
 
 
 def row(value: Any, where: str) -> list[float]:
@@ -91,7 +91,7 @@ def size(width: Any, height: Any, where: str) -> tuple[int, int] | None:
     """[width, height] of pictures, None where the file says nothing; raises RecipeError for anything that is no size."""
     if width is None or height is None:
         return None
-    found = number(width, where), number(height, where)
-    if min(found) < 1 or any(one != int(one) for one in found):
+    sides = number(width, where), number(height, where)
+    if min(sides) < 1 or any(one != int(one) for one in sides):
         raise RecipeError(f"{where}: expected whole numbers of pixels above 0; found {width} and {height}")
-    return int(found[0]), int(found[1])
+    return int(sides[0]), int(sides[1])

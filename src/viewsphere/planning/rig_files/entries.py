@@ -70,10 +70,10 @@ def fisheye(numbers: Sequence[float], where: str) -> LensParameters:
 
 def rotation(matrix: Float, where: str) -> Float:
     """The rotation (3, 3) that a file's matrix nearly is; raises RecipeError for any other."""
-    found = nearest_rotation(matrix) if matrix.shape == (3, 3) else None
-    if found is None or np.abs(found - matrix).max() > RIGHT_ANGLES:
+    rotation = nearest_rotation(matrix) if matrix.shape == (3, 3) else None
+    if rotation is None or np.abs(rotation - matrix).max() > RIGHT_ANGLES:
         raise RecipeError(f"{where}: expected a rotation; found a matrix that is none")
-    return found
+    return rotation
 
 
 def inverse(turn: Float, shift: Float) -> Float:

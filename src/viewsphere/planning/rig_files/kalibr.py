@@ -27,18 +27,18 @@ def sensors(documents: Mapping[Path, dict[str, Any]], rectified: bool) -> tuple[
     if len(documents) > 1:
         raise RecipeError(f"{where}: expected one camchain; found {len(documents)} files")
     (document,) = documents.values()
-    found: list[Calibrated] = []
+    calibrated: list[Calibrated] = []
     pose = np.eye(4)
-    while (name := f"cam{len(found)}") in document:
+    while (name := f"cam{len(calibrated)}") in document:
         entry, at = document[name], f"{where}: {name}"
         if not isinstance(entry, dict):
             raise RecipeError(f"{at}: expected a mapping; found {entry!r:.40}")
         camera = cast("dict[str, Any]", entry)
-        if found:
+        if calibrated:
             step = matrix(camera.get("T_cn_cnm1"), f"{at}: T_cn_cnm1", (4, 4))
             pose = compose(pose, inverse(rotation(step[:3, :3], f"{at}: T_cn_cnm1"), step[:3, 3]))
-        found.append(_camera(name, camera, pose, at))
-    return tuple(found)
+        calibrated.append(_camera(name, camera, pose, at))
+    return tuple(calibrated)
 
 
 def _camera(name: str, entry: Mapping[str, Any], pose: np.ndarray[Any, np.dtype[np.float64]], at: str) -> Calibrated:

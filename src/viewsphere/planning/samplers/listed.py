@@ -132,9 +132,9 @@ def _file(recipe: Recipe) -> tuple[Path, tuple[Arranged, ...]]:
     entry = recipe.viewpoints
     if isinstance(entry, PoseList):
         path = recipe.folder / Path(entry.path).expanduser()
-        found = pose_file(path, entry)
-        if found.shots:
-            return path, found.shots
+        poses = pose_file(path, entry)
+        if poses.shots:
+            return path, poses.shots
     raise RecipeError(
         "viewpoints: expected a file of shots beside sampler: listed; found another kind of viewpoints: set viewpoints: "
         "{kind: file, path: shots.jsonl}"

@@ -46,15 +46,15 @@ def factors(context: SamplingContext) -> str:
 
 def blocks(context: SamplingContext) -> tuple[Block, ...]:
     """Return the blocks of models and their poses, time step by time step."""
-    found: list[Block] = []
+    blocks: list[Block] = []
     for schedule, members in groupby(range(context.models), lambda model: context.schedules[model]):
         keys = tuple(context.model_specs[model].key for model in members)
         runs = [((run.first, run.stop),) for run in schedule.runs]
         if len(runs) == 1:
-            found.append(Block(keys, runs[0]))
+            blocks.append(Block(keys, runs[0]))
         else:
-            found += (Block((key,), poses) for key in keys for poses in runs)
-    return tuple(found)
+            blocks += (Block((key,), poses) for key in keys for poses in runs)
+    return tuple(blocks)
 
 
 def most_objects(recipe: Recipe) -> int:
@@ -154,7 +154,7 @@ def _at(context: SamplingContext, things: Sequence[Thing], run: Run) -> tuple[Th
     """
     if run.step is None:
         return tuple(things)
-    found: list[Thing] = []
+    things_there: list[Thing] = []
     for thing in things:
         number = context.position.get(thing.model.key)
         shown = at_step(None if number is None else context.timings[number], run.number)
@@ -163,10 +163,10 @@ def _at(context: SamplingContext, things: Sequence[Thing], run: Run) -> tuple[Th
             if not context.blend.shows(moved.model, run.step.scene):
                 continue
             moved = context.blend.at_frame(moved, run.step.scene)
-        found.append(moved)
-    if len(found) == len(things):
-        return tuple(found)
-    return tuple(p.model_copy(update={"id": i}) if p.id else p for i, p in enumerate(found, 1))
+        things_there.append(moved)
+    if len(things_there) == len(things):
+        return tuple(things_there)
+    return tuple(p.model_copy(update={"id": i}) if p.id else p for i, p in enumerate(things_there, 1))
 
 
 def _scene(context: SamplingContext, subject: str, pose: str, run: Run) -> Scene:

@@ -45,12 +45,12 @@ def frame_ranges(text: str) -> tuple[tuple[int, int], ...]:
 
     Raises UserError for anything else.
     """
-    found: list[tuple[int, int]] = []
+    ranges: list[tuple[int, int]] = []
     for part in filter(None, (part.strip() for part in text.split(","))):
         first, dash, last = part.partition("-")
         if not first.isdecimal() or (dash and not (last.isdecimal() and int(last) >= int(first))):
             raise UserError(f"--frames: expected numbers and ranges, such as 0-15,40; found {part!r}")
-        found.append((int(first), int(last or first) + 1))
-    if not found:
+        ranges.append((int(first), int(last or first) + 1))
+    if not ranges:
         raise UserError(f"--frames: expected numbers and ranges, such as 0-15,40; found {text!r}")
-    return tuple(found)
+    return tuple(ranges)

@@ -110,18 +110,18 @@ class Dataset(Shown, Sequence[Sample]):
     def models(self) -> tuple[ModelInfo, ...]:
         """The finished models in the plan's order, time steps behind their model; of a choice, those that its frames have."""
         stored = (self.store.model_info(key) for key in self.plan.models)
-        found = tuple(info for model in stored if model is not None for info in (model, *model.steps))
+        infos = tuple(info for model in stored if model is not None for info in (model, *model.steps))
         if self.choice.is_some:
             seen = {o.key for sample in self for o in sample.objects}
-            found = tuple(info for info in found if info.key in seen)
-        return found
+            infos = tuple(info for info in infos if info.key in seen)
+        return infos
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """The rows of all finished shots, chosen or not, in frame order; without those that add channels to others."""
         keys = tuple(self.store.finished())
-        found = chain.from_iterable(index.rows_with_keys(keys) for index in self.plan.indices)
-        return tuple(sorted(found, key=lambda row: row.first))
+        rows = chain.from_iterable(index.rows_with_keys(keys) for index in self.plan.indices)
+        return tuple(sorted(rows, key=lambda row: row.first))
 
     @cached_property
     def _shots(self) -> tuple[list[tuple[str, Sequence[int]]], list[int]]:
@@ -141,9 +141,9 @@ class Dataset(Shown, Sequence[Sample]):
         """A finished shot of each part; None for a part whose shots are not kept, such as an imported one, and for one of which
         nothing is finished, another part's.
         """
-        found = {part: self.labelled(row.key) for part, row in self._first_rows.items()}
-        some = next(iter(found.values()), None)
-        return tuple(found.get(number, some) for number in range(len(self.plan.parts)))
+        shots = {part: self.labelled(row.key) for part, row in self._first_rows.items()}
+        some = next(iter(shots.values()), None)
+        return tuple(shots.get(number, some) for number in range(len(self.plan.parts)))
 
     @property
     def samples_of_parts(self) -> Iterator[Iterator[Sample]]:
@@ -232,13 +232,13 @@ class Dataset(Shown, Sequence[Sample]):
     @cached_property
     def _sequences(self) -> dict[str, list[tuple[str, list[int]]]]:
         """The chosen places of each sequence's shots, by the sequence's name."""
-        found: dict[str, list[tuple[str, list[int]]]] = {}
+        sequences: dict[str, list[tuple[str, list[int]]]] = {}
         for key, places in self._shots[0]:
             names = self._records(key).sequences
             for name in dict.fromkeys(names[place] for place in places):
                 if name:
-                    found.setdefault(name, []).append((key, [place for place in places if names[place] == name]))
-        return found
+                    sequences.setdefault(name, []).append((key, [place for place in places if names[place] == name]))
+        return sequences
 
     def sequence(self, name: str, sensor: str = CAMERA) -> tuple[Sample, ...]:
         """The samples of one sensor in a sequence, in the order of its instants; raises StoreError for a sequence or a sensor
@@ -327,9 +327,9 @@ class Dataset(Shown, Sequence[Sample]):
     def labelled(self, key: str) -> Shot | None:
         """A finished shot as `Store.labelled` gives it; raises StoreError for one of more or fewer samples than are planned."""
         shot, row = self.store.labelled(key), self.plan.find(key)
-        if shot is not None and row is not None and (found := sum(1 for _ in shot.samples)) != row.count:
+        if shot is not None and row is not None and (count := sum(1 for _ in shot.samples)) != row.count:
             file = self.store.shot_folder(key) / "shot.json"
-            raise _damaged(file, ValueError(f"{found} samples instead of {row.count}"))
+            raise _damaged(file, ValueError(f"{count} samples instead of {row.count}"))
         return shot
 
     def _model_facts(self, key: str, frame: int | None) -> ModelInfo:

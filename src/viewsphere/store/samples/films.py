@@ -94,10 +94,10 @@ def _in_shot(shot: Shot | None, places: Sequence[int], start: int, is_shown: IsS
 
 
 def _films(seen: Iterable[Seen]) -> list[Film]:
-    found: dict[str, dict[int, dict[str, tuple[int, float]]]] = {}
+    films: dict[str, dict[int, dict[str, tuple[int, float]]]] = {}
     for sequence, instant, sensor, place, seconds in seen:
-        found.setdefault(sequence, {}).setdefault(instant, {})[sensor] = (place, seconds)
-    return [_film(sequence, instants) for sequence, instants in found.items()]
+        films.setdefault(sequence, {}).setdefault(instant, {})[sensor] = (place, seconds)
+    return [_film(sequence, instants) for sequence, instants in films.items()]
 
 
 def _film(sequence: str, seen: dict[int, dict[str, tuple[int, float]]]) -> Film:

@@ -123,8 +123,8 @@ def _compared(folder: Path) -> Iterator[tuple[str, str, str | None]]:
     lines = _lines(folder)
     with ThreadPoolExecutor(AT_ONCE) as pool:
         while some := list(islice(lines, AT_ONCE * 16)):
-            found = pool.map(_digest, (file_inside(folder, path) for _, path in some))
-            yield from ((*line, has) for line, has in zip(some, found, strict=True))
+            digests = pool.map(_digest, (file_inside(folder, path) for _, path in some))
+            yield from ((*line, has) for line, has in zip(some, digests, strict=True))
 
 
 def _lines(folder: Path) -> Iterator[tuple[str, str]]:

@@ -64,12 +64,12 @@ def unsealed(text: str) -> dict[str, Any]:
 
 def seal_of(file: Path) -> Seal:
     """A file's size and digest, read block by block."""
-    found, size = xxhash.xxh3_128(), 0
+    hasher, size = xxhash.xxh3_128(), 0
     with open_file(file) as stream:  # blocks are large, and most files smaller
         while block := stream.read(BLOCK):
-            found.update(block)
+            hasher.update(block)
             size += len(block)
-    return size, found.hexdigest()
+    return size, hasher.hexdigest()
 
 
 @dataclass(frozen=True)
@@ -148,15 +148,15 @@ class Manifest:
         """Yield the differences from the written state: files that are missing, changed, or additional."""
         for path, told in self.files.items():
             try:
-                found = seal_of(file_inside(folder, path))
+                seal = seal_of(file_inside(folder, path))
             except StoreError as error:
                 yield str(error)
                 continue
             except OSError as error:
                 yield f"{folder / path}: expected {said(told)}, found {error.strerror or error}"
                 continue
-            if found != told:
-                yield f"{folder / path}: expected {said(told)}, found {said(found)}"
+            if seal != told:
+                yield f"{folder / path}: expected {said(told)}, found {said(seal)}"
         yield from (f"{path}: expected no such file" for path in self._strangers(folder))
 
     def _strangers(self, folder: Path) -> Iterable[Path]:

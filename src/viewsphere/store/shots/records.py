@@ -50,10 +50,10 @@ _STRICTLY = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 def _box(value: Any) -> NDArray[np.float64]:
-    found = np.array(value, np.float64)
-    if found.shape != (8, 3) or not np.isfinite(found).all():
-        raise ValueError(f"expected 8 vertices; found {found.shape}")
-    return found
+    corners = np.array(value, np.float64)
+    if corners.shape != (8, 3) or not np.isfinite(corners).all():
+        raise ValueError(f"expected 8 vertices; found {corners.shape}")
+    return corners
 
 
 Box3d = Annotated[NDArray[np.float64], PlainValidator(_box)]
@@ -125,10 +125,10 @@ class ModelInfo:
         """Return the metadata at a time step, by the frame of the model's file (None: at rest); raises ValueError for another
         frame.
         """
-        found = self if frame is None else next((one for one in self.steps if one.step and one.step.frame == frame), None)
-        if found is None:
+        step_info = self if frame is None else next((one for one in self.steps if one.step and one.step.frame == frame), None)
+        if step_info is None:
             raise ValueError(f"model {self.key}: expected time step {frame}, found none")
-        return found
+        return step_info
 
     def moved(self, key: str, prefix: str, **changed: Any) -> ModelInfo:
         """The same model of another key, whose files lie in the folder `prefix`; `changed` are other fields of it."""
@@ -162,10 +162,10 @@ class ModelInfo:
     @staticmethod
     def from_plain(value: Mapping[str, Any]) -> ModelInfo:
         """The record that `to_plain` was asked of; raises LookupError, TypeError or ValueError for anything else."""
-        found = typed(_adapter(ModelInfo), value)
-        for one in (found, *found.steps):
+        info = typed(_adapter(ModelInfo), value)
+        for one in (info, *info.steps):
             names([one.key, *([one.track] if one.track else [])], "the key")
-        return found
+        return info
 
 
 @dataclass(frozen=True)
@@ -396,10 +396,10 @@ class PlanRecord:
         """The record in plan.json's text. Raises OtherStoreError for a store of another version; KeyError, TypeError or
         ValueError for any other text.
         """
-        found = parsed(text)["store"]
-        if found != STORE_VERSION:
+        version = parsed(text)["store"]
+        if version != STORE_VERSION:
             raise OtherStoreError(
-                f"another viewsphere made this data set (store version {found}; this one reads {STORE_VERSION}). Render its "
+                f"another viewsphere made this data set (store version {version}; this one reads {STORE_VERSION}). Render its "
                 "recipe into another folder, or delete this one"
             )
         value = unsealed(text)

@@ -145,10 +145,10 @@ def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapp
 
 
 def _array(value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    found = np.array(value, np.float64)
-    if found.shape != shape or not np.isfinite(found).all():
-        raise ValueError(f"finite numbers {shape} expected, found {found.shape}")
-    return found
+    array = np.array(value, np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"finite numbers {shape} expected, found {array.shape}")
+    return array
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,11 +94,11 @@ def _categories(context: SamplingContext) -> dict[str, tuple[tuple[str, int], ..
     groups: defaultdict[str, list[str]] = defaultdict(list)
     for subject in context.subjects:
         groups[_group(context, subject)].append(subject)
-    found: dict[str, tuple[tuple[str, int], ...]] = {}
+    categories: dict[str, tuple[tuple[str, int], ...]] = {}
     for group, subjects in groups.items():
         there = Counter(spec.category for spec in _models_for(context, group))
-        found |= balanced(recipe.seed, {name: _size(recipe, name) for name in subjects}, there, repeat)
-    return found
+        categories |= balanced(recipe.seed, {name: _size(recipe, name) for name in subjects}, there, repeat)
+    return categories
 
 
 def scene_split(context: SamplingContext, subject: str) -> str:
