@@ -35,8 +35,8 @@ from viewsphere.engines.raster import staging
 from viewsphere.engines.raster.shading import painting
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import annotated, context_of, observe
-from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import SHOT_FRAMES
 from viewsphere.plugins.engine import EngineSpec

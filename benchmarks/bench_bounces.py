@@ -21,11 +21,11 @@ from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines import raster
 from viewsphere.engines.raster.staging import RasterStage
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Scene, Sky, Sun
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.shots.stages import Stages

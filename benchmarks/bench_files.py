@@ -19,7 +19,7 @@ from PIL import Image
 from viewsphere import plan
 from viewsphere.errors import MissingExtraError
 from viewsphere.labels import channels
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.shots.stages import Stages
 from viewsphere.run.workers.allocator import keep_freed_memory

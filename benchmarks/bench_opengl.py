@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.geometry import Geometry
 
 NEAR = 0.1

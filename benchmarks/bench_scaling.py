@@ -16,11 +16,11 @@ from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.labels import observe
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Ground, Scene, Sun
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.plugins.engine import EngineSpec

@@ -32,11 +32,11 @@ from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.engines.shared.blender.requests import laid_with_slabs
 from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, Scene, Sky, SpotLight, Sun, ViewTransform
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.plugins.engine import EngineSpec

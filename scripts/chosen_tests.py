@@ -141,7 +141,7 @@ class Modules:
         self.needs = {module: graph.find_modules_directly_imported_by(module) | self._named(module) for module in self.all}
         for loader, meant in self._implied().items():
             self.needs[loader] |= meant
-        self.needs["viewsphere"] = {"viewsphere.model.notebook"}  # all else is imported for a name that is used
+        self.needs["viewsphere"] = {"viewsphere.model.fields.notebook"}  # all else is imported for a name that is used
         for module in self.all - ROOTS:
             self.needs[module].add(module.rpartition(".")[0])  # whose own file runs first
 

@@ -19,11 +19,11 @@ from viewsphere import Recipe, plugins, render
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.labels.shared.drawing.colors import PALETTE
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
-from viewsphere.model.rig import Rig
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Background, Finish, Scene
+from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.planning.distances import Distances

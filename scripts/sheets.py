@@ -21,10 +21,8 @@ from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.mesh import Mesh
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.errors import ViewsphereError
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import (
     AreaLight,
     Background,
@@ -38,6 +36,8 @@ from viewsphere.model.scene import (
     SpotLight,
     Sun,
 )
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.plugins.engine import EngineSpec

@@ -14,15 +14,15 @@ from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.diameter import diameter
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.labels import annotated, context_of, observe, sample_values
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.annotations.metadata import ModelMetadata
 from viewsphere.model.channel import PASSES
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.model.instant import Viewpoint
-from viewsphere.model.metadata import ModelMetadata
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Ground, Scene
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Store

@@ -12,10 +12,10 @@ from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.geometry.rotation import random_rotation, rigid
 from viewsphere.labels import annotated, context_of, observe
-from viewsphere.model.camera import Camera
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize

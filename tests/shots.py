@@ -4,10 +4,10 @@ import numpy as np
 
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY, Finish, Scene
+from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.truth.raster.visibility import rasterize
 

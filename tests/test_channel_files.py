@@ -17,7 +17,7 @@ from viewsphere.codecs.npz import encode_npz
 from viewsphere.codecs.palette import palette
 from viewsphere.errors import MissingExtraError, RecipeError, StoreError
 from viewsphere.labels import channels
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.datasets.merging import merge
 from viewsphere.store import check_codecs, decode, depth_step, encode

@@ -21,7 +21,7 @@ from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.mask import decode_rle, encode_rle
 from viewsphere.labels import Randomness, ShotAppearance, channel_labels, channels, labels, labels_of, object_labels, on_request
 from viewsphere.labels.shared.spec import no_record
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.run.exports.exporting import export
 from viewsphere.store import Dataset, encode
 from viewsphere.store.shots.checksums import write_checksums

@@ -7,7 +7,7 @@ import pytest
 import viewsphere as vs
 from small import ROOT
 from viewsphere.errors import RecipeError
-from viewsphere.recipe.file import parse
+from viewsphere.recipe.reading.file import parse
 from viewsphere.run.opening import check_formats, prepare
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), ROOT / "recipes" / "README.md"]

@@ -11,7 +11,7 @@ from cube_dataset import make
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.labels import channels
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.run.exports.exporting import export
 from viewsphere.store import Dataset, decode
 from viewsphere.store.shots.checksums import damaged_files

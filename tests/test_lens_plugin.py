@@ -11,7 +11,7 @@ from viewsphere import Dataset, generate, plan, plugins
 from viewsphere.check import check
 from viewsphere.errors import PluginError, RecipeError, UserError
 from viewsphere.geometry.lenses import lens_parameters
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.run.exports.exporting import export
 
 CAMERA = {"size": [96, 72], "fov_deg": 60, "distortion": {"model": "division", "k": -0.4}}

@@ -10,7 +10,7 @@ from quick import quick
 from small import ROOT
 from viewsphere import Recipe, generate, plan
 from viewsphere.check import check
-from viewsphere.recipe.file import read
+from viewsphere.recipe.reading.file import read
 from viewsphere.store import Dataset
 
 FOLDER = ROOT / "recipes" / "like"

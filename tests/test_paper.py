@@ -22,7 +22,7 @@ from viewsphere.check import check
 from viewsphere.cli.arguments import load_recipe
 from viewsphere.model.sample import ObjectAnnotation
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.recipe.file import read
+from viewsphere.recipe.reading.file import read
 
 sys.path.insert(0, str(ROOT / "scripts"))
 paper = importlib.import_module("paper")

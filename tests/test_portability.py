@@ -15,7 +15,7 @@ from viewsphere import Dataset, generate, plan
 from viewsphere.assets import cache
 from viewsphere.errors import RecipeError
 from viewsphere.planning import models
-from viewsphere.recipe import extends
+from viewsphere.recipe.reading import extends
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store.shots import moving
 

@@ -17,7 +17,7 @@ import pytest
 
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
-from viewsphere.model.tracks import TRACK
+from viewsphere.model.annotations.tracks import TRACK
 from viewsphere.run.exports.exporting import export
 from viewsphere.scratch import of_this_process, scratch_folder
 from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder

@@ -9,8 +9,8 @@ import numpy as np
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.geometry.lenses import lens_parameters
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.raster.alpha_masks import ENDLESS
 from viewsphere.truth.raster.geometry import Geometry, build_geometry

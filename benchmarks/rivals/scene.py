@@ -14,7 +14,7 @@ from viewsphere import plan
 from viewsphere.assets.exporting.export import export_glb
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import encoded, linear
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.run.shots.stages import Stages
 
 TO_GLTF = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from viewsphere.model.notebook import Shown
+from viewsphere.model.fields.notebook import Shown
 
 if TYPE_CHECKING:
     from viewsphere.planning.plan import plan

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.model.credit import Credit
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.validation_errors import one_of
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.source import Download, SourceSpec

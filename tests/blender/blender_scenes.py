@@ -19,8 +19,8 @@ from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.engines import raster
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model import scene as model
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Thing
 
 VARIABLE = "VIEWSPHERE_BLENDER_PYTHON"

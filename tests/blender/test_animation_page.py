@@ -14,8 +14,8 @@ from command_line import viewsphere
 from small import ROOT
 from viewsphere import Dataset, Recipe, plan
 from viewsphere.assets.animation.timeline import Blenders, Timeline
+from viewsphere.recipe.cameras.viewpoints import PoseList
 from viewsphere.recipe.models import ModelEntry
-from viewsphere.recipe.viewpoints import PoseList
 
 PAGE = (ROOT / "docs" / "animation.md").read_text("utf-8")
 WALK, PEOPLE, CAMERA = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)

@@ -11,7 +11,7 @@ import yaml
 from command_line import viewsphere
 from small import ROOT
 from viewsphere import Dataset, Recipe
-from viewsphere.recipe.blend import LabelRule
+from viewsphere.recipe.world.blend import LabelRule
 
 PAGE = (ROOT / "docs" / "scenes-in-blender.md").read_text("utf-8")
 (RECIPE,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)

@@ -16,8 +16,8 @@ from viewsphere.composing.placing import Room, Shape, footprint
 from viewsphere.composing.seeds import generator
 from viewsphere.errors import RecipeError, StoreError
 from viewsphere.geometry.box3d import Box3d
+from viewsphere.model.fields.validation_errors import read_options
 from viewsphere.model.scene import IDENTITY
-from viewsphere.model.validation_errors import read_options
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.run.generate import generate

@@ -21,9 +21,9 @@ from viewsphere.composing.seeds import generator
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.recipe.file import read
-from viewsphere.recipe.motion import MotionEntry
+from viewsphere.recipe.reading.file import read
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.world.motion import MotionEntry
 from viewsphere_zoo.places.neighbourhood import neighbourhood
 
 BOX = Box3d.between((-1.0, -2.0, -0.5), (1.0, 2.0, 0.5)).corners

@@ -6,7 +6,7 @@ from test_motion import LANES, WALK, entries, start
 from viewsphere.composing.motion import Mover, mover
 from viewsphere.model.thing import Motion
 from viewsphere.planning.samplers.shared.moving import Moving
-from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.recipe.cameras.sequence import TimeEntry
 
 TIME = TimeEntry(frames=60, fps=25)
 PATH = {"kind": "path", "points": [[0, 0, 0], [0, 4, 0], [2, 6, 1]], "speed": 4}

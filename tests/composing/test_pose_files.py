@@ -14,7 +14,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_angles, orbit_center, orbit_rotation
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.rotation import quaternion_from_matrix
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 

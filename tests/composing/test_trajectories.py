@@ -17,10 +17,10 @@ from viewsphere.composing.viewpoints.pose_files.motions import motion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import matrix_from_quaternion
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint, viewpoint_of
 from viewsphere.model.place import Lane
-from viewsphere.model.rig import Rig, Sensor
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe

@@ -13,11 +13,11 @@ from viewsphere.composing.viewpoints.camera import distance_problem
 from viewsphere.composing.viewpoints.pose_numbers import pose_names
 from viewsphere.composing.viewpoints.poses import poses
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.planning.plan import plan
+from viewsphere.recipe.cameras.viewpoints import Range, axis_count, axis_value
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.viewpoints import Range, axis_count, axis_value
 
 
 def make(seed=0, **viewpoints):

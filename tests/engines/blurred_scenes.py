@@ -12,11 +12,11 @@ from shots import still_shot
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.exposure import Exposure, Sweep
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Ground, Scene, Sun, ViewTransform
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.exposure import Exposure, Sweep
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.raster.visibility import rasterize

@@ -17,8 +17,8 @@ from viewsphere.engines.raster.shadows.kernels_occlusion import occlude
 from viewsphere.engines.raster.shadows.occlusion import Occlusion
 from viewsphere.engines.raster.shadows.shadow_maps import Casters, Extent, Lights, bake_lights
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize

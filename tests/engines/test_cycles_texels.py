@@ -15,10 +15,10 @@ from viewsphere.assets.srgb import encoded
 from viewsphere.engines import cycles
 from viewsphere.engines.shared.blender.texels import BUMPED, CONTENTS, FINEST, Kind, halved, spread_of
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Scene
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Motion, Repaint, Thing
 from viewsphere.truth.raster.visibility import rasterize
 

@@ -19,8 +19,8 @@ from viewsphere.engines.shared.blender.requests import scene_request
 from viewsphere.errors import MissingExtraError, RecipeError, UserError, ViewsphereError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.lenses import lens_parameters
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize

@@ -22,8 +22,8 @@ from viewsphere.engines.raster.reflections.glossy_reflections import NOWHERE
 from viewsphere.engines.raster.reflections.planar_reflections import lobe_rays, mirror_in_panes
 from viewsphere.engines.raster.shading.painting import paint, view_of
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground, Scene, Sun
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.visibility import rasterize
 
 

@@ -18,7 +18,6 @@ from PIL import Image
 from quick import quick
 from shots import still_shot
 from viewsphere.geometry.lenses import lens_parameters
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
@@ -35,6 +34,7 @@ from viewsphere.model.scene import (
     Sun,
     ViewTransform,
 )
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.thing import Thing
 from viewsphere.run.shots.stages import Stages
 

@@ -18,9 +18,9 @@ from viewsphere.engines import raster
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.labels import observe
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Scene, ViewTransform
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.raster.visibility import rasterize
 

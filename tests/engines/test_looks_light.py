@@ -12,10 +12,10 @@ from light_stage import cuboid, flat
 from shots import painted, still_shot
 from viewsphere.engines import raster
 from viewsphere.engines.raster.sky.environment import bake_surrounding, sky_lights
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import AreaLight, Daylight, Ground, PointLight, Scene, Sky, SpotLight, Sun
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.thing import Thing
 from viewsphere.rendering.sky.daylight import air, daylight_picture, opening
 

@@ -11,11 +11,11 @@ from shots import still_shot
 from viewsphere.engines import raster
 from viewsphere.engines.raster import kernels_blur as kernels
 from viewsphere.engines.raster.blurring import MOST, Blur
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.exposure import Exposure, Sweep
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Ground, Scene, Sun
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.exposure import Exposure, Sweep
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.truth.raster.visibility import rasterize

@@ -20,7 +20,6 @@ from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster
 from viewsphere.engines.raster.shading.painting import paint
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
     AreaLight,
@@ -35,6 +34,7 @@ from viewsphere.model.scene import (
     Sun,
     ViewTransform,
 )
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Thing
 from viewsphere.rendering.view import EXPOSURE
 from viewsphere.truth.raster.visibility import rasterize

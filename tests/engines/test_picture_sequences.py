@@ -10,10 +10,10 @@ from shots import still_shot
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import raster
 from viewsphere.engines.raster.shadows.still_maps import MOST, STEPS, StillMaps, rounded, snapped
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Ground, PointLight, Scene, Sun
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.raster.visibility import rasterize
 

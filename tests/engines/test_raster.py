@@ -16,9 +16,9 @@ from viewsphere.engines import raster
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.lenses import LensParameters, lens_parameters
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, ViewTransform
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Thing
 from viewsphere.rendering.view import EXPOSURE, KNEE
 from viewsphere.truth.raster.visibility import rasterize

@@ -12,7 +12,7 @@ from viewsphere.engines.raster.antialiasing.kernels_samples import TIE
 from viewsphere.engines.raster.antialiasing.samples import NOWHERE, OFFSETS, edge_samples, layers
 from viewsphere.engines.raster.shading.kernels_paint import BRIGHT, GLINT, average_samples, brighten_lines, shared_samples
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.visibility import rasterize
 from viewsphere_zoo import build
 

@@ -13,8 +13,8 @@ from quick import quick
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines.raster.shadows import kernels_shadow as shadow
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.scene import AreaLight, HemisphereLight, PointLight, SpotLight, Sun
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.rendering.sky.sky import even_light
 from viewsphere.rendering.sky.sun import Distant, distant_sun
 

@@ -11,8 +11,8 @@ import pytest
 
 from proven import close, equal
 from viewsphere.formats.carla import TAGS, Carla, refuses, transform
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.rig import Rig
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 

@@ -18,7 +18,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats.cityscapes.classes import COLORS, INSTANCES, LABELS, label_of
 from viewsphere.formats.cityscapes.instances import regions
 from viewsphere.geometry.lenses import lens_parameters
-from viewsphere.model.classes import SemanticClass
+from viewsphere.model.annotations.classes import SemanticClass
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import export, write

@@ -10,7 +10,7 @@ from PIL import Image
 
 import cube_dataset
 from proven import close, equal
-from viewsphere.model.classes import FIRST_THING
+from viewsphere.model.annotations.classes import FIRST_THING
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import export, write
 from viewsphere.store import Category

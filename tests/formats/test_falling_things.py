@@ -20,7 +20,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import falling_things
 from viewsphere.formats.falling_things import Options
 from viewsphere.geometry.mask import decode_rle
-from viewsphere.model.rig import Rig, Sensor
+from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.run.exports.exporting import export
 
 P = np.array([[0, 0, 1], [1, 0, 0], [0, -1, 0]])

@@ -13,7 +13,7 @@ from viewsphere import Dataset
 from viewsphere.errors import UserError
 from viewsphere.formats.huggingface import Options, verify
 from viewsphere.labels import channels
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.run.datasets.importing import import_dataset
 from viewsphere.run.exports.exporting import export
 

@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from cube_dataset import MESHES, POSES, make
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import write
 

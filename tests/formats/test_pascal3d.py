@@ -227,7 +227,7 @@ def test_an_empty_picture_is_left_out(tmp_path):
 
 def test_points_whose_names_meet_in_matlab():
     from viewsphere.formats.shared.viewpoint_mat import _fields
-    from viewsphere.model.keypoints import Keypoints
+    from viewsphere.model.annotations.keypoints import Keypoints
 
     class Info:
         def __init__(self, *names):

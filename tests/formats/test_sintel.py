@@ -12,7 +12,7 @@ from proven import close, equal
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope, sintel
 from viewsphere.geometry.lenses import lens_parameters
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 

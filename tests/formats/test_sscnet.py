@@ -14,7 +14,7 @@ from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.formats.sscnet import Sscnet, refuses
-from viewsphere.model.voxels import RUN
+from viewsphere.model.annotations.voxels import RUN
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 from worlds import stills as recipe

@@ -14,8 +14,8 @@ import pytest
 from proven import close, equal
 from viewsphere.errors import UserError
 from viewsphere.formats.synthia import COLORS, Options, Synthia, refuses
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.rig import Rig, Sensor
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.scope import scope_of
 from viewsphere.store import Category

@@ -11,8 +11,8 @@ from PIL import Image
 from proven import close, equal
 from viewsphere.formats.vkitti import Options, refuses
 from viewsphere.formats.vkitti.names import COLORS, Names, object_colors
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.rig import Rig
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.preparing import Views

@@ -10,7 +10,7 @@ import pytest
 from cube_dataset import make
 from viewsphere import Dataset
 from viewsphere.formats.webdataset import Options, verify
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.run.exports.exporting import export
 from viewsphere.store.shots.sample_records import from_whole_sample
 

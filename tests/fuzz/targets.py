@@ -163,7 +163,7 @@ BASE = b"name: base\ncamera: {size: [64, 48], fov_deg: [30, 50]}\nviewpoints: {d
 
 @cache
 def recipes() -> Pack:
-    from viewsphere.recipe import file
+    from viewsphere.recipe.reading import file
 
     root = Path(__file__).parents[2]
     texts = [
@@ -488,7 +488,7 @@ def _channel(path: Path) -> None:
 def coded() -> Pack:
     """A file of each kind in which the store keeps channels, and of others that imported pictures may have."""
     from viewsphere.labels import channels
-    from viewsphere.model.files import Files as Kinds
+    from viewsphere.model.fields.files import Files as Kinds
     from viewsphere.store import encode
 
     rgb = photograph(12, 8)
@@ -551,7 +551,7 @@ def _made(short: bool, shots: str = "files") -> Path:
     """A data set of one shot of four small frames, and its exports inside of it."""
     import tempfile
 
-    from viewsphere.model.files import Files as Kinds
+    from viewsphere.model.fields.files import Files as Kinds
     from viewsphere.run.exports.exporting import export
     from viewsphere.store.shots.heartbeat import Heartbeat
     from viewsphere.store.shots.records import NAME_BYTES

@@ -8,7 +8,7 @@ from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, project
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.pose_category import SIDES, pose_category
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 
 FACES, EDGES, VERTEX_SIGNS = (Box3d.layout()[name] for name in ("faces", "edges", "signs"))
 CUBE_TRIANGLES = np.array([(f[a], f[b], f[c]) for f in FACES.values() for a, b, c in ((0, 1, 2), (0, 2, 3))], np.int32)

@@ -15,7 +15,7 @@ from viewsphere.geometry.camera import (
     project,
 )
 from viewsphere.geometry.lenses import focal_from_fov, lens_parameters
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 
 PROFILE = settings(max_examples=25, derandomize=True, deadline=None, database=None)
 

@@ -11,7 +11,7 @@ from viewsphere.geometry.box import projected_bounds
 from viewsphere.geometry.camera import orbit_rotation
 from viewsphere.geometry.lenses import LensSpec, lens_of, lens_parameters
 from viewsphere.geometry.lenses.shared import outline
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.plugins import loadable
 
 PROFILE = settings(max_examples=25, derandomize=True, deadline=None, database=None)

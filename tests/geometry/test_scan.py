@@ -11,8 +11,8 @@ from quick import quick
 from viewsphere.geometry.box import projected_bounds
 from viewsphere.geometry.camera import orbit_rotation, pixel_rays, project
 from viewsphere.geometry.lenses.scan import Scan
-from viewsphere.model.camera import Camera
-from viewsphere.recipe.lidar import LidarEntry
+from viewsphere.model.sensors.camera import Camera
+from viewsphere.recipe.cameras.lidar import LidarEntry
 
 
 def scan(**said):

@@ -15,7 +15,7 @@ from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import compose, random_rotation, rigid, rotation_about
 from viewsphere.labels.canonical_pose import nearest
 from viewsphere.labels.keypoints import LABEL
-from viewsphere.model.symmetries import Symmetries
+from viewsphere.model.annotations.symmetries import Symmetries
 from viewsphere.store import Dataset
 
 VISIBLE, OCCLUDED, OUTSIDE, BEHIND = range(4)

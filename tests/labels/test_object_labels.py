@@ -18,10 +18,10 @@ from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
 from viewsphere.labels import annotated, context_of, labels_of, object_labels, regular
 from viewsphere.labels.shared.placement import view_of
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.store.shots.sample_records import from_whole_sample, whole_sample
 from viewsphere.truth.raster.geometry import build_geometry

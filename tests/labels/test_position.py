@@ -9,7 +9,7 @@ from truth_scenes import LENSES, lens, orbit_camera, placed, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
 from viewsphere.labels.position import LABEL, striped
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.visibility import rasterize
 
 NAMES = ("depth", "instances", "coordinates", "position")

@@ -8,9 +8,9 @@ from pycocotools import mask as coco
 from test_object_labels import scene
 
 from viewsphere.assets.cache import load_normalised
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.truth.raster.visibility import rasterize
 
 MODELS = Path(__file__).parents[2].parent / "shared" / "models"

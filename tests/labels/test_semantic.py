@@ -17,7 +17,7 @@ from viewsphere.codecs.palette import palette
 from viewsphere.geometry.rotation import rigid
 from viewsphere.labels import channels, observe
 from viewsphere.labels.semantic import LABEL
-from viewsphere.model.classes import (
+from viewsphere.model.annotations.classes import (
     FIRST_THING,
     GROUND,
     SCENERY,
@@ -27,7 +27,7 @@ from viewsphere.model.classes import (
     class_colors,
     classes_of,
 )
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.store import Dataset, encode

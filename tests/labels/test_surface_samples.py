@@ -19,8 +19,8 @@ from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels import annotated, channels, context_of, observe
 from viewsphere.labels.surface_samples import LABEL
+from viewsphere.model.annotations.surface_samples import SURFACE_SAMPLE
 from viewsphere.model.sample import Sample
-from viewsphere.model.surface_samples import SURFACE_SAMPLE
 from viewsphere.model.thing import Motion
 from viewsphere.store import Dataset, encode
 from viewsphere.store.samples.channel_files import decode

@@ -20,10 +20,10 @@ from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels import LabelContext, channels
 from viewsphere.labels.voxels import LABEL
-from viewsphere.model.camera import Camera
+from viewsphere.model.annotations.voxels import FREE, INSIDE, OCCLUDED, OUTSIDE, RUN, SURFACE, TOUCHED, Grid, Voxels
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.model.voxels import FREE, INSIDE, OCCLUDED, OUTSIDE, RUN, SURFACE, TOUCHED, Grid, Voxels
 from viewsphere.store import Dataset, encode
 from viewsphere.store.samples.channel_files import decode
 

@@ -21,13 +21,13 @@ from viewsphere.geometry.box3d import Box3d
 from viewsphere.materials import brick as brick_module
 from viewsphere.materials import metres, surface
 from viewsphere.materials.brick import Brick
-from viewsphere.model.procedural_material import ProceduralMaterial
+from viewsphere.model.annotations.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import Ground
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scene import EngineEntry
+from viewsphere.recipe.world.scene import EngineEntry
 from viewsphere.rendering.ground.material import ground_albedo, ground_material, only_scatters
 from viewsphere_zoo import build
 

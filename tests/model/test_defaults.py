@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 import viewsphere.planning.plan  # noqa: F401 # every class of a recipe and a shot
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 
 
 def _classes(base: type[Frozen]) -> Iterator[type[Frozen]]:

@@ -7,9 +7,9 @@ import sys
 import pytest
 from pydantic import BaseModel, Field, ValidationError
 
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.listed import ListedObject, ListedShot
-from viewsphere.model.omit_none import OmitNone
 
 
 class Wheel(Frozen):

@@ -8,7 +8,7 @@ import pytest
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import project
-from viewsphere.model.rig import Rig
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.planning.rig_files import read_rig as read_rig_file
 from viewsphere.planning.rigs import rig_of
 from viewsphere.recipe.recipe import Recipe

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import project
-from viewsphere.model.rig import Rig
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.planning.plan import plan
 from viewsphere.planning.rigs import rig_of
 from viewsphere.recipe.recipe import Recipe

@@ -3,7 +3,7 @@
 import pytest
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.validation_errors import Marks, Place
+from viewsphere.model.fields.validation_errors import Marks, Place
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
 

@@ -6,7 +6,7 @@ import pytest
 
 from viewsphere import Recipe
 from viewsphere.errors import RecipeError
-from viewsphere.recipe.scene import SceneEntry
+from viewsphere.recipe.world.scene import SceneEntry
 
 
 def test_short_forms_mean_the_long_ones():

@@ -3,18 +3,18 @@
 import pytest
 
 from viewsphere import Recipe
-from viewsphere.model.appearance import Patch
+from viewsphere.model.annotations.appearance import Patch
+from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.omit_none import OmitNone
-from viewsphere.model.rig import Sensor
 from viewsphere.model.scene import Ground
+from viewsphere.model.sensors.rig import Sensor
 from viewsphere.model.thing import Repaint
+from viewsphere.recipe.cameras.viewpoints import PoseList
 from viewsphere.recipe.draws import Distribution, Gaussian
 from viewsphere.recipe.models import ModelEntry
-from viewsphere.recipe.scenery import CompanyEntry, PlaceEntry
-from viewsphere.recipe.surface import GroundEntry, MaterialEntry
-from viewsphere.recipe.viewpoints import PoseList
+from viewsphere.recipe.world.scenery import CompanyEntry, PlaceEntry
+from viewsphere.recipe.world.surface import GroundEntry, MaterialEntry
 
 CLASSES = [
     *(Viewpoint, ModelSpec, Sensor, Repaint, Ground, Patch, Distribution, Gaussian),

@@ -8,12 +8,12 @@ import pytest
 from pydantic import Field, ValidationError
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Amount, Portion
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Amount, Portion
 from viewsphere.model.scene import Color, Position, Srgb
 from viewsphere.recipe.draws import Drawn, alternatives, drawn, is_random
 from viewsphere.recipe.entries import entry_of
-from viewsphere.recipe.extends import assemble
+from viewsphere.recipe.reading.extends import assemble
 from viewsphere.recipe.recipe import Recipe
 
 

@@ -7,14 +7,14 @@ import pytest
 from pydantic import Field, ValidationError
 
 from viewsphere.model import scene
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Length, Portion
-from viewsphere.model.omit_none import OmitNone
-from viewsphere.model.procedural_material import ProceduralMaterial
+from viewsphere.model.annotations.procedural_material import ProceduralMaterial
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Length, Portion
+from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.scene import Color, Effects, Picture, Srgb
-from viewsphere.recipe import finish, light, surface, weather
 from viewsphere.recipe.draws import drawn, is_random
 from viewsphere.recipe.entries import Entry, concrete, entry_of, pictures_of, words_of
+from viewsphere.recipe.world import finish, light, surface, weather
 
 
 class Halo(Frozen):

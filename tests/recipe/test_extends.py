@@ -5,9 +5,9 @@ import json
 import pytest
 
 from viewsphere.errors import RecipeError
-from viewsphere.recipe import extends
-from viewsphere.recipe.extends import assemble, parse_change
-from viewsphere.recipe.file import read
+from viewsphere.recipe.reading import extends
+from viewsphere.recipe.reading.extends import assemble, parse_change
+from viewsphere.recipe.reading.file import read
 from viewsphere.recipe.recipe import Recipe
 
 BASE = """\

@@ -12,7 +12,7 @@ from quick import quick
 from small import small_recipe, tree_hash
 from viewsphere.caches import cache_of
 from viewsphere.errors import RecipeError, RemoteError
-from viewsphere.recipe.fetched import PREFIX, fetched
+from viewsphere.recipe.reading.fetched import PREFIX, fetched
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.scratch import scratch_folder
 from viewsphere.urls import download, files_below, located, remote_path
@@ -136,7 +136,7 @@ def test_no_more_is_written_than_may_be(url, monkeypatch, known):
                 written.append(sum((own / "new" / name).stat().st_size for name in files_below(own / "new")))
 
     monkeypatch.setattr(kind, "find", find)
-    monkeypatch.setattr("viewsphere.recipe.fetched.scratch_folder", weighed)
+    monkeypatch.setattr("viewsphere.recipe.reading.fetched.scratch_folder", weighed)
     whole = sum(map(len, FILES.values()))
     monkeypatch.setenv("VIEWSPHERE_MAX_FETCHED_BYTES", str(whole - 1))
     with pytest.raises(RecipeError, match=rf"at most {whole - 1:,} bytes .*MAX_FETCHED_BYTES\), found more"):

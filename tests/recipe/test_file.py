@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from viewsphere.errors import RecipeError, UserError
-from viewsphere.recipe.file import _Loader, parse, read, schema
+from viewsphere.recipe.reading.file import _Loader, parse, read, schema
 from viewsphere.recipe.recipe import Recipe
 
 ROOT = Path(__file__).parents[2]

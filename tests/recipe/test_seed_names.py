@@ -8,15 +8,15 @@ import pytest
 
 from viewsphere import plugins
 from viewsphere.composing.seeds import generator, share
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Distribution, OrDrawn, drawn
 from viewsphere.recipe.kinds import ByKind
 from viewsphere.recipe.models import ModelEntry
-from viewsphere.recipe.scene import CameraEntry, SceneEntry
-from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.seed_names import SEED_NAMES
+from viewsphere.recipe.world.scene import CameraEntry, SceneEntry
+from viewsphere.recipe.world.scenes import ScenesEntry
 
 PINNED = Path(__file__).parent / "seed_names.json"
 """First number drawn by the seed 7 for each path of seed names. Only new lines may come."""

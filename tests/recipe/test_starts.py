@@ -17,7 +17,7 @@ from shots import unit_box
 from viewsphere.engines.shared.blender.options import PRESETS
 from viewsphere.errors import RecipeError
 from viewsphere.plugins import names
-from viewsphere.recipe.file import read, schema
+from viewsphere.recipe.reading.file import read, schema
 from viewsphere.recipe.starts import FIRST, kinds, start
 
 

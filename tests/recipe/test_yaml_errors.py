@@ -3,7 +3,7 @@
 import pytest
 
 from viewsphere.errors import RecipeError
-from viewsphere.recipe.file import parse
+from viewsphere.recipe.reading.file import parse
 
 PARSER_S = ("while scanning", "while parsing", "<block", "token", "scalar", "alias", "anchor", "alphabetic", "simple key")
 """Words of the YAML reader that mean nothing to a user."""

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from viewsphere.assets.srgb import linear
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Background, Effects, Finish, Smoother, ViewTransform
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.rendering.effects import apply_effects, has_effects
 from viewsphere.rendering.effects.blurs import SIGMA, STREAK, streak
 from viewsphere.rendering.effects.color import LUMINANCE, chroma_matrix, tone_table

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from viewsphere.geometry.camera import orbit_rotation
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.weather import Rain, Snow
 from viewsphere.rendering.weather import kernels_falling as kernels
 from viewsphere.rendering.weather.falling import CLASSES, IN_A_CELL, _there, fall

@@ -22,7 +22,7 @@ POST_BOX = {"contiguous": 1, "coco": 91}
 
 PLUGIN = """
 from contextlib import contextmanager
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.plugins.format import FormatSpec
 
 class Options(Frozen):

@@ -11,11 +11,11 @@ import pytest
 from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.lenses import lens_parameters
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.scene import IDENTITY, Ground, Scene
+from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.run.shots.stages import Stages

@@ -9,7 +9,7 @@ import viewsphere as vs
 from viewsphere.check import check
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.rig import Rig
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.planning.plan import plan
 from viewsphere.preview import contact_sheet, dataset_samples, preview_samples

@@ -11,10 +11,10 @@ from pictures import photograph, write
 from quick import quick
 from shots import still_shot
 from viewsphere.assets.srgb import encoded, linear
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.thing import Thing
 from viewsphere.rendering.background import display_background
 from viewsphere.run.shots.stages import Stages

@@ -7,7 +7,7 @@ import trimesh
 from cube_dataset import MESHES, make
 from truth_scenes import sphere
 from viewsphere.errors import StoreError
-from viewsphere.model.voxels import INSIDE, TOUCHED, Occupancy
+from viewsphere.model.annotations.voxels import INSIDE, TOUCHED, Occupancy
 
 
 @pytest.fixture(scope="module")

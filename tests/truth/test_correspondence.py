@@ -11,7 +11,7 @@ from two_views import brute_points, brute_xy, centers, matched, pose, view
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import matrix_from_quaternion
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.surface_points.draws import points_on
 
 AHEAD = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +Y, Z up

@@ -10,9 +10,9 @@ from truth_scenes import placed, random_soup, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import LabelContext
 from viewsphere.labels.lidar import LABEL
-from viewsphere.model.camera import Camera
-from viewsphere.model.rig import Sensor
-from viewsphere.recipe.lidar import LidarEntry
+from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.rig import Sensor
+from viewsphere.recipe.cameras.lidar import LidarEntry
 from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.shot_views import Painted
 

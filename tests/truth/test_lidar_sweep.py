@@ -8,8 +8,8 @@ import pytest
 from truth_scenes import cube, mesh_of, placed, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import rigid, rotation_about
-from viewsphere.model.camera import Camera
-from viewsphere.recipe.lidar import LidarEntry
+from viewsphere.model.sensors.camera import Camera
+from viewsphere.recipe.cameras.lidar import LidarEntry
 from viewsphere.truth.lidar.sweeping import Turning, still_hits, swept_hits
 from viewsphere.truth.raster.visibility import rasterize
 

@@ -14,10 +14,10 @@ from truth_scenes import FISHEYE, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere.geometry.rotation import rigid
 from viewsphere.labels import LabelContext, Partner, channel_labels
 from viewsphere.labels.shared.drawing.flow_colors import picture, wheel
-from viewsphere.model.camera import Camera
-from viewsphere.model.files import Files
-from viewsphere.model.rig import Rig, Sensor
+from viewsphere.model.fields.files import Files
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.store.samples.channel_files import decode, encode
 from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.view import View

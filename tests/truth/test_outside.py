@@ -6,8 +6,8 @@ import pytest
 from truth_scenes import cube, orbit_camera, sphere
 from viewsphere.geometry.box import overlap
 from viewsphere.labels import LabelContext
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import OUTSIDE, homogeneous, in_picture, rasterize

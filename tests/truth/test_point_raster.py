@@ -10,7 +10,7 @@ from two_views import brute_hidden, brute_points, centers, expected_states, matc
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from viewsphere.assets.mesh import Material
 from viewsphere.geometry.rotation import matrix_from_quaternion
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize
 from viewsphere.truth.surface_points.draws import points_on

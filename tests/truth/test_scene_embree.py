@@ -11,8 +11,8 @@ from shots import still_shot
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import annotated, context_of, observe
-from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.raster.geometry import build_geometry
 from viewsphere.truth.raster.visibility import rasterize

@@ -9,10 +9,10 @@ import pytest
 from truth_scenes import FISHEYE, LENSES, cast, lens, mesh_of, orbit_camera, random_soup
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines.raster.antialiasing.samples import edge_samples
-from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.recipe.lidar import LidarEntry
+from viewsphere.recipe.cameras.lidar import LidarEntry
 from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.lidar.sweeping import Turning, still_hits, swept_hits
 from viewsphere.truth.raster.geometry import build_geometry, seen_from, with_both_sides

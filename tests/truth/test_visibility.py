@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from truth_scenes import LENSES, cast, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.visibility import rasterize
 
 EXACT = settings(max_examples=12, derandomize=True, deadline=None, database=None)

@@ -10,7 +10,7 @@ import pytest
 import viewsphere_zoo as zoo
 from viewsphere.assets.metadata.surface import Surface
 from viewsphere.assets.metadata.symmetries import find
-from viewsphere.model.symmetries import Symmetries
+from viewsphere.model.annotations.symmetries import Symmetries
 from viewsphere_zoo.families.bottle import FORMS, Bottle, bottle
 from viewsphere_zoo.families.bottle import draw as draw_bottle
 from viewsphere_zoo.families.bowl import SHAPES as BOWLS

@@ -19,7 +19,7 @@ from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
 from viewsphere.plugins import prefix_of
 from viewsphere.plugins.source import file_in
-from viewsphere.recipe.sidecar import ENDING
+from viewsphere.recipe.reading.sidecar import ENDING
 
 
 @dataclass(frozen=True)

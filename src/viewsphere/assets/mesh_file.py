@@ -10,7 +10,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import TEXTURE_FIELDS, FileFacts
 from viewsphere.assets.scene_annotations import Annotation
 from viewsphere.caches.arrays import Content, read_arrays, write_arrays
-from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.annotations.keypoints import Keypoints
 
 ARRAYS = (
     "vertices",

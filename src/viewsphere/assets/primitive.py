@@ -15,7 +15,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.readers.shared.coordinates import check_coordinates
 from viewsphere.assets.scene_annotations import Annotation
-from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.annotations.keypoints import Keypoints
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.scene import IDENTITY, Matrix4
 

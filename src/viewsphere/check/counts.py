@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.recipe.cameras.sequence import TimeEntry
 from viewsphere.store import Dataset, PlanRecord
 from viewsphere.store.credits import credits_problem
 

@@ -16,7 +16,7 @@ from viewsphere.formats.blend import StoredModels
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.plugins.engine import EngineSpec
-from viewsphere.recipe.scene import engine_entry
+from viewsphere.recipe.world.scene import engine_entry
 from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Dataset
 

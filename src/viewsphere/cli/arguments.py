@@ -110,7 +110,7 @@ FormatOptions = Annotated[
 def load_recipe(file: Path, changes: Sequence[str] | None = None) -> Recipe:
     """The recipe of a file with some fields set; RecipeError names every mistake."""
     from viewsphere.assets.readers import suffixes
-    from viewsphere.recipe.extends import parse_change
+    from viewsphere.recipe.reading.extends import parse_change
     from viewsphere.recipe.recipe import Recipe
 
     if file.suffix.lower()[1:] in suffixes():
@@ -138,9 +138,9 @@ def asked_formats(formats: str | None, option: str = "--format") -> tuple[str, .
 
 def with_options(names: Sequence[str], options: Sequence[str] | None) -> tuple[FormatEntry, ...]:
     """The formats of these names with the options that are set for them; RecipeError names what cannot be set."""
-    from viewsphere.model.validation_errors import one_of
-    from viewsphere.recipe.extends import parse_change
+    from viewsphere.model.fields.validation_errors import one_of
     from viewsphere.recipe.formats import FormatEntry
+    from viewsphere.recipe.reading.extends import parse_change
 
     entries = {name: FormatEntry(name=name) for name in names}
     for text in options or ():

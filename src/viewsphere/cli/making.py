@@ -37,7 +37,7 @@ from viewsphere.cli.terminal import (
 )
 from viewsphere.errors import StoreError, UserError
 from viewsphere.kernels.garbage import importing
-from viewsphere.model.quantity import quantity
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
 from viewsphere.run.workers.worker_count import cores
 from viewsphere.scratch import write_whole
@@ -98,7 +98,7 @@ def _new_again(format_: str, source: Path, folder: Path | None) -> None:
 
 def _new_start(folder: Path, kind: str) -> None:
     if kind not in kinds():
-        from viewsphere.model.validation_errors import one_of
+        from viewsphere.model.fields.validation_errors import one_of
 
         raise UserError(f"--kind: {one_of(kind, kinds())}")
     file = folder if folder.suffix in {".yaml", ".yml"} else folder / "recipe.yaml"
@@ -131,7 +131,7 @@ def schema() -> None:
     """Print the recipe's JSON schema, for editors."""
 
     from viewsphere.labels import channels, on_request
-    from viewsphere.recipe.file import schema as recipe_schema
+    from viewsphere.recipe.reading.file import schema as recipe_schema
 
     print_json(recipe_schema(channels=tuple(channels()), annotations=tuple(on_request())))
 

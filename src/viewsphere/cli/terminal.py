@@ -17,7 +17,7 @@ import typer
 
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.kernels.garbage import importing
-from viewsphere.model.quantity import quantity
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.printable import printable
 from viewsphere.scratch import write_whole
 

@@ -44,7 +44,7 @@ from viewsphere.model.scene import IDENTITY, Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scenery import Labels
+from viewsphere.recipe.world.scenery import Labels
 from viewsphere.store import Category
 
 __all__ = ["BoxOf", "Composition", "Moved", "Numbering", "center", "center_of_all", "compose", "still"]

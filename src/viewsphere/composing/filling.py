@@ -14,12 +14,12 @@ from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import projected_bounds
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Camera
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
-from viewsphere.recipe.aim import FARTHEST
+from viewsphere.recipe.cameras.aim import FARTHEST
 
 Float = NDArray[np.float64]
 

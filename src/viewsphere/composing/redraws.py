@@ -9,10 +9,10 @@ from __future__ import annotations
 from viewsphere.composing.layouts import is_slow
 from viewsphere.composing.seeds import Names
 from viewsphere.limits import limits
+from viewsphere.recipe.cameras.viewpoints import Jitter, Normal, Sphere
 from viewsphere.recipe.draws import is_random, span
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scenes import ScenesEntry
-from viewsphere.recipe.viewpoints import Jitter, Normal, Sphere
+from viewsphere.recipe.world.scenes import ScenesEntry
 
 RANDOM = Sphere | Normal | Jitter
 """Viewpoints that are drawn."""

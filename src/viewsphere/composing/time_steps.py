@@ -18,9 +18,9 @@ from viewsphere.model.instant import Moment, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.plugins.source import file_in
+from viewsphere.recipe.cameras.time import Frames, Steps, chosen_frames
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.time import Frames, Steps, chosen_frames
 
 if TYPE_CHECKING:
     from viewsphere.assets.animation.timeline import Blenders

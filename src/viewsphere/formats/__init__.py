@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from viewsphere.model.rig import Rig
     from viewsphere.model.sample import Sample
+    from viewsphere.model.sensors.rig import Rig
     from viewsphere.store import Category
 
 

@@ -48,9 +48,9 @@ from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.sequences import scene
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, quaternion_from_matrix, transform
-from viewsphere.model.camera import Camera
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 

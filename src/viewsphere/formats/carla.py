@@ -45,8 +45,8 @@ from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.sequences import scene
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions, item
-from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 

@@ -29,7 +29,7 @@ from viewsphere.formats.shared.writing.pictures import picture, png, suffix_of
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, item
 from viewsphere.geometry.mask import mask_box
 from viewsphere.labels.panoptic import class_of, object_of
-from viewsphere.model.classes import SemanticClass, thing_class
+from viewsphere.model.annotations.classes import SemanticClass, thing_class
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -23,7 +23,7 @@ from pydantic import Field
 
 from viewsphere.files import open_file
 from viewsphere.formats.shared.writing.export_files import Expected, check_files, put
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.scratch import temporary

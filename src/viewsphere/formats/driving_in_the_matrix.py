@@ -30,7 +30,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.refusals import plain_names
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions, line
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

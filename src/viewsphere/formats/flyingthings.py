@@ -51,7 +51,7 @@ from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.sequences import Eyes, check_whole, instants, number, scene, two_eyes
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions, line
 from viewsphere.geometry.rotation import rigid
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

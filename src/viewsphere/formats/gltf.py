@@ -34,7 +34,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats.shared.cameras import opengl_pose
 from viewsphere.formats.shared.writing.export_files import check_files
 from viewsphere.formats.shared.writing.refusals import any_camera
-from viewsphere.model.classes import thing_class
+from viewsphere.model.annotations.classes import thing_class
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.scratch import temporary

@@ -40,7 +40,7 @@ from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.formats.shared.writing.refusals import sequences
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -32,7 +32,7 @@ from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of
 from viewsphere.formats.shared.writing.tree import LINES, File, Layout, Piece, Tree, functions
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -47,7 +47,7 @@ from viewsphere.formats.shared.writing.flow_files import flow_png, steps_png
 from viewsphere.formats.shared.writing.pictures import ids_png, picture
 from viewsphere.formats.shared.writing.sequences import Eyes, check_whole, instants, number, two_eyes
 from viewsphere.formats.shared.writing.tree import File, Tree, functions
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

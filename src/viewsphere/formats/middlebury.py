@@ -46,7 +46,7 @@ from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.sequences import Eyes, instants, number, scene, two_eyes
 from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.geometry.rotation import quaternion_from_matrix
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -29,11 +29,11 @@ from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of
 from viewsphere.formats.shared.writing.refusals import plain_names, sequences
 from viewsphere.formats.shared.writing.tree import LINES, File, Layout, Piece, Tree, functions
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.rig import CAMERA
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.plugins.format import FormatSpec
-from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.recipe.cameras.sequence import TimeEntry
 from viewsphere.store import Dataset
 
 KINDS = (".png", ".jpg")

@@ -44,8 +44,8 @@ from viewsphere.formats.shared.writing.pictures import depth_png, picture
 from viewsphere.formats.shared.writing.refusals import known_cameras, most_objects
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
-from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset, ModelInfo
 

@@ -42,7 +42,7 @@ from viewsphere.formats.shared.writing.refusals import known_views, lenses, pinh
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import product, transform
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

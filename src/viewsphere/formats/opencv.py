@@ -31,9 +31,9 @@ from viewsphere.formats.shared.cameras import Rigs
 from viewsphere.formats.shared.writing.refusals import known_cameras, no_skew, opencv_lenses
 from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.geometry.rotation import product, rotation_vector, transform
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 

@@ -23,9 +23,9 @@ from viewsphere.files import read_bytes
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.export_files import check_files
 from viewsphere.formats.shared.writing.refusals import any_camera
+from viewsphere.model.annotations.point_cloud import PointCloud
 from viewsphere.model.channel import missing
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.point_cloud import PointCloud
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.store import Dataset

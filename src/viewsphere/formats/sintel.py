@@ -47,9 +47,9 @@ from viewsphere.formats.shared.writing.flow_files import FLO_TAG, flo_file, stat
 from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.sequences import Eyes, check_whole, instants, number, scene, two_eyes
 from viewsphere.formats.shared.writing.tree import File, Tree, functions
-from viewsphere.model.camera import Camera
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 

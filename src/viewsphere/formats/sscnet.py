@@ -43,9 +43,9 @@ from viewsphere.formats.shared.writing.pictures import depth_steps
 from viewsphere.formats.shared.writing.sequences import scene
 from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.geometry.rotation import product, transform
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.annotations.voxels import EMPTY, OUTSIDE, Grid, Voxels
 from viewsphere.model.sample import Sample
-from viewsphere.model.voxels import EMPTY, OUTSIDE, Grid, Voxels
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 

@@ -52,10 +52,10 @@ from viewsphere.formats.shared.writing.pictures import depth_steps, picture
 from viewsphere.formats.shared.writing.sequences import Eyes, scene, two_eyes
 from viewsphere.formats.shared.writing.tree import LINES, File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Camera
-from viewsphere.model.classes import Color, SemanticClass
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.annotations.classes import Color, SemanticClass
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 

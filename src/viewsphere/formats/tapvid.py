@@ -44,7 +44,7 @@ from viewsphere.formats.shared.writing.pictures import JPEG_QUALITY, opaque
 from viewsphere.formats.shared.writing.sequences import check_whole, scene
 from viewsphere.formats.shared.writing.tree import File, Tree, functions
 from viewsphere.geometry.rotation import rigid
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

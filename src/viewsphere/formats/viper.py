@@ -43,8 +43,8 @@ from viewsphere.formats.shared.writing.sequences import check_whole, instants
 from viewsphere.formats.shared.writing.timeline import Timeline
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, functions
 from viewsphere.geometry.rotation import product, transform
-from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 

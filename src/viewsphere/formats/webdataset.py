@@ -25,7 +25,7 @@ from viewsphere.files import open_file
 from viewsphere.formats.shared.writing.export_files import check_files
 from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.model.channel import PICTURES
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec, Remark
 from viewsphere.store import Dataset

@@ -1,4 +1,4 @@
-"""The protocols of the cameras that geometry uses: `viewsphere.model.camera` has the classes that satisfy them."""
+"""The protocols of the cameras that geometry uses: `viewsphere.model.sensors.camera` has the classes that satisfy them."""
 
 # ruff: noqa: D102, the classes say what each name means
 

@@ -10,8 +10,8 @@ from viewsphere.geometry.mask import mask_box
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.spec import Drawing, Field, Models, ObjectLabel, rendered
-from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw

@@ -14,9 +14,9 @@ from viewsphere.labels.shared.drawing.lines import axes
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
+from viewsphere.model.annotations.symmetries import Continuous, Symmetries
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import IDENTITY
-from viewsphere.model.symmetries import Continuous, Symmetries
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw

@@ -45,9 +45,9 @@ from viewsphere.labels.shared.ids import in_attributes
 from viewsphere.labels.shared.needs import Randomness, Scenery, ShotAppearance
 from viewsphere.labels.shared.randomness import generator
 from viewsphere.labels.shared.spec import Drawing, Models, Picture, SampleLabel
-from viewsphere.model.classes import SKY, STUFF_IDS
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Count, Natural, Portion
+from viewsphere.model.annotations.classes import SKY, STUFF_IDS
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Count, Natural, Portion
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels.shared.needs import Randomness
 from viewsphere.labels.shared.randomness import generator
 from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, Picture, channel_of
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Natural, Number
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Natural, Number
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from viewsphere.labels.shared.drawing.inset_map import NEXT, OWN, PREVIOUS, inse
 from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.needs import Poses
 from viewsphere.labels.shared.spec import Drawing, Models, SampleLabel
-from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw

@@ -16,8 +16,8 @@ from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.needs import OwnView
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Number
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Number
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.truth.surface_points.points import points_in_world
 from viewsphere.truth.surface_points.raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE

@@ -16,8 +16,8 @@ from viewsphere.labels.shared.needs import LidarScan, Randomness, Scanner
 from viewsphere.labels.shared.randomness import generator
 from viewsphere.labels.shared.reflectance import albedo
 from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of
-from viewsphere.model.lidar import POINT, Lidar
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.lidar import POINT, Lidar
 from viewsphere.truth.lidar.sweeping import Hits, still_hits, swept_hits
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ ROUNDED = 1e-6
 
 
 def compute(context: LabelContext) -> NDArray[np.void]:
-    """One row a point that returns, (N,) of `viewsphere.model.lidar.POINT`, ring by ring. Raises ValueError where the sample's
+    """One row a point that returns, (N,) of `viewsphere.model.sensors.lidar.POINT`, ring by ring. Raises ValueError if the
     sensor is no LiDAR.
     """
     scanner, names = context.get(LidarScan()), context.get(Randomness())

@@ -12,7 +12,7 @@ from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.needs import ShotAppearance
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.spec import Drawing, Models, ObjectLabel, rendered
-from viewsphere.model.appearance import LONGEST
+from viewsphere.model.annotations.appearance import LONGEST
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:

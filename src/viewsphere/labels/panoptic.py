@@ -13,7 +13,7 @@ from viewsphere.labels.shared.class_maps import KEY, colored, with_classes, wron
 from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.ids import by_table
 from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, Picture, channel_of
-from viewsphere.model.classes import SKY
+from viewsphere.model.annotations.classes import SKY
 from viewsphere.model.sample import Sample
 
 if TYPE_CHECKING:

@@ -30,8 +30,8 @@ from viewsphere.labels.shared.field import Field
 from viewsphere.labels.shared.ids import in_attributes
 from viewsphere.labels.shared.needs import ShotAppearance
 from viewsphere.labels.shared.spec import Drawing, Models, SampleLabel
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Portion
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Portion
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewsphere.labels.shared.class_maps import KEY, class_names, colored, with_classes, wrong_classes
 from viewsphere.labels.shared.spec import ChannelLabel, Drawing, Models, channel_of
-from viewsphere.model.classes import SKY, class_colors
+from viewsphere.model.annotations.classes import SKY, class_colors
 from viewsphere.model.sample import Sample
 
 

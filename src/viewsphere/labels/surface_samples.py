@@ -15,8 +15,8 @@ from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.ids import in_column
 from viewsphere.labels.shared.needs import ObjectPoints
 from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, channel_of, rendered
+from viewsphere.model.annotations.surface_samples import SURFACE_SAMPLE, SurfaceSamples
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.surface_samples import SURFACE_SAMPLE, SurfaceSamples
 from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE, VISIBLE
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ UNIT = 1e-5
 
 def compute(context: LabelContext) -> NDArray[np.void]:
     """As many rows an object as the option `count` says, in the order of the ids, (N,) of
-    `viewsphere.model.surface_samples.SURFACE_SAMPLE`; none of an object that is not there, or has no surface.
+    `viewsphere.model.annotations.surface_samples.SURFACE_SAMPLE`; none of an object that is not there, or has no surface.
 
     The points are drawn evenly by area on the model as it is then, the same on all instances and wherever these stand. Whether
     one is seen is said as `tracks` say it: the segment from the camera's centre to the point meets no other surface.

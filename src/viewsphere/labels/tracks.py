@@ -14,8 +14,8 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.labels.shared.ids import in_column
 from viewsphere.labels.shared.needs import FollowedPoints
 from viewsphere.labels.shared.spec import ChannelLabel, Color, Drawing, Models, channel_of
+from viewsphere.model.annotations.tracks import TRACK
 from viewsphere.model.sample import Sample
-from viewsphere.model.tracks import TRACK
 from viewsphere.truth.surface_points.points import SKY
 from viewsphere.truth.surface_points.raster import OCCLUDED, VISIBLE
 
@@ -32,7 +32,7 @@ WORST = 4
 
 
 def compute(context: LabelContext) -> NDArray[np.void]:
-    """One row a point, (N,) of `viewsphere.model.tracks.TRACK`. Raises ValueError where the sample's shot follows none."""
+    """One row a point, (N,) of `viewsphere.model.annotations.tracks.TRACK`. Raises ValueError if the shot follows none."""
     followed = context.get(FollowedPoints())  # first: its triangles may take the place of a view's
     own = context.own_view
     if own is None or followed is None:

@@ -19,10 +19,22 @@ from viewsphere.labels.shared.drawing.voxel_view import drawn
 from viewsphere.labels.shared.ids import in_column
 from viewsphere.labels.shared.point_checks import ROUNDING, exact_depth, largest
 from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, channel_of, rendered
-from viewsphere.model.camera import Camera
-from viewsphere.model.classes import FIRST_THING, SKY, thing_class
+from viewsphere.model.annotations.classes import FIRST_THING, SKY, thing_class
+from viewsphere.model.annotations.voxels import (
+    EMPTY,
+    FREE,
+    INSIDE,
+    OCCLUDED,
+    OUTSIDE,
+    RUN,
+    SURFACE,
+    TOUCHED,
+    Grid,
+    VoxelGrid,
+    Voxels,
+)
 from viewsphere.model.sample import Sample
-from viewsphere.model.voxels import EMPTY, FREE, INSIDE, OCCLUDED, OUTSIDE, RUN, SURFACE, TOUCHED, Grid, VoxelGrid, Voxels
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.alpha_masks import NEVER
 
 if TYPE_CHECKING:
@@ -42,7 +54,7 @@ MESHES = 256
 
 
 def compute(context: LabelContext) -> NDArray[np.void]:
-    """The cells of the grid, its first axis slowest, as runs of equal ones, (N,) of `viewsphere.model.voxels.RUN`.
+    """The cells of the grid, its first axis slowest, as runs of equal ones, (N,) of `viewsphere.model.annotations.voxels.RUN`.
 
     A cell is an object's where a triangle has a part in it, or, for pieces of objects that are closed, where its centre is
     inside; scenery's and the ground's where a triangle has a part in it. Of several things in a cell it is the first one's:

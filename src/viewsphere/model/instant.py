@@ -10,10 +10,10 @@ from pydantic import Field
 
 from viewsphere.geometry.camera import orbit_angles
 from viewsphere.geometry.pose_category import pose_category
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.scene import Finish, Matrix4, Vector
+from viewsphere.model.sensors.camera import Intrinsics
 
 NEAREST = 1e-3
 """Metres ahead of a camera from which on a point may be what it looks at."""

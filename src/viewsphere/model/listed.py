@@ -7,11 +7,11 @@ from typing import Annotated, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from viewsphere.limits import limits
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.file_names import is_reserved
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Number
+from viewsphere.model.fields.file_names import is_reserved
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Number
 from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.model.sensors.camera import Intrinsics
 
 LARGEST_PICTURE = 16384
 """Pixels along a side."""

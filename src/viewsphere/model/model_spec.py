@@ -6,9 +6,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from viewsphere.model.appearance import Word
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.omit_none import OmitNone
+from viewsphere.model.annotations.appearance import Word
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]

@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import NotKeptError, StoreError
-from viewsphere.model.camera import Camera
 from viewsphere.model.channel import picture_of
+from viewsphere.model.fields.notebook import Shown
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import Size
-from viewsphere.model.notebook import Shown
-from viewsphere.model.quantity import quantity
-from viewsphere.model.rig import CAMERA
+from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.model.shot import Shot
 
 if TYPE_CHECKING:
-    from viewsphere.model.point_cloud import Axes, PointCloud, Surface
-    from viewsphere.model.voxels import VoxelGrid
+    from viewsphere.model.annotations.point_cloud import Axes, PointCloud, Surface
+    from viewsphere.model.annotations.voxels import VoxelGrid
 
 MERGED = "-merged-"
 """Between the name of a sequence and its number, where merged data sets have several of one name."""
@@ -245,7 +245,7 @@ class Sample(Shown):
         `complete`: the points of `surface_samples` on all objects, visible or not, without colours. Raises StoreError where
         these are not kept, or the camera is not known; UserError for other axes or surfaces.
         """
-        from viewsphere.model.point_cloud import PointCloud
+        from viewsphere.model.annotations.point_cloud import PointCloud
 
         return PointCloud.of(self, axes, surface)
 
@@ -254,7 +254,7 @@ class Sample(Shown):
         """The cells of the channel `voxels` as arrays. Raises StoreError where it is not kept, or is not of the grid that the
         recipe asks for.
         """
-        from viewsphere.model.voxels import Grid, VoxelGrid, Voxels
+        from viewsphere.model.annotations.voxels import Grid, VoxelGrid, Voxels
 
         if "voxels" not in self.channels:
             raise StoreError(f"frame {self.index}: expected the channel voxels, found none: add it to the recipe's channels")

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
-from viewsphere.model.omit_none import OmitNone
-from viewsphere.model.procedural_material import ProceduralMaterial
+from viewsphere.model.annotations.procedural_material import ProceduralMaterial
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
+from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.weather import Fog, Lamps, Rain, Snow, Wet
 
 WEATHER = ("fog", "rain", "snow", "wet", "lamps")

@@ -10,15 +10,15 @@ import numpy as np
 from pydantic import Field, JsonValue, model_validator
 
 from viewsphere.geometry.rotation import compose, transform
-from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.exposure import Exposure, Sweep
-from viewsphere.model.files import Files
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.annotations.tracks import Tracks
+from viewsphere.model.fields.files import Files
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY, Finish, Scene
+from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.model.sensors.exposure import Exposure, Sweep
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.model.tracks import Tracks
 
 
 class Shot(Frozen):

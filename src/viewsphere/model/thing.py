@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.annotations.procedural_material import ProceduralMaterial
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Portion
+from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.numbers import Portion
-from viewsphere.model.omit_none import OmitNone
-from viewsphere.model.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import IDENTITY, Color, Matrix4, Picture
 
 

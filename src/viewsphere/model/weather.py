@@ -8,8 +8,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Length, Portion
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Length, Portion
 
 Amount = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 Light = tuple[Amount, Amount, Amount]

@@ -13,10 +13,10 @@ from viewsphere.errors import each
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.thing import TimeStep
+from viewsphere.recipe.cameras.sequence import TimeEntry
 from viewsphere.recipe.models import ModelEntry
-from viewsphere.recipe.motion import MotionEntry, Motions, has_clip, listed
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.recipe.world.motion import MotionEntry, Motions, has_clip, listed
 
 if TYPE_CHECKING:
     from viewsphere.assets.animation.timeline import Blenders

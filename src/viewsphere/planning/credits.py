@@ -13,9 +13,9 @@ from viewsphere.assets.paths.inside import split_source
 from viewsphere.composing.tables import Cells, table_rows
 from viewsphere.errors import RecipeError
 from viewsphere.model.credit import Credit
+from viewsphere.model.fields.quantity import first_few, quantity
+from viewsphere.model.fields.validation_errors import report, shown
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.quantity import first_few, quantity
-from viewsphere.model.validation_errors import report, shown
 from viewsphere.plugins.source import Named, source_of
 
 TABLE = "credits.csv"

@@ -29,9 +29,9 @@ from viewsphere.composing.viewpoints.pose_numbers import (
     numbered,
 )
 from viewsphere.errors import RecipeError
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.quantity import quantity
 from viewsphere.model.shard import ALL, Shard
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep

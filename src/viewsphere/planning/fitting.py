@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pydantic import JsonValue
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.validation_errors import shown
+from viewsphere.model.fields.validation_errors import shown
 from viewsphere.planning.engine_digest import engine_digest, script_digest
 from viewsphere.planning.plan import Plan
 from viewsphere.recipe.recipe import Splits

@@ -23,9 +23,9 @@ from viewsphere.composing.seeds import generator, share
 from viewsphere.composing.tables import Cells, table_rows
 from viewsphere.errors import ModelError, RecipeError, UserError, each
 from viewsphere.limits import limits
-from viewsphere.model.file_names import is_reserved
+from viewsphere.model.fields.file_names import is_reserved
+from viewsphere.model.fields.validation_errors import Nearest
 from viewsphere.model.model_spec import ModelSpec, Size
-from viewsphere.model.validation_errors import Nearest
 from viewsphere.plugins.source import Named, model_for, source_of, suggested
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import Dimensions, Length, ModelEntry, SizeTable, unit_metres

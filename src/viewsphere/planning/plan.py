@@ -29,11 +29,11 @@ from viewsphere.composing.time_steps import check_keys, timed
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses, poses_of
 from viewsphere.errors import RecipeError, each
 from viewsphere.model.credit import Credit
+from viewsphere.model.fields.notebook import Shown
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.notebook import Shown
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY, Floor
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.planning.checks.models import (
@@ -64,10 +64,10 @@ from viewsphere.planning.tracks import tracks_digest, tracks_of
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.draws import alternatives, span
-from viewsphere.recipe.finish import JitterEntry
-from viewsphere.recipe.light import NightSky
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scene import SceneEntry
+from viewsphere.recipe.world.finish import JitterEntry
+from viewsphere.recipe.world.light import NightSky
+from viewsphere.recipe.world.scene import SceneEntry
 from viewsphere.store import Block, Category, Row
 from viewsphere.store.index import Index, Ranges, length, numbers, under, without
 

@@ -13,16 +13,16 @@ from viewsphere.composing.viewpoints.pose_files.motions import nearest_rotation
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.labels import Partner, label_named, requires
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import PASSES
-from viewsphere.model.lidar import LIDAR, Lidar
-from viewsphere.model.rig import Rig, Sensor
+from viewsphere.model.fields.validation_errors import one_of, told_of
 from viewsphere.model.scene import IDENTITY, Matrix4
-from viewsphere.model.validation_errors import one_of, told_of
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.lidar import LIDAR, Lidar
+from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.planning.rig_files import Calibrated, read_rig
+from viewsphere.recipe.cameras.rig import RigFile, SensorEntry, SensorList, StereoRig, SurroundRig
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.rig import RigFile, SensorEntry, SensorList, StereoRig, SurroundRig
-from viewsphere.recipe.scene import CameraEntry
+from viewsphere.recipe.world.scene import CameraEntry
 
 Float = NDArray[np.float64]
 

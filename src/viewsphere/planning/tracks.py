@@ -10,10 +10,10 @@ from pathlib import Path
 
 from viewsphere.errors import RecipeError
 from viewsphere.files import read_text
-from viewsphere.model.rig import Rig
-from viewsphere.model.tracks import Query, Tracks
+from viewsphere.model.annotations.tracks import Query, Tracks
+from viewsphere.model.sensors.rig import Rig
+from viewsphere.recipe.cameras.tracks import MOST_POINTS
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.tracks import MOST_POINTS
 
 
 def tracks_of(recipe: Recipe, rig: Rig) -> Tracks | None:

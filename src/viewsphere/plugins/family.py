@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import Field, InstanceOf, field_validator, model_validator
 
 from viewsphere.errors import PluginError
-from viewsphere.model.classes import STUFF_IDS
-from viewsphere.model.keypoints import At
+from viewsphere.model.annotations.classes import STUFF_IDS
+from viewsphere.model.annotations.keypoints import At
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import Size
 from viewsphere.model.place import Surface
-from viewsphere.model.validation_errors import one_of
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import Spec
 

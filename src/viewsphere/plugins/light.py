@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.scene import AnyLight
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import Spec

@@ -14,8 +14,8 @@ from pydantic import Field, InstanceOf
 
 from viewsphere.errors import UserError
 from viewsphere.model.credit import Credit
+from viewsphere.model.fields.validation_errors import nearest
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.validation_errors import nearest
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.registry import Kind, load, names, prefix_of

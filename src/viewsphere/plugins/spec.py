@@ -9,10 +9,10 @@ from pydantic import ConfigDict, Field, ModelWrapValidatorHandler, ValidationErr
 from pydantic.fields import FieldInfo
 
 from viewsphere.errors import PluginError, RecipeError
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.quantity import quantity
-from viewsphere.model.validation_errors import dotted, explained, report
-from viewsphere.model.validation_errors import read_options as read_as
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.quantity import quantity
+from viewsphere.model.fields.validation_errors import dotted, explained, report
+from viewsphere.model.fields.validation_errors import read_options as read_as
 from viewsphere.plugins.registry import Kind
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import Spec
 
@@ -19,7 +19,7 @@ class TrajectorySpec(Spec):
     KIND: ClassVar[Kind] = "trajectories"
 
     options: type[Frozen] = Field(
-        description="the class of the options, upon `viewsphere.recipe.trajectories.Moving`; its field `kind` has the "
+        description="the class of the options, upon `viewsphere.recipe.cameras.trajectories.Moving`; its field `kind` has the "
         "trajectory's name as its only value"
     )
     trajectory: Callable[[Any, Path], Any] = Field(

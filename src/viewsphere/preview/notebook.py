@@ -9,8 +9,8 @@ from typing import Any
 
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.model.channel import picture_of
+from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.validation_errors import shown
 from viewsphere.planning.plan import Plan
 from viewsphere.preview.frame import Picture, draw_sample
 from viewsphere.preview.shown import dataset_samples

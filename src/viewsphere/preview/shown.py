@@ -12,16 +12,16 @@ import numpy as np
 from viewsphere.errors import each
 from viewsphere.labels import channels as known
 from viewsphere.labels import drawable, is_shown, on_request
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.annotations.tracks import Tracks
 from viewsphere.model.channel import picture_of
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
-from viewsphere.model.tracks import Tracks
 from viewsphere.planning.plan import Plan
+from viewsphere.recipe.cameras.rig import SensorList
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.rig import SensorList
 from viewsphere.run.opening import prepare
 from viewsphere.run.shots.camera_collisions import CameraChecks
 from viewsphere.run.shots.framing import Framing

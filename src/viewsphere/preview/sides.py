@@ -9,11 +9,11 @@ import numpy as np
 
 from viewsphere.assets.normalise import rotation
 from viewsphere.composing.viewpoints.camera import looking
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import Axis, ModelSpec
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Ground, Scene
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.preview.frame import Picture

@@ -26,11 +26,11 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Count, Metres, Natural, Number
-from viewsphere.model.omit_none import OmitNone
-from viewsphere.model.quantity import quantity
-from viewsphere.model.validation_errors import error_at, nearest, shown
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Count, Metres, Natural, Number
+from viewsphere.model.fields.omit_none import OmitNone
+from viewsphere.model.fields.quantity import quantity
+from viewsphere.model.fields.validation_errors import error_at, nearest, shown
 from viewsphere.recipe.seed_names import seed_name
 from viewsphere.recipe.values import OrShort
 

@@ -12,10 +12,10 @@ from pydantic import BeforeValidator, Field, Strict
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import whole
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import whole
+from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.scene import LINEAR, PICTURE, SRGB
-from viewsphere.model.validation_errors import shown
 from viewsphere.recipe.draws import KINDS, Distribution, Drawn
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color
 

@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Field, JsonValue, TypeAdapter, ValidationE
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.validation_errors import report, shown
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.validation_errors import report, shown
 from viewsphere.plugins.format import FormatSpec
 
 FORM = {

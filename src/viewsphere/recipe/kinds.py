@@ -10,8 +10,8 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from viewsphere import plugins
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.validation_errors import error_at, one_of, shown
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.validation_errors import error_at, one_of, shown
 from viewsphere.plugins.spec import Spec
 
 

@@ -31,25 +31,25 @@ from pydantic import (
 from viewsphere.errors import RecipeError
 from viewsphere.model.channel import DEFAULT_CHANNELS
 from viewsphere.model.credit import Credit
-from viewsphere.model.file_names import is_reserved
-from viewsphere.model.files import Files
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.lidar import LIDAR
-from viewsphere.model.notebook import Shown
-from viewsphere.model.numbers import Count, Natural, Number
-from viewsphere.model.validation_errors import Marks, error_at, report, shown
+from viewsphere.model.fields.file_names import is_reserved
+from viewsphere.model.fields.files import Files
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.notebook import Shown
+from viewsphere.model.fields.numbers import Count, Natural, Number
+from viewsphere.model.fields.validation_errors import Marks, error_at, report, shown
+from viewsphere.model.sensors.lidar import LIDAR
+from viewsphere.recipe.cameras.rig import RigField, SensorList
+from viewsphere.recipe.cameras.sequence import TimeEntry
+from viewsphere.recipe.cameras.tracks import TracksEntry
+from viewsphere.recipe.cameras.viewpoints import Viewpoints
 from viewsphere.recipe.formats import FormatEntry, FormatField
-from viewsphere.recipe.former_names import former_paths, is_former, renamed, with_present_names
 from viewsphere.recipe.models import ModelEntry
-from viewsphere.recipe.rig import RigField, SensorList
-from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
-from viewsphere.recipe.scenes import ScenesField
-from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.recipe.tracks import TracksEntry
+from viewsphere.recipe.reading.former_names import former_paths, is_former, renamed, with_present_names
 from viewsphere.recipe.values import OrShort, shape_of
 from viewsphere.recipe.variations import Variations, check_alike, varied
-from viewsphere.recipe.viewpoints import Viewpoints
 from viewsphere.recipe.wanted import WantedEntry
+from viewsphere.recipe.world.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
+from viewsphere.recipe.world.scenes import ScenesField
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames", "keep_annotations_above"}
 """Fields of a recipe that change neither a picture nor a label, as the credits of its models do not."""
@@ -305,8 +305,8 @@ class Recipe(Shown, Frozen):
         A recipe at a URL (`s3://bucket/cars/recipe.yaml`) is copied here with all that lies in its folder. Raises RecipeError
         with file, line and field of every mistake, RemoteError where a URL does not answer.
         """
-        from viewsphere.recipe.extends import assemble
-        from viewsphere.recipe.fetched import fetched
+        from viewsphere.recipe.reading.extends import assemble
+        from viewsphere.recipe.reading.fetched import fetched
 
         file = fetched(path)
         data, marks = assemble(file, _plain(changes))
@@ -370,7 +370,7 @@ class Recipe(Shown, Frozen):
 
     def to_yaml(self) -> str:
         """The recipe as the text of a file, without fields that equal their defaults; paths are kept as they were written."""
-        from viewsphere.recipe.file import dump
+        from viewsphere.recipe.reading.file import dump
 
         plain = self.model_dump(mode="json", exclude_defaults=True)
         for name in () if self.time is None else self.scene.flickering:

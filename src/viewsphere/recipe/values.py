@@ -20,9 +20,9 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Number, Positive
-from viewsphere.model.validation_errors import nearest, shown
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Number, Positive
+from viewsphere.model.fields.validation_errors import nearest, shown
 
 
 class OrShort:

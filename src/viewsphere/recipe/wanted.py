@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, model_validator
 
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.validation_errors import shown
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.validation_errors import shown
 from viewsphere.recipe.values import Interval
 
 

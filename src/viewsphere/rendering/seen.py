@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 
 
 @dataclass(frozen=True, eq=False)

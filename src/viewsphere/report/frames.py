@@ -8,9 +8,9 @@ import numpy as np
 
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import stand_in_for
-from viewsphere.model.camera import Camera
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.report.pictures import scan_size
 from viewsphere.report.sequences import moment_data
 from viewsphere.report.unknown import number, numbers

@@ -11,12 +11,12 @@ from typing import Any
 
 from viewsphere.composing.seeds import generator
 from viewsphere.errors import UserError
-from viewsphere.model.notebook import Shown
-from viewsphere.model.quantity import quantity
+from viewsphere.model.fields.notebook import Shown
+from viewsphere.model.fields.quantity import quantity
+from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.sample import Sample
 from viewsphere.model.shard import Shard
 from viewsphere.model.shot import Shot
-from viewsphere.model.validation_errors import shown
 from viewsphere.planning.plan import Plan, plan
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare

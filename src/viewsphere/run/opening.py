@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from viewsphere.errors import RecipeError, StoreError, UserError
 from viewsphere.labels import on_request
 from viewsphere.model.channel import PASSES, missing
-from viewsphere.model.quantity import quantity
-from viewsphere.model.rig import Sensor
+from viewsphere.model.fields.quantity import quantity
+from viewsphere.model.sensors.rig import Sensor
 from viewsphere.planning.checks.models import check_needs
 from viewsphere.planning.engine_digest import engine_digest
 from viewsphere.planning.extension import DatasetPart, extend, resumed, whole

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError, UserError
-from viewsphere.model.validation_errors import one_of
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.reproduce_recipe import RECIPE, draft

@@ -19,16 +19,16 @@ from viewsphere.composing.viewpoints.pose_files import PoseFile
 from viewsphere.composing.viewpoints.poses import world_turn
 from viewsphere.geometry.rotation import rigid
 from viewsphere.limits import limits
-from viewsphere.model.file_names import is_reserved
+from viewsphere.model.fields.file_names import is_reserved
 from viewsphere.model.listed import ListedObject, ListedShot
 from viewsphere.model.scene import IDENTITY, Vector
 from viewsphere.planning.models import numbered_specs
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.plugins.source import model_for
-from viewsphere.recipe.file import dump
+from viewsphere.recipe.cameras.viewpoints import PoseList
 from viewsphere.recipe.formats import Formats, read_formats
+from viewsphere.recipe.reading.file import dump
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.viewpoints import PoseList
 from viewsphere.run.exports.scope import needs_of
 from viewsphere.store.source_cameras import Drafted, SourceCameras, SourceModel
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from viewsphere.errors import StoreError
+from viewsphere.model.annotations.symmetries import Symmetries
 from viewsphere.model.listed import ListedShot
 from viewsphere.model.model_spec import Axis
-from viewsphere.model.symmetries import Symmetries
 
 
 @dataclass(frozen=True)

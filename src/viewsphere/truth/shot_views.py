@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from viewsphere.assets.appearance.repaint import textured
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.rotation import compose, inverse, product, rigid, transform
-from viewsphere.model.camera import Camera
-from viewsphere.model.exposure import Sweep, beyond
+from viewsphere.model.annotations.tracks import TRACK, Tracks
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Sensor
 from viewsphere.model.scene import Finish, Ground, Matrix4
+from viewsphere.model.sensors.camera import Camera
+from viewsphere.model.sensors.exposure import Sweep, beyond
+from viewsphere.model.sensors.rig import Sensor
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
-from viewsphere.model.tracks import TRACK, Tracks
 from viewsphere.truth.lidar.sweeping import Turning
 from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.raster.geometry import Geometry, without_ground
@@ -58,7 +58,7 @@ class Followed:
 
     @cached_property
     def rows(self) -> NDArray[np.void]:
-        """The constant part of each point's track, (N,) of `viewsphere.model.tracks.TRACK`; the rest is 0."""
+        """The constant part of each point's track, (N,) of `viewsphere.model.annotations.tracks.TRACK`; the rest is 0."""
         out = np.zeros(len(self.query), TRACK)
         out["instant"], out["query"], out["object"] = self.query[:, 0], self.query[:, 1:], self.object
         return out

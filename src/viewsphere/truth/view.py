@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.geometry.rotation import inverse, transform
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import Geometry, seen_from
 from viewsphere.truth.raster.visibility import Visibility, homogeneous, lens_rays, pixels_of, rasterize

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.labels import channel_labels, is_shown
 from viewsphere.model.channel import PASSES, PICTURES
-from viewsphere.model.validation_errors import one_of
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.report import conventions, model_data
 from viewsphere.report.facts import facts
 from viewsphere.report.frames import frame_data

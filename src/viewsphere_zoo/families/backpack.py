@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.keypoints import At, sided
+from viewsphere.model.annotations.keypoints import At, sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.sewing.carrying import back, handle, pockets, sides, straps
 from viewsphere_zoo.sewing.closings import CLOSINGS

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.model.keypoints import sided
+from viewsphere.model.annotations.keypoints import sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.furnishing.casework import Leg, block, leg
 from viewsphere_zoo.furnishing.coats import (

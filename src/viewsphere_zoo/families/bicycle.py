@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.keypoints import At, sided
+from viewsphere.model.annotations.keypoints import At, sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.cycle import brakes, fittings, luggage
 from viewsphere_zoo.cycle.coats import Coats, coats

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.keypoints import At, sided
+from viewsphere.model.annotations.keypoints import At, sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.coachwork import fittings, lights, structure
 from viewsphere_zoo.coachwork.coats import Coats, coats

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.keypoints import sided
+from viewsphere.model.annotations.keypoints import sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.joinery import armchair, dining, folding, office, stool, windsor
 from viewsphere_zoo.joinery.armchair import Armchair

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.keypoints import At, sided
+from viewsphere.model.annotations.keypoints import At, sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.shapes.paint import Color
 from viewsphere_zoo.townscape import building

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.keypoints import At, sided
+from viewsphere.model.annotations.keypoints import At, sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.motorbike.bodywork import body_pieces
 from viewsphere_zoo.motorbike.design import Engine, Motorcycle, Style, coats

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Image, Material, Mesh
-from viewsphere.model.keypoints import At
+from viewsphere.model.annotations.keypoints import At
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.household import charts
 from viewsphere_zoo.household.canvas import blank

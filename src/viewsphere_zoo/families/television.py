@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh, Texture
-from viewsphere.model.keypoints import sided
+from viewsphere.model.annotations.keypoints import sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.furnishing.broadcasts import Show, broadcast
 from viewsphere_zoo.furnishing.carcass import Carcass, Column, carcass, fronts

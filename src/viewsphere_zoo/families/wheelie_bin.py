@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.model.keypoints import sided
+from viewsphere.model.annotations.keypoints import sided
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.shapes.assembly import Piece, assemble
 from viewsphere_zoo.shapes.paint import Color, coated, linear

@@ -12,9 +12,9 @@ from viewsphere.assets.metadata import model_metadata as metadata
 from viewsphere.assets.metadata.model_metadata import metadata_of, spread_points
 from viewsphere.assets.metadata.sidecars import sidecar_of
 from viewsphere.errors import ModelError
-from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.annotations.keypoints import Keypoints
+from viewsphere.model.annotations.symmetries import Continuous, Symmetries
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.symmetries import Continuous, Symmetries
 
 SIDES = (2.0, 4.0, 3.0)
 HALF_TURN = [[-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]

@@ -14,7 +14,7 @@ from viewsphere.assets.metadata.rotation_group import is_group
 from viewsphere.assets.metadata.surface import Surface
 from viewsphere.assets.metadata.symmetries import find, lacking
 from viewsphere.geometry.rotation import rotation_about
-from viewsphere.model.symmetries import Continuous, Symmetries
+from viewsphere.model.annotations.symmetries import Continuous, Symmetries
 from viewsphere_zoo import build
 
 solid = trimesh.creation

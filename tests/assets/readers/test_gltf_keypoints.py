@@ -6,7 +6,7 @@ import pytest
 from viewsphere.assets.cache import load
 from viewsphere.assets.load import load_model
 from viewsphere.assets.metadata.model_metadata import metadata_of
-from viewsphere.model.keypoints import left_and_right
+from viewsphere.model.annotations.keypoints import left_and_right
 from viewsphere.model.model_spec import ModelSpec
 
 QUARTER = [0, 0, np.sqrt(0.5), np.sqrt(0.5)]

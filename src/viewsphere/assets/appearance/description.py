@@ -15,7 +15,7 @@ from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.assets.primitive import face_normals
 from viewsphere.assets.srgb import linear
 from viewsphere.materials import word
-from viewsphere.model.appearance import Appearance, Patch
+from viewsphere.model.annotations.appearance import Appearance, Patch
 from viewsphere.model.thing import Repaint
 
 Float = NDArray[np.float64]

@@ -12,7 +12,7 @@ from viewsphere import materials
 from viewsphere.assets.appearance.color_names import NAMES, nearest_names
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import encoded, linear
-from viewsphere.model.procedural_material import ProceduralMaterial
+from viewsphere.model.annotations.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import WHITE, Color
 
 KEPT = 8

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.metadata.stuff import stuff_of
-from viewsphere.model.classes import STUFF_IDS
+from viewsphere.model.annotations.classes import STUFF_IDS
 
 UPRIGHT = 0.35
 """The wetness of walls as a share of the wetness of surfaces that face up."""
@@ -34,7 +34,7 @@ GREEN = {STUFF_IDS["grass"], STUFF_IDS["vegetation"]}
 
 def wetted(mesh: Mesh, amount: float, category: str = "", evenly: bool = False) -> Mesh:
     """The mesh with wet materials: what faces up in its own axes by `amount`, the rest less, plants without a film. `evenly`:
-    all of it as the rest, as of meshes that deform. `category` says what scenery is made of, see `model.classes`.
+    all of it as the rest, as of meshes that deform. `category` says what scenery is made of, see `model.annotations.classes`.
     """
     if evenly:
         return replace(mesh, materials=tuple(wet(material, amount * UPRIGHT) for material in mesh.materials))

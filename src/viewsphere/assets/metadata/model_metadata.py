@@ -20,13 +20,13 @@ from viewsphere.caches.arrays import Content
 from viewsphere.caches.entries import kept
 from viewsphere.errors import ModelError
 from viewsphere.geometry.diameter import diameter
-from viewsphere.model.keypoints import Keypoints, Place
-from viewsphere.model.metadata import ModelMetadata
+from viewsphere.model.annotations.keypoints import Keypoints, Place
+from viewsphere.model.annotations.metadata import ModelMetadata
+from viewsphere.model.annotations.symmetries import Symmetries
+from viewsphere.model.fields.validation_errors import nearest, shown
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
-from viewsphere.model.validation_errors import nearest, shown
-from viewsphere.recipe.sidecar import Sidecar
+from viewsphere.recipe.reading.sidecar import Sidecar
 
 Float = NDArray[np.float64]
 

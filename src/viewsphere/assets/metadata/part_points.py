@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.keypoints import At, Keypoints, Pair, Place, left_and_right
+from viewsphere.model.annotations.keypoints import At, Keypoints, Pair, Place, left_and_right
 
 
 def part_points(mesh: Mesh, places: Mapping[str, At], skeleton: Sequence[Pair] = ()) -> Keypoints | None:

@@ -8,7 +8,7 @@ from viewsphere.assets.paths.inside import split_source
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.plugins import prefix_of
-from viewsphere.recipe.sidecar import ENDING, Sidecar, read_sidecar
+from viewsphere.recipe.reading.sidecar import ENDING, Sidecar, read_sidecar
 
 
 def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:

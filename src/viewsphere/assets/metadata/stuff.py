@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from viewsphere.model.classes import SCENERY, STUFF_IDS
+from viewsphere.model.annotations.classes import SCENERY, STUFF_IDS
 from viewsphere.plugins.source import sources
 
 

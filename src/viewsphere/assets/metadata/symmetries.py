@@ -34,8 +34,8 @@ from viewsphere.assets.metadata.symmetry_lines import (
     usual_axes,
 )
 from viewsphere.geometry.rotation import rotation_about, transform
+from viewsphere.model.annotations.symmetries import Continuous, Symmetries
 from viewsphere.model.scene import Matrix4, Vector
-from viewsphere.model.symmetries import Continuous, Symmetries
 
 Float = NDArray[np.float64]
 

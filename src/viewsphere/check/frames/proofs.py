@@ -19,9 +19,9 @@ from viewsphere.check.frames.repainted import Repainted
 from viewsphere.check.report import Finding, Report, in_short
 from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.labels import channel_labels, labels, on_request
-from viewsphere.model.camera import Camera
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import MERGED, Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.run.shots.scenery import Scenery
 from viewsphere.store import Dataset, ModelInfo, Row

@@ -16,7 +16,7 @@ from viewsphere.errors import BlenderDied, BlenderError, UserError
 from viewsphere.kernels.build import PAINTER
 from viewsphere.labels import channels
 from viewsphere.model.channel import PASSES
-from viewsphere.model.files import LOSSY, Files
+from viewsphere.model.fields.files import LOSSY, Files
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.planning.engine_digest import engine_digest

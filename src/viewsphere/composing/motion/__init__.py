@@ -13,7 +13,7 @@ from viewsphere.composing.motion.shared.heading import Heading, headed, to_the_r
 from viewsphere.composing.motion.shared.made import Mover, check_motion, check_motions, mover
 from viewsphere.composing.motion.shared.start import Origin, Pose, Start
 from viewsphere.composing.motion.shared.way import curve_through
-from viewsphere.model.numbers import Strength
+from viewsphere.model.fields.numbers import Strength
 from viewsphere.model.place import Lane
 from viewsphere.recipe.draws import Drawn
 

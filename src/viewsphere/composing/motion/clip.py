@@ -12,8 +12,8 @@ from pydantic import Field
 from viewsphere.assets.animation.clip import no_animation
 from viewsphere.composing.motion import Move, Pose, Start
 from viewsphere.errors import RecipeError
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Strength
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Strength
 from viewsphere.model.thing import TimeStep
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from viewsphere.composing.motion import Move, Start
 from viewsphere.geometry.rotation import rotation_about
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn
 

@@ -7,8 +7,8 @@ from pydantic import Field
 
 from viewsphere.composing.motion import Move, Pose, Start
 from viewsphere.errors import RecipeError
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Number, Positive
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Number, Positive
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Drawn
 

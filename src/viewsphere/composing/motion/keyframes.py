@@ -12,9 +12,9 @@ from pydantic import Field, model_validator
 
 from viewsphere.composing.motion import Move, Origin, Pose, Start
 from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_about, quaternion_product, slerp
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Number
-from viewsphere.model.validation_errors import error_at, shown
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Number
+from viewsphere.model.fields.validation_errors import error_at, shown
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
 

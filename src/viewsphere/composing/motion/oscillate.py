@@ -9,8 +9,8 @@ from pydantic import Field
 
 from viewsphere.composing.motion import Amplitude, Move, Pose, Start
 from viewsphere.geometry.rotation import rotation_about
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Positive
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Positive
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn
 

@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 from viewsphere.composing.motion import Heading, Lane, Move, Pose, Start, curve_through, headed, to_the_right
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.curve import Curve
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Positive
-from viewsphere.model.validation_errors import one_of
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Positive
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.source import with_roads
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn

@@ -7,8 +7,8 @@ from typing import Annotated
 from pydantic import Field
 
 from viewsphere.composing.motion import Heading, Move, Origin, Pose, Start, curve_through, headed
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Positive
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Positive
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Drawn, PointDrawn
 

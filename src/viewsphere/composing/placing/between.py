@@ -13,11 +13,11 @@ from viewsphere.composing.placing import Draws, Room, Shape, draws_of, footprint
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Camera
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Strength
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.numbers import Strength
 from viewsphere.model.scene import Matrix4
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 

@@ -15,10 +15,10 @@ from viewsphere.composing.placing.shared.dropping import Drop, Ground, Matter, p
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.open_box import boards
-from viewsphere.model.camera import Camera
+from viewsphere.model.fields.numbers import Length
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.numbers import Length
 from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.plugins.source import model_for
 from viewsphere.recipe.draws import Drawn, drawn

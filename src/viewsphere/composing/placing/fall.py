@@ -13,10 +13,10 @@ from viewsphere.composing.physics import Board
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, Way, draws_of, footprint
 from viewsphere.composing.placing.shared.dropping import Drop, Ground, Matter, poses_of, ways_of
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.model.camera import Camera
+from viewsphere.model.fields.numbers import Length
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.numbers import Length
 from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 

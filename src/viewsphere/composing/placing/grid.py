@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from itertools import product
 
 from viewsphere.composing.placing import Draws, Room, Shape, checked, footprint, standing
-from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from viewsphere.composing.placing import Draws, Room, Shape, checked, standing
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 
 

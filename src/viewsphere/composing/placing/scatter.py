@@ -14,10 +14,10 @@ from pydantic import Field
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, draws_of
 from viewsphere.composing.placing.shared.scattered import Gaps, scattered
 from viewsphere.composing.placing.shared.spot import Cover, Others, free_spot, spread_spot
-from viewsphere.model.camera import Camera
+from viewsphere.model.fields.numbers import Length
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.numbers import Length
 from viewsphere.model.scene import Matrix4
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import Drawn, drawn
 

@@ -19,9 +19,9 @@ from viewsphere.composing.placing.shared.spot import Others, free_spot
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.draws import CountDrawn, drawn
 

@@ -15,12 +15,12 @@ from viewsphere.composing.placing.shared.crowd import Crowd
 from viewsphere.composing.scene.scenery import composed
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.model.camera import Camera
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Length, Portion, Strength
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.numbers import Length, Portion, Strength
 from viewsphere.model.place import Bay, Lane, stretches
 from viewsphere.model.scene import Matrix4
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.plugins.source import with_roads
 from viewsphere.recipe.draws import Drawn, drawn

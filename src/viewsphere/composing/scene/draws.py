@@ -20,10 +20,10 @@ from viewsphere.composing.scene.weather import through_windows, weathered
 from viewsphere.composing.seeds import Names, scene_generators, share
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.pose_category import pose_category
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.annotations.procedural_material import ProceduralMaterial
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.procedural_material import ProceduralMaterial
 from viewsphere.model.scene import (
     WHITE,
     AnyLight,
@@ -40,12 +40,12 @@ from viewsphere.model.scene import (
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.draws import RngOf, alternatives, drawn, is_random
 from viewsphere.recipe.entries import concrete, pictures_of
-from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame, ViewEntry
-from viewsphere.recipe.light import DaylightSky, HdriSky, NightEntry, NightSky, SunEntry
 from viewsphere.recipe.lights import Lamp, spec_of
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.seed_names import seed_name
-from viewsphere.recipe.surface import GroundEntry, MaterialEntry
+from viewsphere.recipe.world.finish import BackgroundEntry, JitterEntry, PerFrame, ViewEntry
+from viewsphere.recipe.world.light import DaylightSky, HdriSky, NightEntry, NightSky, SunEntry
+from viewsphere.recipe.world.surface import GroundEntry, MaterialEntry
 
 PARTS = tuple(Finish.model_fields)
 """The parts of a finish, which have their names in a recipe's scene, too."""

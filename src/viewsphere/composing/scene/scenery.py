@@ -22,16 +22,16 @@ from viewsphere.composing.seeds import Names, generator, scene_generators, share
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, transform
+from viewsphere.model.fields.validation_errors import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Bay, Lane, Place, Surface, Traffic
 from viewsphere.model.scene import Matrix4
-from viewsphere.model.validation_errors import nearest, one_of
 from viewsphere.plugins.source import place_names, place_of
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import unit_metres
-from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scenery import Labels, PlaceEntry, PlaneEntry
+from viewsphere.recipe.world.motion import Motions
+from viewsphere.recipe.world.scenery import Labels, PlaceEntry, PlaneEntry
 
 TRIES = 200
 """Spots that are tried for one plane."""

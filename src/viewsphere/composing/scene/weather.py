@@ -13,10 +13,10 @@ from viewsphere.model.scene import HemisphereLight, Scene
 from viewsphere.model.weather import CONTRAST, Fog, Lamps, Rain, Snow, Wet
 from viewsphere.recipe.draws import RngOf, drawn
 from viewsphere.recipe.entries import concrete
-from viewsphere.recipe.light import NightSky
-from viewsphere.recipe.scene import SceneEntry
 from viewsphere.recipe.seed_names import seed_name
-from viewsphere.recipe.weather import FogEntry, LampsEntry, RainEntry, SnowEntry, WetEntry
+from viewsphere.recipe.world.light import NightSky
+from viewsphere.recipe.world.scene import SceneEntry
+from viewsphere.recipe.world.weather import FogEntry, LampsEntry, RainEntry, SnowEntry, WetEntry
 from viewsphere.rendering.weather.conditions import clouded, floor_light, in_fog
 from viewsphere.rendering.weather.precipitation import extinction
 

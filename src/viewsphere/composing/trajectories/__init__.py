@@ -18,7 +18,7 @@ from viewsphere.composing.viewpoints.camera import looking
 from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
 from viewsphere.model.scene import IDENTITY, Vector
 from viewsphere.plugins.trajectory import TrajectorySpec
-from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, Sphere, Viewpoints
+from viewsphere.recipe.cameras.viewpoints import Grid, Jitter, Normal, Sphere, Viewpoints
 
 __all__ = [
     "RigPose",

@@ -15,11 +15,11 @@ from viewsphere.composing.trajectories.shared.along import level
 from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.curve import Curve, spline
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.numbers import Length, Metres, Positive
-from viewsphere.model.validation_errors import one_of
+from viewsphere.model.fields.numbers import Length, Metres, Positive
+from viewsphere.model.fields.validation_errors import one_of
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
-from viewsphere.recipe.trajectories import LOOK, Look, Moving
+from viewsphere.recipe.cameras.trajectories import LOOK, Look, Moving
 
 Float = NDArray[np.float64]
 

@@ -18,9 +18,9 @@ from viewsphere.composing.viewpoints.pose_files import Extrinsics, PoseFile
 from viewsphere.composing.viewpoints.poses import placed, pose_file, world_turn
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, slerp
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
-from viewsphere.recipe.viewpoints import PoseList
+from viewsphere.recipe.cameras.viewpoints import PoseList
 
 Float = NDArray[np.float64]
 Between = tuple[int, float]

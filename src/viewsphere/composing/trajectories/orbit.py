@@ -12,11 +12,11 @@ from pydantic import Field, field_validator, model_validator
 
 from viewsphere.composing.trajectories.shared.aim import around, focuses
 from viewsphere.composing.trajectories.shared.world import RigPose, World
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.numbers import Number
+from viewsphere.model.fields.numbers import Number
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
-from viewsphere.recipe.aim import AZIMUTH, DISTANCE, ELEVATION, TILT, in_elevation, in_reach
-from viewsphere.recipe.trajectories import LOOK, Drift, Look, Moving, Place, ends
+from viewsphere.recipe.cameras.aim import AZIMUTH, DISTANCE, ELEVATION, TILT, in_elevation, in_reach
+from viewsphere.recipe.cameras.trajectories import LOOK, Drift, Look, Moving, Place, ends
 
 Float = NDArray[np.float64]
 

@@ -15,11 +15,11 @@ from pydantic import Field, model_validator
 from viewsphere.composing.trajectories.shared.aim import aimed, focuses
 from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.geometry.curve import Curve, spline
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.numbers import Number, Positive
-from viewsphere.model.validation_errors import shown
+from viewsphere.model.fields.numbers import Number, Positive
+from viewsphere.model.fields.validation_errors import shown
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
-from viewsphere.recipe.trajectories import LOOK, MOST_POINTS, Look, Moving, Place
+from viewsphere.recipe.cameras.trajectories import LOOK, MOST_POINTS, Look, Moving, Place
 
 Float = NDArray[np.float64]
 

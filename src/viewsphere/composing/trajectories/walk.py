@@ -18,12 +18,12 @@ from viewsphere.composing.trajectories.shared.aim import aimed, focuses
 from viewsphere.composing.trajectories.shared.along import level
 from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.geometry.curve import Curve, spline
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Length, Metres, Number, Positive
-from viewsphere.model.validation_errors import shown
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Length, Metres, Number, Positive
+from viewsphere.model.fields.validation_errors import shown
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
-from viewsphere.recipe.trajectories import LOOK, MOST_POINTS, MOST_TURNS, Look, Moving, Spot
+from viewsphere.recipe.cameras.trajectories import LOOK, MOST_POINTS, MOST_TURNS, Look, Moving, Spot
 
 Float = NDArray[np.float64]
 

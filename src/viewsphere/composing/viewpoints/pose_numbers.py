@@ -19,9 +19,9 @@ from viewsphere.composing.time_steps import TimedPoses
 from viewsphere.composing.viewpoints.poses import ListedPoses, Poses
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses, TrajectoryPoses, poses_of
 from viewsphere.errors import StoreError
-from viewsphere.model.numbers import Natural
-from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.recipe.viewpoints import Viewpoints
+from viewsphere.model.fields.numbers import Natural
+from viewsphere.recipe.cameras.sequence import TimeEntry
+from viewsphere.recipe.cameras.viewpoints import Viewpoints
 from viewsphere.store import Part, PlanRecord
 from viewsphere.store.index import Ranges
 from viewsphere.store.shots.records import typed

@@ -20,12 +20,12 @@ from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics, Orb
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import rigid, transform
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint, viewpoint_of
 from viewsphere.model.scene import Vector
-from viewsphere.recipe.aim import Fill, FillBetween
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.recipe.cameras.aim import Fill, FillBetween
+from viewsphere.recipe.cameras.viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
 from viewsphere.recipe.values import Range
-from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
 
 Float = NDArray[np.float64]
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from viewsphere.composing.trajectories import Trajectory, is_still, trajectory
 from viewsphere.composing.viewpoints.poses import Orbit, Poses, RepeatedPoses, poses
 from viewsphere.errors import RecipeError
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.scene import Vector
-from viewsphere.recipe.aim import Fill, FillBetween
-from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.recipe.viewpoints import Viewpoints
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.recipe.cameras.aim import Fill, FillBetween
+from viewsphere.recipe.cameras.sequence import TimeEntry
+from viewsphere.recipe.cameras.viewpoints import Viewpoints
 
 
 @dataclass(frozen=True)

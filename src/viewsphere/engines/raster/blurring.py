@@ -18,8 +18,8 @@ from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.shared.arranged import Arranged, Arrangements
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import compose
-from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Matrix4
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility, rasterize

@@ -25,9 +25,9 @@ from viewsphere.engines.raster.shadows.thing_occlusion import TargetShades
 from viewsphere.engines.shared.arranged import Arranged, Arrangements
 from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import RecipeError
-from viewsphere.model.camera import Camera
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
 from viewsphere.model.listed import LARGEST_PICTURE
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.weather import Wet
 from viewsphere.rendering.background import display_background, shows_sky

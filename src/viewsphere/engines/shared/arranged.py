@@ -140,7 +140,7 @@ class Arrangements:
         return known
 
     def during(self, instant: int, moment: float) -> Arranged:
-        """The things a moment after an instant (see `model.exposure.Sweep`) while the shutter is open. Its geometry is good
+        """The things a moment after an instant (a `Sweep` has it) while the shutter is open. Its geometry is good
         until this is called again.
         """
         things = self.shot.things_during(instant, moment)

@@ -32,13 +32,13 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.refusals import any_view
 from viewsphere.geometry.rotation import compose, rigid
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.quantity import quantity
-from viewsphere.model.rig import Rig
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4, Scene
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.plugins.engine import EngineSpec

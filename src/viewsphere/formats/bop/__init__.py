@@ -71,7 +71,7 @@ from viewsphere.formats.shared.writing.paper import json_bytes
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of
 from viewsphere.formats.shared.writing.refusals import known_cameras, lacking_labels, pinhole
 from viewsphere.formats.shared.writing.tree import FOLDER_SIZE, LIST, OBJECT, File, Layout, Piece, Tree, functions, item, member
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

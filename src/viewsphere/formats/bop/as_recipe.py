@@ -21,8 +21,8 @@ from viewsphere.formats.bop.source_models import model_files, model_folder, mode
 from viewsphere.formats.shared.reading.as_recipe import pose_of
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.geometry.rotation import compose, rigid
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.listed import ListedObject, ListedShot
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.store.paths import file_inside
 from viewsphere.store.source_cameras import SourceCameras, SourceModel, refuse_any

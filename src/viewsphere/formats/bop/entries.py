@@ -17,8 +17,8 @@ from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.formats.shared.writing.pictures import depth_steps
 from viewsphere.geometry.diameter import diameter
 from viewsphere.geometry.mask import decode_rle, rle_area, rle_box, rle_runs
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.sample import ObjectAnnotation, Rle, Sample
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store import ModelInfo
 
 MM = 1000.0

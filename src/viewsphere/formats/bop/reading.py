@@ -24,8 +24,8 @@ from viewsphere.formats.shared.reading.placed_objects import placed
 from viewsphere.geometry.box import clip_to_image
 from viewsphere.geometry.mask import encode_rle, rle_area, rle_box
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import Rle, Sample
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, Loaded, foreign_object, refuse_broken
 from viewsphere.store.paths import file_inside, is_name

@@ -16,9 +16,9 @@ from viewsphere.files import read_bytes
 from viewsphere.formats.bop.entries import MM
 from viewsphere.formats.shared.reading.image_lists import one_line
 from viewsphere.formats.shared.reading.source_models import foreign_model
+from viewsphere.model.annotations.symmetries import RIGID, Symmetries
+from viewsphere.model.fields.validation_errors import first_of
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.symmetries import RIGID, Symmetries
-from viewsphere.model.validation_errors import first_of
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignModel
 from viewsphere.store.paths import file_inside

@@ -55,7 +55,7 @@ from viewsphere.formats.shared.writing.pictures import picture, png
 from viewsphere.formats.shared.writing.sequences import Eyes, two_eyes
 from viewsphere.formats.shared.writing.timeline import Timeline
 from viewsphere.formats.shared.writing.tree import FOLDER_SIZE, File, Tree, functions
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.model.classes import SemanticClass
+from viewsphere.model.annotations.classes import SemanticClass
 
 Color = tuple[int, int, int]
 

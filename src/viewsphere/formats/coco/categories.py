@@ -12,8 +12,8 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.formats.coco.source_metadata import imported_categories
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.annotations.keypoints import Keypoints
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation
 
 if TYPE_CHECKING:

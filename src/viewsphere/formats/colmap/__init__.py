@@ -42,7 +42,7 @@ from viewsphere.formats.shared.writing.pictures import picture, suffix_of
 from viewsphere.formats.shared.writing.refusals import known_cameras, no_skew, opencv_lenses
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -24,7 +24,7 @@ from viewsphere.formats.shared.reading.posed_pictures import (
 )
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
 from viewsphere.geometry.rotation import matrix_from_quaternion, transform
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import is_name
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
 from viewsphere.geometry.rotation import quaternion_from_matrix
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 
 Float = NDArray[np.float64]
 Pose = tuple[float, ...]

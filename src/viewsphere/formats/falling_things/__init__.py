@@ -53,9 +53,9 @@ from viewsphere.formats.shared.writing.pictures import depth_png, picture, png
 from viewsphere.formats.shared.writing.refusals import known_cameras, pinhole
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.model.channel import missing
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.rig import Rig
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid, transform
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import ObjectAnnotation
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.store import ModelInfo
 
 CM = 100.0

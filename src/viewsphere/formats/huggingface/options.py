@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 
 
 class Options(Frozen):

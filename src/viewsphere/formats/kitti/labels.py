@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line, text_of
 from viewsphere.geometry.rotation import inverse, transform
 from viewsphere.limits import limits
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import Box
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 
 LEVEL = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 """From a world whose z is up, and whose origin is KITTI's reference camera, which looks along y, to that camera's axes."""

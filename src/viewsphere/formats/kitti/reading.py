@@ -29,8 +29,8 @@ from viewsphere.formats.shared.reading.placed_objects import placed
 from viewsphere.formats.shared.reading.posed_pictures import picture_inside
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import rigid
-from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, foreign_object
 from viewsphere.store.paths import file_inside, is_name

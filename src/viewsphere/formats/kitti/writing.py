@@ -16,9 +16,9 @@ from viewsphere.formats.shared.mounting import Float
 from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.timeline import Timeline
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, line
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.rig import CAMERA, Rig
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.rig import CAMERA, Rig
 from viewsphere.store import Dataset
 
 NAMES = ("Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram", "Misc")

@@ -22,10 +22,10 @@ from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.lenses import read_parameters
 from viewsphere.geometry.mask import encode_rle, mask_box, mask_polygons
 from viewsphere.labels import channels
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.credit import Credit
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.thing import TimeStep
 from viewsphere.store import Category, ModelInfo, decode
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, foreign_object, refuse_broken

@@ -52,10 +52,10 @@ from viewsphere.formats.shared.writing import refusals
 from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, item
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.listed import ListedShot
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 from viewsphere.store.source_cameras import SourceCameras, refuse_any

@@ -23,7 +23,7 @@ from viewsphere.formats.shared.reading.posed_pictures import (
     without_world,
 )
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.store.texts import parsed

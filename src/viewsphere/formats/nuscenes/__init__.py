@@ -50,7 +50,7 @@ from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.refusals import pinhole, sequences
 from viewsphere.formats.shared.writing.timeline import Timeline, unknown_shots
 from viewsphere.formats.shared.writing.tree import LIST, File, Layout, Piece, Tree, functions, item
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

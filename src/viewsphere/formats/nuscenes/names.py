@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from hashlib import blake2b
 
-from viewsphere.model.rig import CAMERA, Rig
+from viewsphere.model.sensors.rig import CAMERA, Rig
 
 CATEGORIES = {
     "animal": "animal",

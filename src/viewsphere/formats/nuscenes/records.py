@@ -12,9 +12,9 @@ from viewsphere.formats.nuscenes.story import neighbours
 from viewsphere.formats.shared.mounting import CAMERA_FROM_LIDAR, Float, centred, mounted, unmoved
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, product, quaternion_from_matrix
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.rig import Rig
 from viewsphere.model.sample import ObjectAnnotation
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.store import Category
 
 Record = dict[str, Any]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from viewsphere.formats.shared.writing.timeline import Course, Timeline
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 
 
 @dataclass(frozen=True)

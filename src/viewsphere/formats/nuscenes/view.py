@@ -15,8 +15,8 @@ from viewsphere.formats.nuscenes.story import Story
 from viewsphere.formats.shared.mounting import measured
 from viewsphere.formats.shared.writing.pictures import suffix_of
 from viewsphere.formats.shared.writing.timeline import Course
-from viewsphere.model.lidar import LIDAR
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.lidar import LIDAR
 from viewsphere.model.shot import Shot
 
 APART_S = 3600

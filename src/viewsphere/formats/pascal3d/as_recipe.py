@@ -18,8 +18,8 @@ from viewsphere.formats.shared.reading.as_recipe import pose_of
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.formats.shared.viewpoint_mat import off_bytes
 from viewsphere.geometry.rotation import compose, rigid, transform
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.listed import ListedObject, ListedShot
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.paths import file_inside, is_name
 from viewsphere.store.source_cameras import Drafted, SourceCameras, SourceModel, refuse_any
 

@@ -15,7 +15,7 @@ from viewsphere.formats.pascal3d.records import FARTHEST, structs_of, variables
 from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.formats.shared.reading.source_models import foreign_model
 from viewsphere.formats.shared.viewpoint_mat import OWN
-from viewsphere.model.keypoints import Keypoints, Place
+from viewsphere.model.annotations.keypoints import Keypoints, Place
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignModel
 from viewsphere.store.paths import file_inside

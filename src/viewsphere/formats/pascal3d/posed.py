@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from viewsphere.formats.pascal3d.records import Float, Seen
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import rigid, transform
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 
 
 @dataclass(frozen=True)

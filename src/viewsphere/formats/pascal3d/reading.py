@@ -26,8 +26,8 @@ from viewsphere.geometry.camera import orbit_rotation
 from viewsphere.geometry.mask import encode_rle
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import product, rigid
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import Box, ObjectAnnotation, ObjectView, Sample
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignModel, foreign_object
 from viewsphere.store.paths import file_inside, is_name

@@ -13,9 +13,9 @@ from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.rig import CAMERA, Rig
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.model.sensors.rig import CAMERA, Rig
 from viewsphere.store import Dataset
 
 Float = NDArray[np.float64]

@@ -13,9 +13,9 @@ from viewsphere.formats import Scope
 from viewsphere.formats.shared.mounting import CAMERA_FROM_LIDAR, Float, centred, measured, mounted, pointless, unmoved
 from viewsphere.geometry.rotation import compose, product, transform
 from viewsphere.labels.kitti_levels import LARGELY_HIDDEN, LARGELY_OUTSIDE, PARTLY, TRUNCATED, UNKNOWN
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 
 

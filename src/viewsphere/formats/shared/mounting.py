@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.geometry.rotation import rigid, transform
-from viewsphere.model.lidar import LIDAR
-from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.lidar import LIDAR
+from viewsphere.model.sensors.rig import Rig
 
 Float = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def pointless(scope: Scope) -> Iterator[str]:
 
 
 def measured(sample: Sample) -> NDArray[np.void]:
-    """The points of a LiDAR's sample, rows of `viewsphere.model.lidar.POINT`; raises UserError if the data set lacks them."""
+    """The points of a LiDAR's sample, rows of `viewsphere.model.sensors.lidar.POINT`; raises UserError if there are none."""
     if LIDAR not in sample.channels:
         raise UserError(f"frame {sample.index}: expected channel {LIDAR} of a LiDAR, found none: render it with {LIDAR}")
     return sample.channels[LIDAR]

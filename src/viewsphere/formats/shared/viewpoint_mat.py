@@ -20,9 +20,9 @@ from viewsphere.errors import MissingExtraError, UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.refusals import lenses, pinhole, plain_names
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store import Dataset, ModelInfo
 
 NAMES = r"[A-Za-z][A-Za-z0-9_]{0,62}"

@@ -38,9 +38,9 @@ from viewsphere.formats.shared.writing.refusals import known_cameras, lenses, no
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions, line
 from viewsphere.formats.tum.reading import read
 from viewsphere.geometry.rotation import quaternion_from_matrix
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 

@@ -16,7 +16,7 @@ from viewsphere.formats.shared.reading.image_lists import MISTAKES, one_line
 from viewsphere.formats.shared.reading.posed_pictures import Posed, camera_of, picture_inside, posed_dataset
 from viewsphere.geometry.lenses import opencv_parameters
 from viewsphere.geometry.rotation import matrix_from_quaternion
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.paths import is_name
 

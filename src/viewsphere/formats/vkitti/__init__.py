@@ -54,7 +54,7 @@ from viewsphere.formats.shared.writing.sequences import Eyes, instants, scene, t
 from viewsphere.formats.shared.writing.tree import File, Layout, Piece, Tree, functions
 from viewsphere.formats.vkitti import maps, rows
 from viewsphere.formats.vkitti.names import Names
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.codecs.palette import palette
-from viewsphere.model.classes import STUFF_IDS, Color, SemanticClass
+from viewsphere.model.annotations.classes import STUFF_IDS, Color, SemanticClass
 
 COLORS: dict[str, Color] = {
     "Terrain": (210, 0, 200),

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from viewsphere.formats.vkitti.names import Names, object_colors
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import product
-from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Camera
 
 Float = NDArray[np.float64]
 

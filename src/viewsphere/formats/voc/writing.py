@@ -16,8 +16,8 @@ from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats.shared.writing.export_files import Coded
 from viewsphere.formats.shared.writing.pictures import picture
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree, line
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.numbers import Portion
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Portion
 from viewsphere.model.sample import Box, ObjectAnnotation, ObjectView, Sample
 from viewsphere.store import Dataset
 

@@ -13,7 +13,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats.shared.writing.pictures import picture, suffix_of
 from viewsphere.formats.shared.writing.polygons import one_ring
 from viewsphere.formats.shared.writing.tree import File, Piece, Tree
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 

@@ -9,7 +9,7 @@ import numpy as np
 from viewsphere.labels.shared.ids import by_table
 from viewsphere.labels.shared.point_checks import exact_depth
 from viewsphere.labels.shared.spec import Array, Picture
-from viewsphere.model.classes import FIRST_THING, SKY, STUFF, STUFF_IDS, class_colors, thing_class
+from viewsphere.model.annotations.classes import FIRST_THING, SKY, STUFF, STUFF_IDS, class_colors, thing_class
 from viewsphere.model.sample import Sample
 
 KEY = tuple(STUFF.items())

@@ -14,14 +14,14 @@ from viewsphere.labels.shared.context import LabelContext
 from viewsphere.labels.shared.placement import Placement
 from viewsphere.labels.shared.record import Makers, computed
 from viewsphere.labels.shared.spec import ChannelLabel, derived
-from viewsphere.model.appearance import Appearance
-from viewsphere.model.camera import Camera
-from viewsphere.model.keypoints import Keypoints
-from viewsphere.model.metadata import ModelMetadata
+from viewsphere.model.annotations.appearance import Appearance
+from viewsphere.model.annotations.keypoints import Keypoints
+from viewsphere.model.annotations.metadata import ModelMetadata
+from viewsphere.model.annotations.symmetries import Symmetries
 from viewsphere.model.model_spec import Size
 from viewsphere.model.sample import ObjectAnnotation
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
-from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import Thing
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility

@@ -15,8 +15,8 @@ from viewsphere.geometry.box import Bounds, is_behind, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.labels.shared.needs import Need, OwnView, Partner
 from viewsphere.labels.shared.placement import Placement
-from viewsphere.model.camera import Camera
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.correspondences.correspondence import Match
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
 
 if TYPE_CHECKING:
-    from viewsphere.model.rig import Sensor
     from viewsphere.model.scene import Finish
+    from viewsphere.model.sensors.rig import Sensor
     from viewsphere.model.shot import Shot
     from viewsphere.recipe.recipe import Recipe
     from viewsphere.truth.lidar.sweeping import Turning

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, rigid
-from viewsphere.model.appearance import Appearance
-from viewsphere.model.camera import Camera
-from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.annotations.appearance import Appearance
+from viewsphere.model.annotations.keypoints import Keypoints
+from viewsphere.model.annotations.symmetries import Symmetries
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.sample import ObjectView
 from viewsphere.model.scene import Matrix4
-from viewsphere.model.symmetries import Symmetries
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import TimeStep
 
 Float = NDArray[np.float64]

@@ -16,7 +16,7 @@ from viewsphere.labels.shared.ids import Ids, check_ids, has_whole_numbers
 from viewsphere.labels.shared.needs import Need
 from viewsphere.labels.shared.placement import ModelFacts, Placement
 from viewsphere.model.channel import Channel
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import Spec

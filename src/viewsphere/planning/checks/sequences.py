@@ -18,7 +18,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.thing import Thing
 from viewsphere.planning.samplers.shared.sequence_state import no_such_thing, piece_moving, target_moving, time_of
-from viewsphere.recipe.scenes import ScenesEntry
+from viewsphere.recipe.world.scenes import ScenesEntry
 
 if TYPE_CHECKING:
     from viewsphere.planning.plan import Plan

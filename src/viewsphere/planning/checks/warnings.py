@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from viewsphere.composing.scene.draws import is_night
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.geometry.camera import orbit_center
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Sun
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.recipe.draws import alternatives, component, span
-from viewsphere.recipe.light import DaylightSky, HdriSky, NightSky, SunEntry
 from viewsphere.recipe.models import Dimensions, Length, ModelEntry
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scene import SceneEntry
+from viewsphere.recipe.world.light import DaylightSky, HdriSky, NightSky, SunEntry
+from viewsphere.recipe.world.scene import SceneEntry
 
 Float = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.composing.viewpoints.pose_files.lines import number, read_text
 from viewsphere.errors import RecipeError
-from viewsphere.recipe.file import ShallowLoader
+from viewsphere.recipe.reading.file import ShallowLoader
 
 Float = NDArray[np.float64]
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from viewsphere.composing.viewpoints.poses import Poses
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.validation_errors import read_options
 from viewsphere.model.scene import Vector
 from viewsphere.model.thing import Thing
-from viewsphere.model.validation_errors import read_options
 from viewsphere.planning.samplers.shared.sampling_context import SamplingContext, lens
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scenes import SamplerEntry
+from viewsphere.recipe.world.scenes import SamplerEntry
 
 __all__ = ["SamplingContext", "Standing", "lens", "options_of"]
 

@@ -11,18 +11,18 @@ from viewsphere.composing.time_steps import is_animated
 from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics
 from viewsphere.composing.viewpoints.poses import ListedPoses, placed, pose_file, world_turn
 from viewsphere.errors import RecipeError, each
+from viewsphere.model.fields.quantity import quantity
+from viewsphere.model.fields.validation_errors import Nearest, one_of
 from viewsphere.model.listed import ListedObject
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.quantity import quantity
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.model.validation_errors import Nearest, one_of
 from viewsphere.planning.samplers import SamplingContext, Standing
 from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.recipe.cameras.viewpoints import PoseList
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.viewpoints import PoseList
 from viewsphere.store import Block
 
 

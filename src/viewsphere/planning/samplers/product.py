@@ -11,8 +11,8 @@ from viewsphere.composing.redraws import redraw_names
 from viewsphere.composing.time_steps import Run, TimedPoses, at_step
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor, Scene, Vector
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing

@@ -14,8 +14,8 @@ from viewsphere.composing.time_steps import is_animated
 from viewsphere.composing.viewpoints.pose_numbers import as_ranges
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
 from viewsphere.planning.samplers import SamplingContext, Standing

@@ -21,14 +21,14 @@ from viewsphere.composing.trajectories import is_still
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
 from viewsphere.labels import label_named
-from viewsphere.model.exposure import Exposure, Sweep, beyond
+from viewsphere.model.annotations.tracks import Tracks
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import Floor, Matrix4
+from viewsphere.model.sensors.exposure import Exposure, Sweep, beyond
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion
-from viewsphere.model.tracks import Tracks
 from viewsphere.planning.samplers import SamplingContext, Standing
 from viewsphere.planning.samplers.shared.moving import Moving
 from viewsphere.planning.samplers.shared.random import (
@@ -41,9 +41,9 @@ from viewsphere.planning.samplers.shared.random import (
 )
 from viewsphere.planning.samplers.shared.sequence_state import SequenceState, middle, placed_targets, sequence_state, time_of
 from viewsphere.plugins.sampler import SamplerSpec
+from viewsphere.recipe.cameras.sequence import TimeEntry
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scenes import ScenesEntry
-from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.recipe.world.scenes import ScenesEntry
 from viewsphere.store import Block
 
 NODES = 5

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays, project
-from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Scene
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.weather import Falling, Rain
 from viewsphere.rendering.weather.precipitation import diameter, number, sizes, speed
 

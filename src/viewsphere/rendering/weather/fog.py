@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.weather import Fog
 
 Float = NDArray[np.float64]

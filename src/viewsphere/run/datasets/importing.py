@@ -10,7 +10,7 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.model.validation_errors import one_of
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.store import Block, Dataset, Part, PlanRecord, Store, located

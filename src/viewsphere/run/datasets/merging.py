@@ -25,10 +25,10 @@ from viewsphere.labels import (
     renumbered,
     sample_labels,
 )
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.credit import Credit
-from viewsphere.model.quantity import quantity
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.sample import MERGED, ObjectAnnotation, Sample
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode, located
 from viewsphere.store.credits import write_credits

@@ -10,7 +10,7 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.model.quantity import quantity
+from viewsphere.model.fields.quantity import quantity
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.run.exports.preparing import Entries, prepared, targets

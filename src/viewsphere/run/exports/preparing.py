@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.model.channel import missing
-from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.workers.in_order import in_order

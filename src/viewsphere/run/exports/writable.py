@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.model.validation_errors import one_of
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.plugins.format import FormatSpec
 
 

@@ -17,7 +17,7 @@ from viewsphere.composing.redraws import is_redrawn
 from viewsphere.composing.viewpoints.camera import inside_box
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.classes import STUFF_IDS
+from viewsphere.model.annotations.classes import STUFF_IDS
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.planning.distances import Distances

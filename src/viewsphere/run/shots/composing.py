@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.planning.extension import DatasetPart

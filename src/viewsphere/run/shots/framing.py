@@ -21,7 +21,7 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.labels import LabelContext
 from viewsphere.labels.visibility import LABEL as VISIBILITY
 from viewsphere.limits import limits
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.planning.plan import Plan

@@ -27,15 +27,15 @@ from viewsphere.kernels.garbage import pause_collection
 from viewsphere.kernels.overloads import needed, table
 from viewsphere.kernels.precompile import Told, compile_all
 from viewsphere.labels import channels
-from viewsphere.model.exposure import Exposure, Sweep
+from viewsphere.model.annotations.metadata import ModelMetadata
+from viewsphere.model.annotations.tracks import Tracks
 from viewsphere.model.instant import Instant, Viewpoint
-from viewsphere.model.metadata import ModelMetadata
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.model.sensors.exposure import Exposure, Sweep
+from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
-from viewsphere.model.tracks import Tracks
 from viewsphere.planning.engine_digest import engine_digest
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.recipe.recipe import Recipe

@@ -20,8 +20,8 @@ from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels import FollowedPoints, annotated, context_of, labels, observe, requires, sample_values
+from viewsphere.model.annotations.metadata import ModelMetadata
 from viewsphere.model.channel import PASSES
-from viewsphere.model.metadata import ModelMetadata
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
 from viewsphere.model.sample import Float, Origin, Sample
 from viewsphere.model.shot import Shot

@@ -14,7 +14,7 @@ from viewsphere.codecs.palette import MOST_COLORS, palette
 from viewsphere.errors import MissingExtraError, RemoteError, StoreError, UserError
 from viewsphere.files import read_bytes
 from viewsphere.model.channel import Channel
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 
 MOST_STEPS = 65535
 

@@ -17,15 +17,15 @@ from pydantic import TypeAdapter
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes
 from viewsphere.labels import channels
-from viewsphere.model.classes import SemanticClass
-from viewsphere.model.files import Files
+from viewsphere.model.annotations.classes import SemanticClass
+from viewsphere.model.fields.files import Files
+from viewsphere.model.fields.notebook import Shown
+from viewsphere.model.fields.quantity import quantity
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import step_key
-from viewsphere.model.notebook import Shown
-from viewsphere.model.quantity import quantity
-from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.model.shot import Shot
-from viewsphere.model.validation_errors import one_of
 from viewsphere.store.foreign import Loaded
 from viewsphere.store.index import Row
 from viewsphere.store.paths import file_inside, files_inside, names
@@ -42,7 +42,7 @@ from viewsphere.urls import here, link_file, located
 
 if TYPE_CHECKING:
     from viewsphere.assets.mesh import Mesh
-    from viewsphere.model.voxels import Occupancy
+    from viewsphere.model.annotations.voxels import Occupancy
 
 
 Options = Mapping[str, Mapping[str, Any]]
@@ -458,7 +458,7 @@ class Dataset(Shown, Sequence[Sample]):
         A cell is occupied where the model's surface is, and inside its closed pieces.
         Raises StoreError as `mesh` does, ValueError for too many cells.
         """
-        from viewsphere.model.voxels import Occupancy
+        from viewsphere.model.annotations.voxels import Occupancy
 
         mesh = self.mesh(key)
         return Occupancy.of(mesh.vertices, mesh.triangles, cells)

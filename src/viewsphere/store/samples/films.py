@@ -13,9 +13,9 @@ import numpy as np
 from viewsphere.errors import StoreError
 from viewsphere.labels import TAIL
 from viewsphere.model.channel import picture_of
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
-from viewsphere.model.validation_errors import one_of
 from viewsphere.store.samples.dataset import Dataset
 
 ALONE = 1.0

@@ -17,12 +17,12 @@ from pydantic import ValidationError
 from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
 from viewsphere.labels import channels
-from viewsphere.model.files import Files
-from viewsphere.model.quantity import first_few
+from viewsphere.model.fields.files import Files
+from viewsphere.model.fields.quantity import first_few
+from viewsphere.model.fields.validation_errors import different, first_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.model.validation_errors import different, first_of
 from viewsphere.scratch import lives
 from viewsphere.store.index import Index, Row
 from viewsphere.store.paths import file_inside

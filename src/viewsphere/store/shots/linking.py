@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.store.foreign import ForeignFrame, Loaded
 from viewsphere.store.shots.folder import Store
 from viewsphere.store.shots.manifest import MANIFEST

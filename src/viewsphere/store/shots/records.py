@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, JsonValue, PlainValidator, TypeAdapter, ValidationError
 
 from viewsphere.labels import channel_labels
-from viewsphere.model.appearance import Appearance
-from viewsphere.model.classes import SemanticClass, classes_of
+from viewsphere.model.annotations.appearance import Appearance
+from viewsphere.model.annotations.classes import SemanticClass, classes_of
+from viewsphere.model.annotations.keypoints import Keypoints
+from viewsphere.model.annotations.symmetries import Symmetries
 from viewsphere.model.credit import Credit
-from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.fields.validation_errors import first_of
 from viewsphere.model.model_spec import Size, step_key
-from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
-from viewsphere.model.validation_errors import first_of
 from viewsphere.store.index import Block, Index, Row, without
 from viewsphere.store.paths import names
 from viewsphere.store.shots.manifest import sealed, unsealed

@@ -30,10 +30,10 @@ from viewsphere.labels import (
     short_record,
     whole_record,
 )
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
-from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Origin, Sample
+from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.model.shot import Shot
 from viewsphere.store.shots.records import typed
 

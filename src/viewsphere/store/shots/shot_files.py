@@ -11,7 +11,7 @@ import xxhash
 
 from viewsphere.codecs import tar
 from viewsphere.files import read_bytes
-from viewsphere.model.files import Files
+from viewsphere.model.fields.files import Files
 from viewsphere.store.shots.manifest import SHARD, Manifest, Seal, Span, digest, seal_of
 from viewsphere.urls import link_file
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import product
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.geometry import Geometry
 from viewsphere.truth.raster.visibility import Visibility, homogeneous, lens_rays, rasterize
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.metadata.stuff import stuff_of
-from viewsphere.model.classes import GROUND, thing_class
+from viewsphere.model.annotations.classes import GROUND, thing_class
 from viewsphere.model.thing import Thing
 
 Int32 = NDArray[np.int32]
@@ -52,7 +52,7 @@ class TriangleLabels:
 
     @cached_property
     def classes(self) -> Int32:
-        """Classes of things, then those of the scenery and the ground, see `model.classes`."""
+        """Classes of things, then those of the scenery and the ground, see `model.annotations.classes`."""
         own = self._filled(lambda thing, _: thing_class(thing.model.category_id))
         return np.concatenate([own, *(classes() for classes in self.classes_behind)])
 

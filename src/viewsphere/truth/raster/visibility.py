@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.lenses import Window
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.truth.raster.geometry import Geometry, seen_from
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)

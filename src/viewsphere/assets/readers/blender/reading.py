@@ -33,7 +33,7 @@ from viewsphere.codecs.npz import load_array
 from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
 from viewsphere.files import open_file, read_bytes
 from viewsphere.limits import limits
-from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.annotations.keypoints import Keypoints
 
 NAMES = {
     "abc": "Alembic",

@@ -8,7 +8,7 @@ from typing import Any, cast
 from viewsphere.assets.primitive import Float
 from viewsphere.assets.readers.gltf.document import Document
 from viewsphere.assets.readers.shared.named_points import NamedPoint, named_points
-from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.annotations.keypoints import Keypoints
 
 PREFIX = "keypoint:"
 """Begins the name of a node that is a point; the rest is the point's name."""

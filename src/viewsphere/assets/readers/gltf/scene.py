@@ -19,7 +19,7 @@ from viewsphere.assets.readers.shared.coordinates import check_coordinates
 from viewsphere.assets.readers.shared.smoothing import flat
 from viewsphere.assets.readers.shared.transform import moved, unit
 from viewsphere.geometry.rotation import compose
-from viewsphere.model.keypoints import is_name
+from viewsphere.model.annotations.keypoints import is_name
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 

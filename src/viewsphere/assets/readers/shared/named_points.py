@@ -8,8 +8,8 @@ from typing import cast
 
 from viewsphere.assets.paths.folder import ModelFolder
 from viewsphere.assets.primitive import Float
-from viewsphere.model.keypoints import MOST_POINTS, Keypoints, Place, is_name, left_and_right
-from viewsphere.model.numbers import LARGEST
+from viewsphere.model.annotations.keypoints import MOST_POINTS, Keypoints, Place, is_name, left_and_right
+from viewsphere.model.fields.numbers import LARGEST
 
 
 @dataclass(frozen=True, eq=False)

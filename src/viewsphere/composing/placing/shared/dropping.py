@@ -21,9 +21,9 @@ from viewsphere.composing.physics import LONGEST_S, Board, Body, Touch, World, b
 from viewsphere.composing.placing import Draws, Footprint, Room, Shape, Way, draws_of
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Length, Portion, Positive, Strength
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.numbers import Length, Portion, Positive, Strength
 from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import Drawn, drawn
 

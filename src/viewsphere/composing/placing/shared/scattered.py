@@ -16,7 +16,7 @@ from viewsphere.composing.placing.shared.spot import Cover, Others
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.hull import convex_hull
-from viewsphere.model.frozen import Frozen
+from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
 

@@ -12,7 +12,7 @@ from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import rigid
-from viewsphere.recipe.trajectories import Moving
+from viewsphere.recipe.cameras.trajectories import Moving
 
 Float = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from viewsphere.composing.noise import noise
 from viewsphere.composing.trajectories.shared.aim import DIGITS
 from viewsphere.composing.trajectories.shared.world import RigPose, Trajectory, World
 from viewsphere.geometry.rotation import compose, rigid, rotation_about
-from viewsphere.model.camera import Intrinsics
-from viewsphere.recipe.aim import Shake
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.recipe.cameras.aim import Shake
 
 Float = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.place import Lane
 from viewsphere.model.scene import Vector
+from viewsphere.model.sensors.camera import Intrinsics
 
 Float = NDArray[np.float64]
 

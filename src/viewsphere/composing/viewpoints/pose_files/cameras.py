@@ -11,9 +11,9 @@ from viewsphere.composing.viewpoints.pose_files.entries import Extrinsics, PoseF
 from viewsphere.composing.viewpoints.pose_files.lens import one_lens
 from viewsphere.composing.viewpoints.pose_files.motions import motion
 from viewsphere.errors import ModelError, RecipeError
-from viewsphere.model.camera import Intrinsics
-from viewsphere.recipe.time import chosen_frames
-from viewsphere.recipe.viewpoints import PoseList
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.recipe.cameras.time import chosen_frames
+from viewsphere.recipe.cameras.viewpoints import PoseList
 
 if TYPE_CHECKING:
     from viewsphere.assets.animation.timeline import Blenders

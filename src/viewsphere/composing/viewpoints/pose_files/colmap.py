@@ -14,8 +14,8 @@ from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion, 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.validation_errors import told_of
+from viewsphere.model.fields.validation_errors import told_of
+from viewsphere.model.sensors.camera import Intrinsics
 
 PARAMETERS = {
     "SIMPLE_PINHOLE": "f cx cy",

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.listed import ListedShot
 from viewsphere.model.model_spec import Axis
+from viewsphere.model.sensors.camera import Intrinsics
 
 Row = tuple[float, float, float]
 

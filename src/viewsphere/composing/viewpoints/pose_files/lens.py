@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 
 
 def one_lens(lenses: Iterable[Intrinsics | None], where: str) -> Intrinsics | None:

@@ -14,9 +14,9 @@ from viewsphere.composing.viewpoints.pose_files.entries import Arranged, Extrins
 from viewsphere.composing.viewpoints.pose_files.lines import read_text
 from viewsphere.composing.viewpoints.pose_files.motions import motions
 from viewsphere.errors import RecipeError
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.fields.validation_errors import report
 from viewsphere.model.listed import ListedShot, Pose
-from viewsphere.model.validation_errors import report
+from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.texts import parsed
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.engines.raster.antialiasing import kernels_chosen, kernels_edges, kernels_lines
 from viewsphere.engines.raster.antialiasing import kernels_samples as kernels
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.truth.raster.geometry import Geometry, seen_from
 from viewsphere.truth.raster.visibility import (
     RayTable,

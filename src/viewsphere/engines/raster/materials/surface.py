@@ -15,8 +15,8 @@ from viewsphere.engines.raster.materials.bundles import BundlePacker
 from viewsphere.engines.raster.materials.kernels_rows import place_rows
 from viewsphere.engines.raster.materials.material_rows import material_row
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures
-from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Repaint, Thing
 from viewsphere.rendering.ground.material import ground_frame, ground_material
 from viewsphere.truth.raster.geometry import UP, Geometry, read_only

@@ -15,7 +15,7 @@ from viewsphere.engines.raster.reflections import kernels_mirror
 from viewsphere.engines.raster.reflections.mirroring import blurred, looked_at, lying, mirrored
 from viewsphere.engines.raster.shading import kernels_paint, kernels_split
 from viewsphere.engines.raster.shading.painting import Baked, view_of
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.visibility import Visibility
 
 LEVEL = 0.9995

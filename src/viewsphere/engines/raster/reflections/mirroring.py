@@ -13,7 +13,7 @@ from viewsphere.engines.raster.reflections import kernels_mirror as kernels
 from viewsphere.engines.raster.shading.painting import NO_SPLIT, Baked, shade_all, view_of
 from viewsphere.engines.raster.sky.environment import sky_behind
 from viewsphere.geometry.camera import inverse_camera_matrix
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.alpha_masks import NEVER
 from viewsphere.truth.raster.geometry import Geometry, with_both_sides
 from viewsphere.truth.raster.visibility import Visibility, lens_rays, rasterize

@@ -25,7 +25,7 @@ from viewsphere.engines.raster.reflections.mirroring import BRIGHTEST
 from viewsphere.engines.raster.reflections.tracing import Tree, cast
 from viewsphere.engines.raster.shading import kernels_paint, kernels_split
 from viewsphere.engines.raster.shading.painting import Baked, view_of
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.truth.raster.visibility import Visibility
 
 Float = NDArray[np.float64]

@@ -14,8 +14,8 @@ from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.reflections.mirroring import blurred, looked_at, lying, mirrored
 from viewsphere.engines.raster.shading import kernels_paint, kernels_split
 from viewsphere.engines.raster.shading.painting import Baked, view_of
-from viewsphere.model.camera import Camera
-from viewsphere.model.classes import STUFF_IDS
+from viewsphere.model.annotations.classes import STUFF_IDS
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.weather import Wet
 from viewsphere.truth.raster.visibility import Visibility
 

@@ -22,7 +22,7 @@ from viewsphere.engines.raster.shadows.occlusion import Occlusion
 from viewsphere.engines.raster.shadows.shadow_maps import Lights
 from viewsphere.engines.raster.sky.environment import Surrounding, sky_behind
 from viewsphere.geometry.camera import inverse_camera_matrix
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.weather import Fog
 from viewsphere.rendering.weather.fog import Air
 from viewsphere.truth.raster.geometry import Geometry

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from viewsphere.engines.shared.blender.requests import extent
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.weather import Fog
 from viewsphere.rendering.ground.horizon import BEGIN, FLAT, OVER

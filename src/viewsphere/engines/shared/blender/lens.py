@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from viewsphere.engines.shared.blender.file_frame import FileFrame
 from viewsphere.engines.shared.blender.requests import staged
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sensors.camera import Camera, Intrinsics
 from viewsphere.model.shot import Shot
 
 MOMENTS = 9

@@ -18,10 +18,10 @@ from viewsphere.engines.shared.blender.file_frame import FileFrame
 from viewsphere.engines.shared.blender.requests import members_of
 from viewsphere.engines.shared.blender.staging import STAGE_SECONDS, Arrangement, build_stage, camera_request
 from viewsphere.geometry.camera import orbit_angles
-from viewsphere.model.camera import Camera
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Finish
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.rendering.background import display_background
 from viewsphere.rendering.effects import has_effects

@@ -27,8 +27,8 @@ from viewsphere.engines.shared.blender.scripts import script_request
 from viewsphere.engines.shared.blender.texels import Kind, Levels
 from viewsphere.engines.shared.passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
-from viewsphere.model.camera import Camera
 from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.rendering.background import display_background, shows_sky

@@ -23,7 +23,7 @@ from viewsphere.assets.appearance.repaint import repainted
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.thing import Repaint, Thing
 
 FINEST = 2.0

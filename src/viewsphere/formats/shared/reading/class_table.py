@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.model.classes import STUFF_IDS, SemanticClass
+from viewsphere.model.annotations.classes import STUFF_IDS, SemanticClass
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from pydantic import ValidationError
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes, read_text
 from viewsphere.formats.shared.reading.exif import upright
+from viewsphere.model.fields.validation_errors import dotted, first_of
 from viewsphere.model.sample import Sample
-from viewsphere.model.validation_errors import dotted, first_of
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, refuse_broken
 from viewsphere.store.paths import file_inside, is_name

@@ -12,7 +12,7 @@ from viewsphere.geometry.camera import project
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, transform
 from viewsphere.labels import view_of
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.sensors.camera import Intrinsics
 
 Float = NDArray[np.float64]
 

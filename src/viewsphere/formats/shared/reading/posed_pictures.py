@@ -17,10 +17,10 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes
 from viewsphere.formats.shared.cameras import world_from_camera
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import viewpoint_of
-from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Camera, Intrinsics
+from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, Loaded, refuse_broken
 from viewsphere.store.paths import file_inside, is_name
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.model.camera import Camera
+from viewsphere.model.sensors.camera import Camera
 from viewsphere.store import ModelInfo
 
 

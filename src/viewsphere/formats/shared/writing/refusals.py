@@ -7,9 +7,9 @@ import re
 from collections.abc import Iterator, Sequence
 
 from viewsphere.formats import Scope
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import missing
 from viewsphere.model.sample import Sample
+from viewsphere.model.sensors.camera import Intrinsics
 
 
 def lenses(scope: Scope) -> Iterator[tuple[str, Intrinsics]]:

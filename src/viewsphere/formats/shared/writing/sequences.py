@@ -8,10 +8,10 @@ from functools import lru_cache
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.timeline import unknown_shots
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.rig import Pair, Rig
 from viewsphere.model.sample import Sample
-from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Pair, Rig
+from viewsphere.recipe.cameras.sequence import TimeEntry
 from viewsphere.store import Dataset
 from viewsphere.store.paths import is_name
 

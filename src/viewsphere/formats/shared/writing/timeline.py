@@ -11,7 +11,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
-from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.recipe.cameras.sequence import TimeEntry
 from viewsphere.store import Dataset, PlanRecord
 from viewsphere.store.index import Block
 

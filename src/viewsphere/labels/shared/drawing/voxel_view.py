@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels.shared.drawing.colors import color_of
-from viewsphere.model.classes import class_colors
+from viewsphere.model.annotations.classes import class_colors
+from viewsphere.model.annotations.voxels import OCCLUDED, OUTSIDE
 from viewsphere.model.sample import Sample
-from viewsphere.model.voxels import OCCLUDED, OUTSIDE
 
 Picture = NDArray[np.uint8]
 Float = NDArray[np.float64]

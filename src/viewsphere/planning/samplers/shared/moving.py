@@ -10,7 +10,7 @@ from itertools import chain
 from viewsphere.composing.motion import Mover
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion, TimeStep
-from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.recipe.cameras.sequence import TimeEntry
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,19 +19,19 @@ from viewsphere.composing.seeds import generator, share, shares
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.limits import limits
+from viewsphere.model.fields.quantity import quantity
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Surface
-from viewsphere.model.quantity import quantity
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.model.validation_errors import one_of
 from viewsphere.planning.samplers.shared.sampling_context import SamplingContext
 from viewsphere.planning.splits import drawn_split, shared
 from viewsphere.plugins.source import model_for
 from viewsphere.recipe.draws import drawn
-from viewsphere.recipe.layout import SurfaceEntry
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.scenes import ScenesEntry
+from viewsphere.recipe.world.layout import SurfaceEntry
+from viewsphere.recipe.world.scenes import ScenesEntry
 
 LOOKS = 8
 """Looks of one piece of scenery."""

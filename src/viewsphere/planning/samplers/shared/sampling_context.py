@@ -26,14 +26,14 @@ from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
 from viewsphere.labels import label_named
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.annotations.tracks import Tracks
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Finish, Scene, Vector
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
-from viewsphere.model.tracks import Tracks
 from viewsphere.planning.clips import shown_steps
 from viewsphere.planning.engine_digest import engine_options
 from viewsphere.planning.splits import dealt, hashed

@@ -1,0 +1,1 @@
+"""Facts about models and objects: points, symmetries, classes, metadata, voxels."""

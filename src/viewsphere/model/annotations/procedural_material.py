@@ -1,0 +1,18 @@
+"""A material that is drawn from a number rather than read from a file."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Natural
+
+
+class ProceduralMaterial(Frozen):
+    """One piece of a material of `viewsphere.materials`: its name, what colours, sizes and grain are drawn from, and the
+    texels of its pictures a side.
+    """
+
+    name: str = Field(min_length=1)
+    seed: Natural = 0
+    size: int = Field(default=512, ge=16, le=4096)

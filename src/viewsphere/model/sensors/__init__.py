@@ -1,0 +1,1 @@
+"""Sensors: cameras, LiDARs, rigs and exposures."""

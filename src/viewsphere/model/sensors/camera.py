@@ -1,0 +1,86 @@
+"""The camera: its lens (intrinsics) and, for one frame, where it stands (extrinsics)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, SerializeAsAny
+
+from viewsphere.geometry.lenses import Lens, LensParameters, lens_of, read_parameters
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.fields.frozen import Frozen
+
+Distortion = Annotated[SerializeAsAny[LensParameters], BeforeValidator(read_parameters)]
+"""The model of a lens and its parameters; a mapping of these is read as its model's class."""
+
+
+class Intrinsics(Frozen):
+    """Image size in pixels and the pinhole matrix K; pixel coordinates have their origin at the image's corner."""
+
+    width: int = Field(gt=0)
+    height: int = Field(gt=0)
+    fx: float = Field(gt=0)
+    fy: float = Field(gt=0)
+    cx: float
+    cy: float
+    skew: float = 0.0
+    distortion: Distortion | None = None
+
+    @property
+    def lens(self) -> Lens:
+        """Rays of pixels, and pixels of points."""
+        return lens_of(self)  # pyright: ignore[reportArgumentType]: it is frozen, so it has a hash
+
+    @property
+    def K(self) -> NDArray[np.float64]:
+        """Camera matrix, (3, 3) float64, pixels."""
+        return np.array([[self.fx, self.skew, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """One frame's camera: intrinsics and the world-to-camera motion x_camera = R x_world + t (OpenCV axes, metres)."""
+
+    intrinsics: Intrinsics
+    R: NDArray[np.float64]
+    t: NDArray[np.float64]
+
+    @property
+    def K(self) -> NDArray[np.float64]:
+        """Camera matrix, (3, 3) float64, pixels."""
+        return self.intrinsics.K
+
+    @property
+    def P(self) -> NDArray[np.float64]:
+        """Projection matrix K [R|t], (3, 4) float64; exact for an undistorted lens."""
+        motion = np.column_stack([self.R, self.t])
+        return transform(self.K, motion.T).T
+
+    @cached_property
+    def center(self) -> NDArray[np.float64]:
+        """Camera centre in the world, (3,) metres; do not write to it."""
+        return -transform(self.R.T, self.t)
+
+    @property
+    def width(self) -> int:
+        """Image width in pixels."""
+        return self.intrinsics.width
+
+    @property
+    def height(self) -> int:
+        """Image height in pixels."""
+        return self.intrinsics.height
+
+    @property
+    def lens(self) -> Lens:
+        """Rays of pixels, and pixels of points, in camera axes."""
+        return self.intrinsics.lens
+
+    @property
+    def distortion(self) -> LensParameters | None:
+        """The lens model and its parameters, None for a pinhole."""
+        return self.intrinsics.distortion

@@ -1,0 +1,82 @@
+"""The motion while the shutter is open: for motion blur, which pictures show and labels do not."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from typing import Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from viewsphere.geometry.rotation import matrix_from_quaternion, product, quaternion_from_matrix, rigid
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.scene import Matrix4
+from viewsphere.model.thing import Motion, TimeStep
+
+
+class Sweep(Frozen):
+    """A motion around an instant: its poses and time steps at `moments`, which increase. They are times after the instant, in
+    shares of the time between two instants; what lies between two of them is interpolated.
+
+    Moments may lie outside of the time for which the shutter is open: a mesh goes on from the time step that the instant before
+    shows (moment -1) to those of the instant (0) and of the one after (1).
+    """
+
+    moments: tuple[float, ...] = Field(min_length=2)
+    motion: Motion
+
+    @model_validator(mode="after")
+    def _as_many_as_moments(self) -> Sweep:
+        count = len(self.moments)
+        if any(a >= b for a, b in zip(self.moments, self.moments[1:], strict=False)):
+            raise ValueError(f"expected moments that increase; found {self.moments}")
+        if not self.motion.lasts(count):
+            counts = f"{len(self.motion.poses)} and {len(self.motion.steps)}"
+            raise ValueError(f"expected one pose and one time step, or one a moment ({count}); found {counts}")
+        return self
+
+    def pose(self, moment: float) -> Matrix4 | None:
+        """The pose at a moment: straight on and turning the shorter way between two known ones; None where it is not there."""
+        before, after, share = self._around(moment)
+        start, end = self.motion.at(before), self.motion.at(after)
+        return start if start is None or end is None or start == end else _between(start, end, share)
+
+    def steps(self, moment: float) -> tuple[TimeStep | None, TimeStep | None, float]:
+        """The known time steps around a moment, and how far from the first to the second it is, 0 to 1."""
+        before, after, share = self._around(moment)
+        return self.motion.step_at(before), self.motion.step_at(after), share
+
+    def _around(self, moment: float) -> tuple[int, int, float]:
+        before = min(max(bisect_right(self.moments, moment) - 1, 0), len(self.moments) - 2)
+        start, end = self.moments[before], self.moments[before + 1]
+        return before, before + 1, min(max((moment - start) / (end - start), 0.0), 1.0)
+
+
+class Exposure(Frozen):
+    """The motion around one instant: a sweep for each thing of a shot, and one for the rig (world from rig).
+
+    A sweep is None for a thing that stands still or is not there, and for a rig that stands still.
+    """
+
+    things: tuple[Sweep | None, ...]
+    rig: Sweep | None = None
+
+
+def _between(start: Matrix4, end: Matrix4, share: float) -> Matrix4:
+    """A rigid pose between two: no sines, which differ by processor, since what is turned by little turns evenly without."""
+    a, b = np.array(start), np.array(end)
+    p, q = (np.array(quaternion_from_matrix(m[:3, :3])) for m in (a, b))
+    q = q if float((p * q).sum()) >= 0 else -q
+    turned = matrix_from_quaternion((1 - share) * p + share * q)
+    rows = rigid(turned, (1 - share) * a[:3, 3] + share * b[:3, 3]).tolist()
+    first, second, third, last = (tuple(row) for row in rows)
+    return first, second, third, last
+
+
+def beyond(now: Matrix4, other: Matrix4) -> Matrix4:
+    """The pose as far from `now` as another, on its other side: straight on, and turned on by as much."""
+    a, b = np.array(now), np.array(other)
+    turned = product(product(a[:3, :3], b[:3, :3].T), a[:3, :3])
+    rows: Any = rigid(turned, 2 * a[:3, 3] - b[:3, 3]).tolist()
+    first, second, third, last = (tuple(row) for row in rows)
+    return first, second, third, last

@@ -1,0 +1,97 @@
+"""A rig: sensors that are mounted to one another and move together."""
+
+from __future__ import annotations
+
+from itertools import permutations
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.omit_none import OmitNone
+from viewsphere.model.scene import IDENTITY, Matrix4
+from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.model.sensors.lidar import LIDAR, Lidar
+
+CAMERA = "camera"
+"""Default name of a rig's only sensor."""
+
+
+class Sensor(OmitNone):
+    """A camera or a LiDAR of a rig: its lens, and where it is mounted. `rig_from_sensor` is rigid, OpenCV axes on both sides,
+    metres. `channels` are those of the shot's that it keeps, None: a camera all but points, a LiDAR these alone. `lidar`: how
+    it measures; None: it is a camera.
+    """
+
+    OMIT_IF_NONE = ("channels", "lidar")
+
+    intrinsics: Intrinsics
+    name: str = Field(default=CAMERA, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)
+    rig_from_sensor: Matrix4 = IDENTITY
+    channels: tuple[str, ...] | None = None
+    lidar: Lidar | None = None
+
+    def kept(self, channels: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the channels of a shot that the sensor keeps, in the shot's order."""
+        own = self.channels
+        if own is None:
+            return tuple(name for name in channels if (name == LIDAR) == (self.lidar is not None))
+        return tuple(name for name in channels if name in own)
+
+
+class Pair(NamedTuple):
+    """Two sensors of a rig, by their places in it, whose pictures are rectified, and the metres between them."""
+
+    left: int
+    right: int
+    baseline: float
+
+
+class Rig(Frozen):
+    """One or more sensors; the rig's axes are those of the first."""
+
+    sensors: tuple[Sensor, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _named_once(self) -> Rig:
+        names = [sensor.name for sensor in self.sensors]
+        if len({name.casefold() for name in names}) != len(names):
+            raise ValueError(f"expected sensors of different names; found {', '.join(names)}")
+        if self.sensors[0].rig_from_sensor != IDENTITY:
+            raise ValueError(f"expected the rig's axes to be those of its first sensor; found {names[0]} mounted elsewhere")
+        return self
+
+    @property
+    def rectified(self) -> tuple[Pair, ...]:
+        """The pairs of sensors with equal pinhole lenses and equal axes, of which one stands along the other's x axis."""
+        numbered = permutations(enumerate(self.sensors), 2)
+        pairs = ((i, j, _baseline(left, right)) for (i, left), (j, right) in numbered)
+        return tuple(Pair(i, j, baseline) for i, j, baseline in pairs if baseline is not None)
+
+    def partner(self, sensor: int) -> tuple[str, float] | None:
+        """Name of the first sensor that is rectified with another one, counted from 0, and the metres between them; or None."""
+        pairs = self.rectified
+        beside = sorted((right if left == sensor else left, b) for left, right, b in pairs if sensor in (left, right))
+        return (self.sensors[beside[0][0]].name, beside[0][1]) if beside else None
+
+    @staticmethod
+    def of(intrinsics: Intrinsics) -> Rig:
+        """The rig of one camera with this lens."""
+        return Rig(sensors=(Sensor(intrinsics=intrinsics),))
+
+
+STRAIGHT = 1e-9
+"""Tolerance for the numbers of equal axes, and for a baseline's direction along the x axis."""
+
+
+def _baseline(left: Sensor, right: Sensor) -> float | None:
+    """Metres from the left sensor to the right one along x, None where they are not rectified in this order."""
+    if left.intrinsics != right.intrinsics or not left.intrinsics.lens.is_linear:
+        return None
+    a, b = np.array(left.rig_from_sensor), np.array(right.rig_from_sensor)
+    if np.abs(a[:3, :3] - b[:3, :3]).max() > STRAIGHT:
+        return None
+    x, y, z = transform(a[:3, :3].T, b[:3, 3] - a[:3, 3]).tolist()
+    return x if x > 0 and max(abs(y), abs(z)) <= STRAIGHT * x else None

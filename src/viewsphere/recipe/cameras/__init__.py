@@ -1,0 +1,1 @@
+"""Recipe fields about cameras: viewpoints, trajectories, lenses, rigs and time."""

@@ -1,0 +1,191 @@
+"""The rig of a recipe: sensors that are mounted to one another, listed, made by a rule, or read from calibrations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
+
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Count, Length, Metres, Number, Positive
+from viewsphere.model.fields.validation_errors import shown
+from viewsphere.recipe.cameras.lens import DistortionField
+from viewsphere.recipe.cameras.lidar import LidarEntry
+from viewsphere.recipe.values import OrShort, pair
+from viewsphere.recipe.world.scene import CameraEntry, CameraMatrix, PictureSize, Row
+
+MOST_SENSORS = 64
+AXES = "OpenCV axes of the first sensor: x right, y down, z forward"
+OWN_LENSES = ("fov_deg", "focal_px", "K")
+LENS_FIELDS = ("size", "fov_deg", "fov_axis", "focal_px", "focal_mm", "sensor_mm", "K", "principal_point", "distortion")
+
+SensorName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
+Place = tuple[Metres, Metres, Metres]
+
+
+Rotation = Annotated[
+    Annotated[tuple[Number, Number, Number], Tag("angles")] | Annotated[tuple[Row, Row, Row], Tag("matrix")],
+    Discriminator(lambda value: "matrix" if _is_of_lists(value) else "angles"),
+]
+
+
+def _is_of_lists(value: object) -> bool:
+    return isinstance(value, (list, tuple)) and any(isinstance(row, (list, tuple)) for row in cast("Sequence[object]", value))
+
+
+class SensorEntry(Frozen):
+    """A sensor's mounting, and its own lens and channels."""
+
+    position: Place = Field(default=(0.0, 0.0, 0.0), description=f"[x, y, z] in metres; {AXES}")
+    rotation: Rotation | None = Field(
+        default=None,
+        description="[x, y, z] in degrees: y turns it to the right, then x up, then z clockwise seen from behind; or the "
+        "3x3 matrix from the sensor's axes to the rig's",
+    )
+    look: Place | None = Field(default=None, description=f"instead of rotation: the point [x, y, z] to look at, metres, {AXES}")
+    size: PictureSize | None = Field(default=None, description="[width, height] in pixels; default: the camera's")
+    fov_deg: Annotated[Number, Field(gt=0, lt=180)] | None = Field(default=None, description="as in camera")
+    fov_axis: Literal["horizontal", "vertical"] | None = Field(default=None, description="as in camera")
+    focal_px: Annotated[tuple[Positive, Positive], BeforeValidator(pair), OrShort({"type": "number"})] | None = Field(
+        default=None, description="as in camera"
+    )
+    K: CameraMatrix | None = Field(default=None, description="as in camera")
+    distortion: DistortionField | None = Field(
+        default=None, description="as in camera; a sensor with its own lens does not inherit the camera's"
+    )
+    lidar: LidarEntry | None = Field(default=None, description="instead of a lens: a LiDAR, with its rings, columns and noise")
+    channels: Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
+        default=None,
+        description="channels of the recipe that this sensor keeps; default: all but lidar, for a LiDAR only lidar",
+    )
+
+    @model_validator(mode="after")
+    def _one_turn(self) -> SensorEntry:
+        if self.rotation is not None and self.look is not None:
+            raise ValueError("expected rotation or look; found both")
+        if self.look is not None and self.look == self.position:
+            raise ValueError(f"expected look away from position; found both at {shown(self.look)}")
+        return self
+
+    @model_validator(mode="after")
+    def _one_lens(self) -> SensorEntry:
+        given = [name for name in OWN_LENSES if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise ValueError(f"expected one of {', '.join(OWN_LENSES)}; found {' and '.join(given)}")
+        if self.lidar is not None and self.has_lens:
+            raise ValueError(f"expected none of {', '.join(LENS_FIELDS)} beside lidar, which says its rays; found one")
+        if self.fov_axis and not self.fov_deg:
+            raise ValueError("expected fov_axis beside fov_deg; found it alone")
+        return self
+
+    @property
+    def has_lens(self) -> bool:
+        """True if it sets its lens or its size."""
+        return any(getattr(self, name, None) is not None for name in LENS_FIELDS)
+
+    def lens(self, camera: CameraEntry) -> CameraEntry:
+        """Size and lens, the recipe's camera's as far as the sensor says nothing. Raises ValueError for a size beside a camera
+        whose lens is in pixels.
+        """
+        mine = {name: value for name in LENS_FIELDS if (value := getattr(self, name, None)) is not None}
+        states = any(name in mine for name in OWN_LENSES)
+        if not states and camera.is_random:
+            raise ValueError(
+                "expected fov_deg, focal_px or K beside size or distortion, as the camera's lens is drawn; found none"
+            )
+        if not states and "size" in mine and (camera.focal_px or camera.K or camera.of_viewpoints):
+            raise ValueError(
+                "expected fov_deg, focal_px or K beside size, as the camera's lens is in its own pixels; found none"
+            )
+        if not states and camera.of_viewpoints:
+            raise ValueError(
+                "expected fov_deg, focal_px or K beside distortion, as the camera's lens is its file's; found none"
+            )
+        theirs = {n: v for n in LENS_FIELDS if (v := getattr(camera, n)) is not None and (n == "size" or not states)}
+        return CameraEntry.model_validate(theirs | mine)
+
+
+class SensorList(Frozen):
+    """Sensors by name. The first is the rig's origin: where it stands elsewhere, all are moved and turned with it there."""
+
+    kind: Literal["sensors"] = Field(default="sensors", description="a mapping of sensors by name")
+    sensors: Annotated[dict[SensorName, SensorEntry], Field(min_length=1, max_length=MOST_SENSORS)] = Field(
+        description="each sensor by its name; the viewpoint is the first one's"
+    )
+
+    @field_validator("sensors")
+    @classmethod
+    def _told_apart(cls, value: dict[str, SensorEntry]) -> dict[str, SensorEntry]:
+        seen: dict[str, str] = {}
+        for name in value:
+            if (other := seen.setdefault(name.casefold(), name)) != name:
+                raise ValueError(
+                    f"sensors {other!r} and {name!r} differ only in capitals, which some file systems ignore: rename one"
+                )
+        return value
+
+    @property
+    def has_lidar(self) -> bool:
+        """True if one of them is a LiDAR."""
+        return any(entry.lidar is not None for entry in self.sensors.values())
+
+
+class StereoRig(Frozen):
+    """Two equal cameras side by side, rectified: `left`, whose the viewpoint is, and `right`."""
+
+    kind: Literal["stereo"] = Field(description="two equal cameras, left and right, side by side")
+    baseline: Length = Field(description="metres from the left camera to the right one")
+
+
+class SurroundRig(Frozen):
+    """Equal cameras that look all around: `camera0` ahead, each next one turned on to the right."""
+
+    kind: Literal["surround"] = Field(description="equal cameras all around: camera0 ahead, camera1 turned to the right, ...")
+    count: Annotated[Count, Field(ge=2, le=MOST_SENSORS)] = Field(description="number of cameras")
+    radius: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="metres from the rig's middle to each camera")
+
+
+class RigFile(Frozen):
+    """Sensors of calibration files. What the calibrations do not say, as sizes may be, is the recipe's camera's."""
+
+    kind: Literal["file"] = Field(default="file", description="from calibrations")
+    path: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1)] = Field(
+        description="the file, or files: camera_info has one per camera, OpenCV can have one for lenses and one for R, T"
+    )
+    format: Literal["auto", "opencv", "kalibr", "camera_info"] = Field(
+        default="auto", description="auto: detected from the file's content"
+    )
+    rectified: bool = Field(default=False, strict=True, description="rectified pictures instead of raw ones: the pinholes of P")
+
+    @field_validator("path", mode="before")
+    @classmethod
+    def _listed(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
+
+
+AnyRig = SensorList | StereoRig | SurroundRig | RigFile
+
+
+def _as_written(value: Any) -> Any:
+    """`{file: PATH}` as `{kind: file, path: PATH}`; anything else unchanged."""
+    if isinstance(value, Mapping) and "file" in value and not {"kind", "path"} & value.keys():
+        entry = dict(cast("Mapping[str, Any]", value))
+        return {"kind": "file", "path": entry.pop("file"), **entry}
+    return value
+
+
+def _kind(value: Any) -> Any:
+    return value.get("kind", "sensors") if isinstance(value, dict) else getattr(value, "kind", None)
+
+
+RigField = Annotated[
+    Annotated[
+        Annotated[SensorList, Tag("sensors")]
+        | Annotated[StereoRig, Tag("stereo")]
+        | Annotated[SurroundRig, Tag("surround")]
+        | Annotated[RigFile, Tag("file")],
+        Discriminator(_kind),
+    ],
+    BeforeValidator(_as_written),
+]

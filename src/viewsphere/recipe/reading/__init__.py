@@ -1,0 +1,1 @@
+"""Recipe files: YAML, recipes that extend others, former names and the places of errors."""

@@ -1,0 +1,246 @@
+"""Recipe files: YAML 1.2 in UTF-8, read with the line of every value; their JSON schema; a recipe to start from."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import yaml
+from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from viewsphere.errors import RecipeError
+from viewsphere.files import read_bytes
+from viewsphere.limits import limits
+from viewsphere.model.fields.validation_errors import Marks, Place, dotted, shown
+from viewsphere.model.fields.validation_errors import Path as Steps
+from viewsphere.recipe.reading.yaml_errors import syntax_error
+
+DEEPEST = 200
+"""Brackets within one another: each takes the YAML reader as long as all those around it."""
+
+FOUND: dict[type | tuple[type, ...], str] = {type(None): "an empty file", list: "a list", str: "a text", object: "a number"}
+"""The problem of a file that holds no mapping. The message does not quote the file, which may be private and no recipe."""
+
+_HALF = re.compile("[\ud800-\udfff]")
+_INT = re.compile(r"[-+]?[0-9]+\Z")
+_FLOAT = re.compile(r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
+_TAG = "tag:yaml.org,2002:"
+
+
+def _use_yaml_12(rules: type[yaml.SafeLoader] | type[yaml.SafeDumper]) -> None:
+    """Set YAML 1.2's core rules: `no` and `12:30` are text, `1e3` is a number, there are no dates and no merge keys."""
+    rules.yaml_implicit_resolvers = {}
+    rules.add_implicit_resolver(f"{_TAG}null", re.compile(r"(?:~|null|Null|NULL|)\Z"), ["~", "n", "N", ""])
+    rules.add_implicit_resolver(f"{_TAG}bool", re.compile(r"(?:true|True|TRUE|false|False|FALSE)\Z"), list("tTfF"))
+    rules.add_implicit_resolver(f"{_TAG}int", _INT, list("-+0123456789"))
+    rules.add_implicit_resolver(f"{_TAG}float", _FLOAT, list("-+.0123456789"))
+
+
+class ShallowLoader(yaml.SafeLoader):
+    """A loader that raises RecursionError for more than `DEEPEST` brackets within one another, before it reads on."""
+
+    def fetch_flow_collection_start(self, TokenClass: Any) -> None:
+        """Begin a list or a mapping in brackets."""
+        if self.flow_level >= DEEPEST:
+            raise RecursionError("lists or mappings nested too deeply")
+        super().fetch_flow_collection_start(TokenClass)
+
+
+class _Loader(ShallowLoader):
+    """A loader that follows the rules of YAML 1.2, and ends at the first value beyond the limit, before the rest is read."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.most = limits.MAX_RECIPE_VALUES
+        self._left = self.most
+
+    def compose_node(self, parent: Node | None, index: Any) -> Node | None:
+        """The next node; raises _TooMany where it is a value beyond the limit. The keys of mappings are no values."""
+        if parent is None or index is not None:
+            self._left -= 1
+            if self._left < 0:
+                raise _TooMany(self.peek_event().start_mark.line + 1)
+        return super().compose_node(parent, cast(Any, index))
+
+
+class _TooMany(Exception):
+    """More values than a recipe may have; the argument is the line of the first of them."""
+
+
+class _Dumper(yaml.SafeDumper):
+    """A dumper whose text `_Loader` reads back equal."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+_use_yaml_12(_Loader)
+_use_yaml_12(_Dumper)
+
+
+def read(path: Path, fields: str = "name, models, viewpoints") -> tuple[Any, Marks]:
+    """Plain data of one recipe file, or of another with these fields, and the place of every value in it; raises RecipeError
+    naming file and line.
+    """
+    data, marks = parse(_text(path), str(path))
+    if not isinstance(data, dict):
+        found = next(kind for kinds, kind in FOUND.items() if isinstance(data, kinds))
+        raise RecipeError(f"{path}:1: expected a mapping of {fields}, ...; found {found}")
+    return data, marks
+
+
+def parse(text: str, source: str) -> tuple[Any, Marks]:
+    """Any YAML text as plain data, and the place of every value in it; raises RecipeError beginning with `source` and line."""
+    loader = _Loader(text)
+    try:
+        root = loader.get_single_node()
+        reader = _Reader(source, loader.most)
+        data = reader.value(root, ()) if root is not None else None
+    except yaml.MarkedYAMLError as error:
+        raise RecipeError(f"{source}:{syntax_error(text, error, _Loader)}") from None
+    except _TooMany as error:
+        problem = f"expected at most {loader.most:,} values (limit MAX_RECIPE_VALUES); found more"
+        raise RecipeError(f"{source}:{error}: {problem}: write fewer, or set VIEWSPHERE_MAX_RECIPE_VALUES higher") from None
+    except RecursionError:
+        raise RecipeError(f"{source}: expected a recipe, found lists or mappings nested too deeply") from None
+    return data, Marks(source, {steps: Place(source, line) for steps, line in reader.lines.items()})
+
+
+def _text(path: Path) -> str:
+    try:
+        if path.is_dir():
+            raise RecipeError(f"{path}: expected a recipe file, found a folder: name the .yaml file in it")
+        raw = read_bytes(path, "MAX_RECIPE_BYTES")
+    except OSError as error:
+        raise RecipeError(f"{path}: expected a readable recipe file, found: {error.strerror or error}") from None
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise RecipeError(
+            f"{path}:{line}: expected text in UTF-8; found byte 0x{raw[error.start]:02x}: save it as UTF-8"
+        ) from None
+    control = yaml.reader.Reader.NON_PRINTABLE.search(text)
+    if control:
+        line = text.count("\n", 0, control.start()) + 1
+        raise RecipeError(f"{path}:{line}: expected text; found the control character {control.group()!r}")
+    return text
+
+
+class _Reader:
+    """Turns YAML nodes into plain data and keeps their lines."""
+
+    def __init__(self, file: str, most: int) -> None:
+        self.file = file
+        self.most = most
+        self.lines: dict[Steps, int] = {}
+        self._count = 0
+        self._open: set[int] = set()
+
+    def value(self, node: Node, place: Steps) -> Any:
+        """The node's plain data; raises RecipeError for duplicate keys, tags and endless or exploding aliases."""
+        line = node.start_mark.line + 1
+        self.lines.setdefault(place, line)
+        self._count += 1
+        if self._count > self.most:
+            found = f"expected at most {self.most:,} values (limit MAX_RECIPE_VALUES); found more: write fewer aliases"
+            raise self._error(line, place, found)
+        if id(node) in self._open:
+            raise self._error(line, place, "expected a value; found an alias for the value it stands in")
+        self._open.add(id(node))
+        try:
+            if isinstance(node, MappingNode) and node.tag == f"{_TAG}map":
+                return self._mapping(node, place)
+            if isinstance(node, SequenceNode) and node.tag == f"{_TAG}seq":
+                return [self.value(item, (*place, i)) for i, item in enumerate(node.value)]
+            if isinstance(node, ScalarNode):
+                return self._scalar(node, place)
+        finally:
+            self._open.discard(id(node))
+        raise self._error(line, place, f"expected plain YAML; found the tag {node.tag!r}")
+
+    def _mapping(self, node: MappingNode, place: Steps) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            line = key_node.start_mark.line + 1
+            key = key_node.value if isinstance(key_node, ScalarNode) else None
+            if not isinstance(key, str):
+                raise self._error(line, place, "expected a name before the colon; found a list or mapping")
+            self._character(key, key_node, place)
+            if key in result:
+                first = self.lines[(*place, key)]
+                raise self._error(line, (*place, key), f"expected every field once; found {key!r} again, after line {first}")
+            self.lines[(*place, key)] = line
+            result[key] = self.value(value_node, (*place, key))
+        return result
+
+    def _scalar(self, node: ScalarNode, place: Steps) -> Any:
+        text: str = node.value
+        match node.tag.removeprefix(_TAG):
+            case "null":
+                return None
+            case "bool":
+                return text.lower() == "true"
+            case "int" if _INT.match(text) and len(text) <= 300:
+                return int(text)
+            case "float" if _FLOAT.match(text):
+                return _float(text)
+            case "str":
+                return self._character(text, node, place)
+            case _:
+                line = node.start_mark.line + 1
+                raise self._error(line, place, f"expected plain YAML; found {shown(text)} with the tag {node.tag!r}")
+
+    def _character(self, text: str, node: Node, place: Steps) -> str:
+        """The text; raises RecipeError for halves of pairs, such as `\\ud800` in quotes, which no file can hold, and for `\\0`,
+        which no path can.
+        """
+        if "\0" in text:
+            raise self._error(
+                node.start_mark.line + 1, place, f"expected text; found the control character '\\x00' in {text!a:.60}"
+            )
+        if not text.isascii() and _HALF.search(text):
+            raise self._error(node.start_mark.line + 1, place, f"expected characters; found half of one in {text!a:.60}")
+        return text
+
+    def _error(self, line: int, place: Steps, problem: str) -> RecipeError:
+        return RecipeError(f"{self.file}:{line}: {dotted(place)}: {problem}")
+
+
+def _float(text: str) -> float:
+    lower = text.lower()
+    if lower.endswith("inf"):
+        return -math.inf if lower.startswith("-") else math.inf
+    return math.nan if lower == ".nan" else float(text)
+
+
+def dump(data: dict[str, Any]) -> str:
+    """Plain data as the text of a recipe file that `read` gives back."""
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
+
+
+def schema(**names: Sequence[str]) -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of recipe files, with a description of every field; `names`: all valid names that the fields
+    `channels` and `annotations` list, if given.
+    """
+    from viewsphere.recipe.recipe import Recipe
+
+    whole = Recipe.model_json_schema()
+    for field, known in names.items():
+        whole["properties"][field]["items"]["enum"] = list(known)
+    path = {"type": "string", "minLength": 1}
+    extends = {
+        "anyOf": [path, {"type": "array", "items": path}],
+        "description": "another recipe, or several, whose fields hold where this one says nothing",
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **whole,
+        "properties": {"extends": extends, **whole["properties"]},
+        "required": [],
+        "anyOf": [{"required": ["extends"]}, {"required": whole["required"]}],
+        "title": "viewsphere recipe",
+    }

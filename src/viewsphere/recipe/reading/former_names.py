@@ -1,0 +1,57 @@
+"""Former names of recipe fields: recipes may still use them, with a warning."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, cast
+
+from viewsphere.model.fields.validation_errors import Path, dotted
+
+_PRESENT = {"azimuth_deg": "azimuth", "elevation_deg": "elevation", "tilt_deg": "tilt"}
+"""Former names, with those that replaced them."""
+
+_ENTRIES = frozenset({"sun", "night", "at", "jitter"})
+"""Entries of a scene that had fields with these names. A third-party plug-in's options may have them still."""
+
+_SCENES = frozenset({"scene", "variations"})
+
+
+def is_former(path: Path) -> bool:
+    """Return whether a path ends with the former name of a field."""
+    names = [step for step in path if isinstance(step, str) and step != "choice"]
+    return len(names) > 2 and names[0] in _SCENES and names[-2] in _ENTRIES and names[-1] in _PRESENT and path[-1] == names[-1]
+
+
+def present(path: Path) -> Path:
+    """The path with the present name of its field."""
+    return (*path[:-1], _PRESENT[cast(str, path[-1])]) if is_former(path) else path
+
+
+def with_present_names(data: Any, path: Path = ()) -> Any:
+    """The data of a recipe with present names for former ones. A former name beside its present one stays, as a mistake."""
+    if isinstance(data, Mapping) and (len(path) != 1 or path[0] in _SCENES):
+        fields = cast(Mapping[Any, Any], data)
+        return {
+            name if (new := present((*path, name))[-1]) in fields else new: with_present_names(value, (*path, name))
+            for name, value in fields.items()
+        }
+    if isinstance(data, (list, tuple)) and path[:1] and path[0] in _SCENES:
+        return [with_present_names(value, (*path, i)) for i, value in enumerate(cast(list[Any], data))]
+    return data
+
+
+def former_paths(data: Any, path: Path = ()) -> Iterator[Path]:
+    """Yield the paths of the fields that have a former name."""
+    if is_former(path):
+        yield path
+    if isinstance(data, Mapping):
+        for name, value in cast(Mapping[Any, Any], data).items():
+            yield from former_paths(value, (*path, name))
+    elif isinstance(data, (list, tuple)):
+        for i, value in enumerate(cast(list[Any], data)):
+            yield from former_paths(value, (*path, i))
+
+
+def renamed(paths: Iterable[Path]) -> tuple[str, ...]:
+    """The warnings about former names at these paths, one line each."""
+    return tuple(f"{dotted(path)}: this field is now called {_PRESENT[cast(str, path[-1])]!r}: rename it" for path in paths)

@@ -1,0 +1,1 @@
+"""Recipe fields about the world: scenes, layouts, lights, motion, weather and the finish of pictures."""
