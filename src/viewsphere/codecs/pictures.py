@@ -15,7 +15,7 @@ from viewsphere.errors import MissingExtraError
 
 Picture = NDArray[np.uint8]
 
-JPEG_QUALITY = 95
+JPEG_QUALITY = 95  # Pillow's highest recommended quality: more bytes beyond it show no difference
 _QOI_END = bytes(7) + b"\1"  # https://qoiformat.org/qoi-specification.pdf
 EFFORT = 1
 """JPEG XL's fastest lossless effort; higher ones take ten times as long to save a tenth of the size."""

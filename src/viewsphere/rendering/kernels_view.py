@@ -16,7 +16,7 @@ FAST = {"contract", "arcp", "nsz", "afn", "reassoc"}
 BLOCK = 8192
 GREEN, BLUE, ALPHA = BLOCK, 2 * BLOCK, 3 * BLOCK
 
-KNEE = f4(0.6)
+KNEE = f4(0.6)  # from which on highlights are compressed; below, the picture is linear
 GREY_IN = f4(0.723223)  # Narkowicz' curve takes 0.18 times this to 0.18
 INSET, OUTSET = f4(0.8), f4(1.25)
 SHARE_R, SHARE_G, SHARE_B = f4(0.04235), f4(0.07845), f4(0.0792)  # weights of the grey that AgX adds

@@ -18,11 +18,11 @@ Float = NDArray[np.float64]
 TYPICAL = 0.4
 """Length in metres that the typical body is simulated with."""
 
-STEP_S = 0.002
+STEP_S = 0.002  # MuJoCo's own default
 SOFT_S = 4 * STEP_S
 """Seconds in which a contact gives way: shorter ones need shorter steps, longer ones let bodies sink into one another."""
 
-GRAVITY = 9.81
+GRAVITY = 9.81  # metres a second squared
 
 LOOK = 25
 """Steps between two looks at whether bodies move."""

@@ -34,7 +34,7 @@ APART = 1.6
 BELOW = 0.06
 """Metres below its lens at which a lamp's light begins, so that the lens hides none."""
 
-CONE = 150.0
+CONE = 150.0  # degrees: a street lamp lights its post and the road, not the sky
 
 
 def lamplight(scene: Scene, things: Sequence[Thing], meshes: Sequence[Mesh], middle: Float) -> Scene:

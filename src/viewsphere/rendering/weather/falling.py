@@ -49,7 +49,7 @@ MOST = 400_000
 APERTURE = 0.003
 """Metres: the width of the lens, which blurs what is nearer than `FOCUS`, metres."""
 
-FOCUS = 8.0
+FOCUS = 8.0  # metres: near drops are blurred and far ones sharp, as in photographs of rain. Chosen by sight
 SWIRL = 0.12
 """Metres by which flakes swing from side to side."""
 

@@ -30,7 +30,7 @@ meets surface other than its own triangle, nearer by more than `GAP` of its dept
 turns its back to the camera.
 """
 
-GAP = 1e-6
+GAP = 1e-6  # of the depth: above the rounding of one depth computed twice, below the gap of surfaces. Not measured alone
 FACES = ((0, 1, 2, 1.0), (0, 1, 2, -1.0), (1, 2, 0, 1.0), (1, 2, 0, -1.0), (2, 0, 1, 1.0), (2, 0, 1, -1.0))
 """Sides of the cube around a fisheye or a scan: the axes that are right and down in it, the axis it faces, and which way."""
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from viewsphere.assets.primitive import BLOCK, Float, Int, Primitive, blocks, face_normals, pick
 from viewsphere.assets.readers.shared.transform import unit
 
-CREASE_DEG = 40.0
-MAX_VALENCE = 64
+CREASE_DEG = 40.0  # cylinders of ten sides, 36 degrees each, are smooth; boxes are not
+MAX_VALENCE = 64  # faces around a point: bounds the time of hostile fans, whose cost grows with the square
 ROUNDS = 8
 """More normals than a vertex has where less than a fan of sharp faces meets."""
 

@@ -19,7 +19,7 @@ from viewsphere.model.scene import IDENTITY, Matrix4
 TRIES = 2000
 """Spots that are tried for one model; the circle they lie in grows with each."""
 
-GROWTH = 0.01
+GROWTH = 0.01  # of the radius a try: TRIES tries reach the whole floor. Chosen by that, not measured
 
 SPREAD_TRIES = 400
 """Spots of a bounded floor that are tried for one model: where fewer than one in a hundred is free, another draw finds room

@@ -26,7 +26,7 @@ LEAST = 0.02  # weight of four nodes from which on they are read: probes know mo
 STEEP = 0.2  # cosine from which on light along the axes is known
 NEAR = 0.5  # cells
 INSIDE, SHUT = 0.5, 0.97  # shares of rays that meet an inner side, or anything near, from which on a node hardly counts
-HARDLY = 1e-3
+HARDLY = 1e-3  # weight of nodes that see no light of their own: above 0, so that weights can be divided by their sum
 _blend = blend(COLUMNS)
 
 

@@ -15,7 +15,7 @@ U = nb.uintp
 LIKE = 0.3  # cosine between the normals of a point and of a site from which on the site counts
 ASIDE = 0.15  # part of a normal along an axis from which on sites that face along this axis are asked
 THICK = 0.5  # cells between the planes of a point and a site from which on the site hardly counts
-HARDLY = 1e-3
+HARDLY = 1e-3  # least weight: above 0, so that weights can be divided by their sum
 SHUT = 0.5  # how many squared cells aside a part may be that is all open, instead of one that is all shut in
 STRAIGHT = 0.5  # cosine between a vertex' normal and that of its triangle from which on the triangle is round there
 

@@ -33,12 +33,12 @@ f4 = nb.float32
 i4 = nb.int32
 U = nb.uintp
 
-COAT_F0 = np.float32(0.04)
+COAT_F0 = np.float32(0.04)  # glTF's clear coat, index of refraction 1.5: ((1.5 - 1) / (1.5 + 1)) squared
 FULL_RIM = np.float32(50)  # one over the share mirrored straight on from which on a surface mirrors all light at its rim
 SMOOTHEST = np.float32(0.03)  # perceptual roughness, at least: in a perfect mirror a lamp would be a single point
 VIEWED = np.float32(0.25)  # squared roughness, as blurred as what probes see
 WIDE = np.float32(0.36)  # squared roughness from which on a lobe is as wide as a matt surface's
-BRIGHTEST = np.float32(60000.0)
+BRIGHTEST = np.float32(60000.0)  # below 65,504, the greatest half float of EXR files
 UNEXPOSED = np.float32(1 / EXPOSURE)  # an unlit colour is shown unchanged by the exposure
 
 

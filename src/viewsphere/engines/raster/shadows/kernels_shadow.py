@@ -20,11 +20,11 @@ U = nb.uintp
 
 STEP = 4  # texels from one of the finest cells to the next; each cell is two steps wide
 COARSEST = 16  # texels a side that a map's coarsest level has at least
-LEVELS = 12
+LEVELS = 12  # of depths: a map of 16 texels, doubled eleven times, is 32,768 texels wide, more than any map
 GAP = 16  # unused texels between rows: without them the rows of a window would push each other out of the cache
-STEEP = 15.0
+STEEP = 15.0  # biases: steeper slopes in a cell are given up. Chosen with the biases, not measured alone
 WIDE = 16  # texels of a row from which on it is worth to find out which of them a triangle covers
-ROUNDING = 1e-14
+ROUNDING = 1e-14  # some 50 units in the last place of a double: the error of the few sums before it
 # Columns of Views.form: four rows of the matrix, then those that `kernels_direct_light.look` reads: texels per length (at
 # distance 1), the bias in q of a distant light and in shares of q of a near one, the least q in the map, how far from the
 # middle the map is read, half its size, whether the light is round, how an ellipse grows with the squared texels from the

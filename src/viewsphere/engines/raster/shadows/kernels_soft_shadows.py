@@ -42,7 +42,7 @@ LEFT, TOP, TEXEL, TALL, REACH = U0, V0, U1, V1, PROBES + BLOCK
 MEAN, SUM, COUNT = OPENX, OPENY, OPENZ
 # Between the search and the filter: how the blockers' distance grows per texel. The rows' other contents are not needed then.
 SLOPE_U, SLOPE_V = SUM, RADIUS
-NARROW, WIDE = 6.5, 9.0
+NARROW, WIDE = 6.5, 9.0  # texels: half a filter of all texels, and from which on it skips some. Chosen by sight
 
 
 def span(form: Rows, b: Rows) -> Lanes:

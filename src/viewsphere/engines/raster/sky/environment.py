@@ -28,7 +28,7 @@ Float = NDArray[np.float64]
 
 _LEVELS = 8  # roughness 0 to 1
 _WIDE = 3  # level from which on a lobe is so wide that all texels of a map no wider than _COARSE are summed for it
-_COARSE = 64
+_COARSE = 64  # texels: wider maps are sampled for wide lobes, narrower ones are summed. Chosen by cost, not measured alone
 _SMALLEST = 32  # width of a map
 _SKY_WIDTH = 256  # width of the sharpest map of a sky that has no detail
 _PICTURE_WIDTH = 512  # width of the sharpest map of a photographed sky
@@ -36,7 +36,8 @@ _SKY_HEIGHT = 256  # height of the picture that is made of a gradient or dayligh
 _STEPS = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)  # factors of a packed colour (RGB9_E5), by its exponent
 _DISC = 60.0  # greatest radiance of the sun's disc where it is seen: every such pixel is white anyway
 
-# A photographed sun: a bright spot this far from its middle at most, so much above the mean and of so much of all light.
+# A photographed sun: a bright spot this far from its middle at most, so much above the mean and of so much of all light. Chosen
+# so that clear skies have a sun and overcast skies and windows of rooms have none; not measured on a collection.
 _SPOT = math.radians(5.0)
 _AROUND = math.radians(9.0)
 _ABOVE_MEAN = 20.0
