@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from viewsphere import Recipe, plugins, render
 from viewsphere.composing.viewpoints.camera import looking
-from viewsphere.geometry.box import EDGES, FACES
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels.shared.drawing.colors import PALETTE
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -193,13 +193,13 @@ def box3d_picture(sample: Sample, o: ObjectAnnotation, size: int) -> Picture:
     pen, small, large = (ImageDraw.Draw(image, "RGBA"), *(ImageFont.load_default(size=s) for s in (15, 18)))
     points = [tuple(p) for p in (o.box3d_pixels * scale).tolist()]
     centre = o.box3d_camera.mean(axis=0)
-    for name, face in FACES.items():
+    for name, face in Box3d.numbered_faces().items():
         middle = o.box3d_camera[list(face)].mean(axis=0)
         if middle @ (middle - centre) < 0:  # the triangle faces the camera
             pen.polygon([points[i] for i in face], fill=(*FACE_COLORS[name], 70))
             x, y = np.mean([points[i] for i in face], axis=0)
             pen.text((x, y), name, fill=(255, 255, 255), font=large, anchor="mm", stroke_width=2, stroke_fill=INK)
-    for a, b in EDGES:
+    for a, b in Box3d.layout()["edges"]:
         pen.line((points[a], points[b]), fill=(255, 255, 255, 230), width=2)
     middle = np.mean(points, axis=0)
     for i, point in enumerate(points):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from small import small_recipe
-from viewsphere.geometry.box import EDGES
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.labels.shared.drawing.colors import PALETTE
 from viewsphere.labels.shared.drawing.depth_colors import picture as depth_picture
 from viewsphere.model.model_spec import ModelSpec
@@ -64,10 +64,10 @@ def test_every_edge_of_a_3d_box_is_drawn_but_those_to_vertices_that_are_not_seen
     for name, vertices in (("all", pixels), ("hidden", hidden)):
         o = replace(sample.objects[0], box3d_pixels=vertices)
         picture = draw_sample(replace(sample, objects=(o,), channels={"rgb": black}), ["boxes3d"]).max(axis=2)
-        middles = [(pixels[a] + pixels[b]) / 2 for a, b in EDGES]
+        middles = [(pixels[a] + pixels[b]) / 2 for a, b in Box3d.layout()["edges"]]
         drawn[name] = [bool(picture[int(y) - 1 : int(y) + 2, int(x) - 1 : int(x) + 2].max() > 100) for x, y in middles]
     assert all(drawn["all"])
-    assert drawn["hidden"] == [7 not in edge for edge in EDGES]
+    assert drawn["hidden"] == [7 not in edge for edge in Box3d.layout()["edges"]]
 
 
 def test_near_is_light_and_nothing_is_black():

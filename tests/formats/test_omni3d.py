@@ -13,7 +13,7 @@ from pycocotools.coco import COCO
 from proven import close, equal
 from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
-from viewsphere.geometry.box import VERTEX_SIGNS
+from viewsphere.geometry.box3d import Box3d
 from viewsphere.run.exports.exporting import export
 from worlds import poses as recipe
 
@@ -49,7 +49,7 @@ def order():
     found = []
     for corner in range(8):
         sides = dict(SIGNS[name] for name, corners in NAMED.items() if corner in corners)
-        found.append(VERTEX_SIGNS.index(tuple(sides[axis] for axis in range(3))))
+        found.append(Box3d.layout()["signs"].index(tuple(sides[axis] for axis in range(3))))
     return found
 
 
