@@ -302,6 +302,13 @@ def test_an_engine_is_one_file(install):
         next(iter(render(small_recipe(engine={"name": "flat", "gloss": 1}, formats=[]))))
 
 
+def test_an_engine_whose_program_does_not_exist_is_refused_by_name(install):
+    code = EXAMPLES["flat"].replace("stage=Flat)", "stage=Flat, programs=(__import__('pathlib').Path('gone'),))")
+    install("engines", "flat", code)
+    with pytest.raises(PluginError, match=r"EngineSpec\.programs: expected files and folders that exist; found gone"):
+        plan(small_recipe(engine="flat", formats=[]))
+
+
 def test_a_stage_that_lacks_a_method_is_refused_by_name(install):
     install("engines", "flat", EXAMPLES["flat"].replace("def paint(", "def color("))
     with pytest.raises(PluginError, match=r"EngineSpec\.stage: expected a stage with at, paint, of; found no paint"):

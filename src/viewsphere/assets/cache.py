@@ -217,7 +217,7 @@ def readers_digest() -> str:
         except PackageNotFoundError:
             digest.update(f"{library} unknown;".encode())
     own = Path(__file__).parent
-    for source in [*sorted(own.rglob("*.py")), *sorted((own.with_name("blender") / "worker").glob("*.py"))]:
+    for source in [*sorted(own.rglob("*.py")), *sorted((own.with_name("blender") / "worker").rglob("*.py"))]:
         digest.update(read_bytes(source))
     return digest.hexdigest()
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
-from pydantic import Field, JsonValue
+from pydantic import Field, JsonValue, model_validator
 
 from viewsphere.errors import PluginError
 from viewsphere.model.channel import PICTURES
@@ -47,6 +47,13 @@ class EngineSpec(Spec):
         description="`indices(shot, instant, sensor, load)`: ids of the objects that the engine itself sees, for "
         "`check --against-cycles`; None where it lacks the lens",
     )
+
+    @model_validator(mode="after")
+    def _check_programs(self) -> Self:
+        for path in self.programs:
+            if not path.exists():
+                raise PluginError(f"EngineSpec.programs: expected files and folders that exist; found {path}")
+        return self
 
     def staged(self, shot: Shot, load: Callable[..., Any]) -> Any:
         """The stage of a shot; raises PluginError for one that lacks a method."""

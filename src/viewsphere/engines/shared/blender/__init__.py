@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from viewsphere.model.scene import Finish
     from viewsphere.model.shot import Shot
 
-PROGRAMS = (Path(__file__).parent, Path(__file__).parents[2] / "blender" / "worker")
+PROGRAMS = (Path(__file__).parent, Path(__file__).parents[3] / "blender" / "worker")
 """Source folders that the pictures of all these renderers depend on."""
 
 
