@@ -35,7 +35,7 @@ def plain(element):
 
 
 @st.composite
-def elements(draw, depth=3):
+def elements(draw, depth=2):
     name, attributes = draw(NAMES), draw(st.dictionaries(NAMES, WORDS, max_size=3))
     inside = draw(st.lists(elements(depth=depth - 1), max_size=3)) if depth else []
     between = draw(st.sampled_from(["", "<!-- said -->", "<?done?>", "<![CDATA[<p>]]>", "&#228;&lt;"]))
