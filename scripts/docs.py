@@ -231,9 +231,11 @@ A plug-in is one module, named by an entry point of its group, that holds its sp
 def plugins_page() -> str:
     """The fields of all specs."""
     text = NOTE + PLUGINS
-    for spec in (spec for spec in SPECS if spec is not LabelSpec):
+    of_labels = (ChannelLabel, ObjectLabel, SampleLabel)
+    for spec in (one for kind in SPECS for one in (of_labels if kind is LabelSpec else (kind,))):
         text += f"\n## {spec.__name__}\n\n{inspect.getdoc(spec)}\n\n"
-        text += f"Entry points `viewsphere.{spec.KIND}`; the module holds `{plugins.SEAMS[spec.KIND].constant}`.\n"
+        several = f", or several in `{constant}`" if (constant := plugins.SEAMS[spec.KIND].several) else ""
+        text += f"Entry points `viewsphere.{spec.KIND}`; the module holds `{plugins.SEAMS[spec.KIND].constant}`{several}.\n"
         text += "\n| field | default | meaning |\n|---|---|---|\n"
         for name, field in spec.model_fields.items():
             text += f"| `{name}` | {'needed' if field.is_required() else value(field.default)} | {field.description} |\n"
@@ -284,7 +286,7 @@ def value(default: Any) -> str:
     if isinstance(default, (list, tuple)):
         return f"[{', '.join(map(value, default))}]"
     if isinstance(default, str):
-        return f"`{default}`"
+        return f"`{default}`" if default else ""
     if isinstance(default, Mapping):
         return ", ".join(map(str, cast(Mapping[object, object], default)))
     if default is None or callable(default):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, InstanceOf, SkipValidation, model_validator
+from pydantic import Field as described
 
 from viewsphere.errors import PluginError, ViewsphereError
 from viewsphere.labels.shared.field import Field
@@ -42,7 +43,7 @@ Proof = Callable[[Sample, Models], Iterator[str]]
 
 
 def no_proof(sample: Sample, models: Models) -> Iterator[str]:
-    """The proof of a label about which nothing else in a sample says anything: only computing the label again proves it."""
+    """The proof of a label that nothing else in a sample can contradict: only computing it again proves it."""
     yield from ()
 
 
@@ -85,26 +86,29 @@ class Drawing:
 
 
 class LabelSpec(Spec):
-    """The properties of all labels: `name` (that of their file), `meaning`, `axes`, their frame of reference, `needs`, the
-    inputs besides what the picture's camera sees at its instant, and `options`, the class of those that a recipe's `labels` may
-    give.
-
-    `names_categories`: its text has the names of categories, which merging then does not spell in another way. `prove` compares
-    a stored sample with itself, which is quick; besides, `check` computes every label again.
-    """
+    """The properties of all labels."""
 
     model_config = ConfigDict(allow_inf_nan=True)
 
     KIND: ClassVar[Kind] = "labels"
 
-    name: str
-    meaning: str
-    axes: str = ""
-    needs: tuple[InstanceOf[Need[Any]], ...] = ()
-    options: type[Frozen] | None = None
-    prove: Proof = no_proof
-    drawing: InstanceOf[Drawing] | None = None
-    names_categories: bool = False
+    name: str = described(description="the name in recipes and data sets; a module with one label has the same name")
+    meaning: str = described(description="a phrase for lists")
+    axes: str = described(default="", description="the frame of reference")
+    needs: tuple[InstanceOf[Need[Any]], ...] = described(
+        default=(), description="inputs besides the view of the picture's own camera, such as `Next(1)` and `Partner()`"
+    )
+    options: type[Frozen] | None = described(default=None, description="the class of the options in a recipe's `labels`")
+    prove: Proof = described(
+        default=no_proof,
+        description="`prove(sample, models)`: yields a message for each contradiction within a stored sample. `check` also "
+        "recomputes every label",
+    )
+    drawing: InstanceOf[Drawing] | None = described(default=None, description="the `Drawing` of previews and reports")
+    names_categories: bool = described(
+        default=False,
+        description="whether its text contains names of categories, which merging must then not change",
+    )
 
     @property
     def view_offsets(self) -> frozenset[int]:
@@ -122,25 +126,25 @@ class LabelSpec(Spec):
 
 
 class ChannelLabel(LabelSpec):
-    """A label of pixels, stored as a separate file: (height, width) or (height, width, components); `empty` where nothing is
-    seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact; `colors` are those of the
-    first ids in files with a palette.
+    """A label of pixels, stored as a file for each picture."""
 
-    `in_steps`: a PNG file has it in whole steps. `holds_classes`: its numbers are classes, which the plan of the data set then
-    lists. `ids` are the kinds of ids in the array, each with a function that replaces them. Arrays of whole numbers without a
-    declaration raise PluginError.
-    """
-
-    compute: Callable[[LabelContext], Array]
-    dtype: Any
-    components: int = 1
-    in_steps: bool = False
-    holds_classes: bool = False
-    unit: str = "1"
-    empty: float = 0
-    encoding: Any = "tiff"
-    colors: tuple[Color, ...] = ()
-    ids: SkipValidation[Ids | None] = None
+    compute: Callable[[LabelContext], Array] = described(
+        description="`compute(context)`: the array, (height, width) or (height, width, components)"
+    )
+    dtype: Any = described(description="the type of the array")
+    components: int = described(default=1, description="numbers a pixel; 0: the array has rows, as many as there are")
+    unit: str = described(default="1", description="the unit of the numbers")
+    empty: float = described(default=0, description="the number where nothing is seen")
+    encoding: Any = described(
+        default="tiff", description="the default file: png16 for ids, png for small numbers, tiff for exact ones, npz for rows"
+    )
+    in_steps: bool = described(default=False, description="whether PNG files hold whole steps of `files.depth_unit`")
+    colors: tuple[Color, ...] = described(default=(), description="colours of the first ids, in files with a palette")
+    holds_classes: bool = described(default=False, description="whether its numbers are classes, which the plan then lists")
+    ids: SkipValidation[Ids | None] = described(
+        default=None,
+        description="the kinds of ids in the array, each with a function that replaces them; required for whole numbers",
+    )
 
     @model_validator(mode="after")
     def _check_ids(self) -> Self:
@@ -181,25 +185,25 @@ def no_record(annotation: ObjectAnnotation) -> None:
 
 
 class ObjectLabel(LabelSpec):
-    """A label of objects: one field or several that are computed together.
+    """A label of objects: one field or several that are computed together."""
 
-    `compute(context, i)` gives the fields of the object of id i + 1; `derived`: `restore` does. `keep` gives, as JSON, the part
-    of them that does not follow from the shot and its models, None if everything follows. `restore(kept, placement,
-    annotation)` computes all fields from this part again, equal to the last bit; other labels' fields are available as
-    attributes of the annotation.
-
-    A label that is `on_request` is computed only where a recipe's `annotations` name it.
-    """
-
-    fields: tuple[InstanceOf[Field], ...]
-    compute: Callable[[LabelContext, int], Mapping[str, Any]] = derived
-    restore: Callable[[Any, Placement, ObjectAnnotation], Mapping[str, Any]]
-    keep: Callable[[ObjectAnnotation], Any] = no_record
-    on_request: bool = False
+    fields: tuple[InstanceOf[Field], ...] = described(description="its fields, attributes of objects")
+    compute: Callable[[LabelContext, int], Mapping[str, Any]] = described(
+        default=derived, description="`compute(context, i)`: the fields of the object with id i + 1; without, `restore` does"
+    )
+    keep: Callable[[ObjectAnnotation], Any] = described(
+        default=no_record,
+        description="`keep(object)`: JSON of the part that does not follow from the shot and its models; None: all follows",
+    )
+    restore: Callable[[Any, Placement, ObjectAnnotation], Mapping[str, Any]] = described(
+        description="`restore(kept, placement, object)`: all fields from this part, equal to the last bit; the object has the "
+        "fields of other labels"
+    )
+    on_request: bool = described(default=False, description="whether it is computed only if a recipe's `annotations` name it")
 
     @property
     def follows(self) -> bool:
-        """Return whether it follows from what every data set has: it is there whether it was asked for or not."""
+        """Return whether it follows from the content of every data set, requested or not."""
         return self.keep is no_record and self.options is None and not self.needs
 
     def is_in(self, sample: Sample) -> bool:
@@ -232,13 +236,12 @@ class ObjectLabel(LabelSpec):
 
 
 class SampleLabel(LabelSpec):
-    """A label of a whole picture, computed where a recipe's `annotations` name it.
+    """A label of whole pictures, computed if a recipe's `annotations` name it."""
 
-    `compute(context, objects)` gives its fields. The store keeps them as they are.
-    """
-
-    fields: tuple[InstanceOf[Field], ...]
-    compute: Callable[[LabelContext, Sequence[ObjectAnnotation]], Mapping[str, Any]]
+    fields: tuple[InstanceOf[Field], ...] = described(description="its fields, attributes of samples, stored as they are")
+    compute: Callable[[LabelContext, Sequence[ObjectAnnotation]], Mapping[str, Any]] = described(
+        description="`compute(context, objects)`: the fields"
+    )
 
 
 def rendered(sample: Sample) -> list[ObjectAnnotation]:
