@@ -169,7 +169,7 @@ def _covered(report: Report, dataset: Dataset, chosen: Chosen, read: int) -> Rep
         (len(chosen.computed), total, "frames with labels computed again"),
     ]
     coverage.append((shots, len(dataset.rows), "shots composed again"))
-    coverage = [one for one in coverage if 0 < one[0] < one[1]]
+    coverage = [pair for pair in coverage if 0 < pair[0] < pair[1]]
     if set(PASSES) & set(dataset.plan.channels):
         coverage.append((checked.get("repaint", 0), total, "frames painted again"))
     idle = dict.fromkeys((name for name, count in checked.items() if not count), "no frame has it")

@@ -93,7 +93,7 @@ def formats(json_: AsJson = False) -> None:
 
     found = listed()
     if json_:
-        print_json([one.__dict__ for one in found])
+        print_json([format_.__dict__ for format_ in found])
     else:
         print_formats(found)
 
@@ -104,7 +104,7 @@ def plugins(json_: AsJson = False) -> None:
 
     found = overview()
     if json_:
-        print_json([one.__dict__ for one in found])
+        print_json([plugin.__dict__ for plugin in found])
     else:
         print_plugins(found)
 

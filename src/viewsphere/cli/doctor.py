@@ -85,8 +85,8 @@ def _set_up_blender() -> None:
     from viewsphere.blender.environment import home, interpreter_of, make_environment
     from viewsphere.blender.interpreter import probe
 
-    made = interpreter_of(home())
-    if made.is_file() and probe(made).problem is None:
+    interpreter = interpreter_of(home())
+    if interpreter.is_file() and probe(interpreter).problem is None:
         say(f"{home()} has a Blender that works", err=True)
         return
     make_environment(lambda line: say(line, err=True))

@@ -122,7 +122,7 @@ def convert(
     crew = cores() if workers is None else workers
     try:
         with ProgressBar(quiet=json_) as bar:
-            made = write_formats(
+            summary = write_formats(
                 kind,
                 source,
                 with_options(names, format_option),
@@ -135,11 +135,11 @@ def convert(
         say("stopped; nothing was written", err=True)
         raise typer.Exit(130) from None
     if json_:
-        told = {"left_out": list(made.left_out), "notes": list(made.notes)}
-        print_json({"formats": list(names), "frames": made.frames, **told})
+        report = {"left_out": list(summary.left_out), "notes": list(summary.notes)}
+        print_json({"formats": list(names), "frames": summary.frames, **report})
         return
-    _tell_left_out(made.left_out)
-    for note in made.notes:
+    _tell_left_out(summary.left_out)
+    for note in summary.notes:
         say(note)
     for name in dict.fromkeys(names):
         say(f"wrote {target / name}")

@@ -89,11 +89,11 @@ def _new_again(format_: str, source: Path, folder: Path | None) -> None:
     from viewsphere.run.reproduce import make_again
 
     _compile_kernels()
-    made = make_again(format_, source, folder or Path(f"{source.resolve().stem}-again"))
-    for note in made.notes:
+    recipe = make_again(format_, source, folder or Path(f"{source.resolve().stem}-again"))
+    for note in recipe.notes:
         say(f"note: {note}", err=True)
-    what = quantity(made.models, "model") if made.models else "a stand-in model, as the data set has none"
-    say(f"wrote {made.recipe}: {quantity(made.shots, 'shot')}, {what}; next: viewsphere preview {made.recipe}")
+    what = quantity(recipe.models, "model") if recipe.models else "a stand-in model, as the data set has none"
+    say(f"wrote {recipe.recipe}: {quantity(recipe.shots, 'shot')}, {what}; next: viewsphere preview {recipe.recipe}")
 
 
 def _new_start(folder: Path, kind: str) -> None:
@@ -245,7 +245,7 @@ def plan(
         print_plan(planned)
         for note in planned.notes:
             say(f"note: {note}")
-    said = _model_warnings(planned, json_) if models else ()
+    model_warnings = _model_warnings(planned, json_) if models else ()
     cost = _estimate(loaded, workers) if estimate else None
     counts = {
         "name": planned.recipe.name,
@@ -260,7 +260,7 @@ def plan(
                 **counts,
                 "splits": dict(planned.split_counts),
                 "shots": planned.shot_count,
-                "warnings": [*planned.warnings, *said],
+                "warnings": [*planned.warnings, *model_warnings],
                 "notes": list(planned.notes),
                 **({"estimate": asdict(cost)} if cost else {}),
             }
@@ -335,9 +335,9 @@ def _write_video(source: Path, file: Path, draw: list[str], sequence: str | None
         def tell(done: int, total: int) -> None:
             bar.show(Progress("video", done, total))
 
-        made = write_video(Dataset(source), file, draw, sequence, tell)
-    many = f"{quantity(made.sequences, 'sequence')}, {quantity(made.pictures, 'picture')}"
-    say(f"wrote {file} ({many}, {made.seconds:g} s)")
+        video = write_video(Dataset(source), file, draw, sequence, tell)
+    many = f"{quantity(video.sequences, 'sequence')}, {quantity(video.pictures, 'picture')}"
+    say(f"wrote {file} ({many}, {video.seconds:g} s)")
 
 
 DataSetFolder = Annotated[
@@ -426,10 +426,10 @@ def _model_warnings(planned: Plan, quiet: bool) -> tuple[str, ...]:
     from viewsphere.run.shots.models import check_models
 
     with ProgressBar(quiet) as bar:
-        said = check_models(planned, bar.show)
-    for line in () if quiet else said:
+        warnings = check_models(planned, bar.show)
+    for line in () if quiet else warnings:
         say(f"warning: {line}", err=True)
-    return said
+    return warnings
 
 
 def _kept(output: Path) -> str:

@@ -148,8 +148,8 @@ def _print_warnings(warnings: Warnings) -> None:
 def _shared(what: str, warnings: Mapping[str, Sequence[str]]) -> Iterator[str]:
     """Each warning once, behind who it is about."""
     keys_of: dict[str, list[str]] = {}
-    for key, said in warnings.items():
-        for warning in said:
+    for key, messages in warnings.items():
+        for warning in messages:
             keys_of.setdefault(warning, []).append(key)
     for warning, (key, *others) in keys_of.items():
         more = f" and {len(others):,} more" if others else ""
@@ -173,11 +173,11 @@ def print_summary(summary: Summary, as_json: bool) -> None:
 
 def print_formats(found: Sequence[Listed]) -> None:
     """Print a paragraph for each format."""
-    for one in found:
-        does = " and ".join(word for word, can in (("written", one.writes), ("imported", one.reads)) if can)
-        say(f"{one.name} ({does}): {one.summary}")
-        options = tuple(f"{one.name}.{name}" for name in one.options)
-        parts = (("holds", one.holds), ("needs", one.needs), ("read by", one.read_by), ("options", options))
+    for format_ in found:
+        does = " and ".join(word for word, can in (("written", format_.writes), ("imported", format_.reads)) if can)
+        say(f"{format_.name} ({does}): {format_.summary}")
+        options = tuple(f"{format_.name}.{name}" for name in format_.options)
+        parts = (("holds", format_.holds), ("needs", format_.needs), ("read by", format_.read_by), ("options", options))
         for what, names in parts:
             if names:
                 say(f"    {what}: {', '.join(names)}")
@@ -185,16 +185,16 @@ def print_formats(found: Sequence[Listed]) -> None:
 
 def print_plugins(found: Sequence[Installed]) -> None:
     """Print the plug-ins of each kind and distribution in a paragraph, and those that cannot be loaded, a line each."""
-    for kind in dict.fromkeys(one.kind for one in found):
+    for kind in dict.fromkeys(plugin.kind for plugin in found):
         say(f"{kind}:")
-        working = [one for one in found if one.kind == kind and one.error is None]
-        for distribution in dict.fromkeys(one.distribution for one in working):
-            listed = ", ".join(one.name for one in working if one.distribution == distribution)
+        working = [plugin for plugin in found if plugin.kind == kind and plugin.error is None]
+        for distribution in dict.fromkeys(plugin.distribution for plugin in working):
+            listed = ", ".join(plugin.name for plugin in working if plugin.distribution == distribution)
             say(f"    {distribution}: {listed}")
-        for one in found:
-            if one.kind == kind and one.error is not None:
-                say(f"    {one.distribution}: {one.name} cannot be loaded:")
-                for line in one.error.splitlines():
+        for plugin in found:
+            if plugin.kind == kind and plugin.error is not None:
+                say(f"    {plugin.distribution}: {plugin.name} cannot be loaded:")
+                for line in plugin.error.splitlines():
                     say(f"        {line}")
 
 
@@ -214,8 +214,8 @@ def print_status(found: Status) -> None:
         gone = "" if run.state == "running" or found.complete else ": run it again"
         heard = f"heard of {_duration(run.seconds_ago)} ago"
         say(f"{run.state}: {_who(run.told)}: {what}{rate}, {heard}{shots}{gone}")
-    for told in found.failed:
-        say(f"failed: {_who(told)}: {told.error}")
+    for failure in found.failed:
+        say(f"failed: {_who(failure)}: {failure.error}")
     if found.seconds_left is not None:
         say(f"{_rate(1, 1 / found.rate)}, about {_duration(found.seconds_left)} left")
 
@@ -318,8 +318,8 @@ class ProgressBar:
             bar = self._bars[progress.phase]
             elapsed = self._rich.tasks[bar].elapsed or 0.0
             seen = progress.done + progress.under_way
-            made = seen - progress.resumed
-            rate = _rate(made, elapsed) if progress.phase == "frames" and made and elapsed else ""
+            rendered = seen - progress.resumed
+            rate = _rate(rendered, elapsed) if progress.phase == "frames" and rendered and elapsed else ""
             if progress.nodes is not None:
                 rate = ", ".join(filter(None, (rate, f"{progress.nodes} node{'' if progress.nodes == 1 else 's'}")))
             self._rich.update(bar, completed=seen, total=progress.total, rate=rate)

@@ -147,8 +147,8 @@ class Shot(Frozen):
         return viewpoint_of(pose, now.focus, now.viewpoint.index, self.category_deg, now.viewpoint.time).rounded()
 
     def _lens(self, instant: int, sensor: int) -> Intrinsics:
-        own, zoomed = self.rig.sensors[sensor].intrinsics, self.instants[instant].intrinsics
-        return zoomed if zoomed is not None and own == self.rig.sensors[0].intrinsics else own
+        lens, zoomed = self.rig.sensors[sensor].intrinsics, self.instants[instant].intrinsics
+        return zoomed if zoomed is not None and lens == self.rig.sensors[0].intrinsics else lens
 
     def kept(self, sensor: int) -> tuple[str, ...]:
         """The channels that a sensor keeps, counted from 0 in the rig."""

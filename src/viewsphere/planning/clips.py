@@ -47,8 +47,8 @@ def with_clips(
 def playing(recipe: Recipe, number: int) -> tuple[tuple[str, Motions | None], ...]:
     """The motions that models of an entry may have, with their fields: their own, and those of distractors."""
     company = recipe.scene.company
-    own = (f"models[{number}].motion", recipe.models[number].motion)
-    return (own,) if company is None else (own, ("scene.company.motion", company.motion))
+    motions = (f"models[{number}].motion", recipe.models[number].motion)
+    return (motions,) if company is None else (motions, ("scene.company.motion", company.motion))
 
 
 def shown_steps(recipe: Recipe, number: int, spec: ModelSpec, line: Timeline) -> tuple[TimeStep, ...]:

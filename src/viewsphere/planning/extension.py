@@ -88,8 +88,8 @@ class DatasetPart(Sendable):
         those that its shots need, and its shard of all, so that shards together have every model.
         """
         kept = enumerate(self.plan.kept_specs)
-        own = (spec for i, spec in kept if self.shard.is_all or self.shard.has(i) or spec.key in self._needed)
-        return tuple((self._numbered(spec), self.plan.steps_of(spec)) for spec in own)
+        specs = (spec for i, spec in kept if self.shard.is_all or self.shard.has(i) or spec.key in self._needed)
+        return tuple((self._numbered(spec), self.plan.steps_of(spec)) for spec in specs)
 
     @cached_property
     def _needed(self) -> frozenset[str]:
@@ -137,13 +137,13 @@ class DatasetPart(Sendable):
     def shot(self, row: Row, box_of: BoxOf, redraws: Sequence[int] = (), redraw: int = 0) -> Shot:
         """The shot of a row; `box_of`, `redraws`, `redraw` and errors as for `Plan.shot`."""
         poses = tuple(numbers(row.positions))
-        own = [self._of_recipe(pose) for pose in poses]
-        made = self.plan.take(row.subject, own, box_of, row.key, row.first, redraws, redraw)
+        poses_of_recipe = [self._of_recipe(pose) for pose in poses]
+        taken_shot = self.plan.take(row.subject, poses_of_recipe, box_of, row.key, row.first, redraws, redraw)
         number_of = iter(poses)
-        instants = (_at_pose(now, next(number_of)) if now.recorded else now for now in made.instants)
-        return made.model_copy(
+        instants = (_at_pose(now, next(number_of)) if now.recorded else now for now in taken_shot.instants)
+        return taken_shot.model_copy(
             update={
-                "things": tuple(thing.model_copy(update={"model": self._numbered(thing.model)}) for thing in made.things),
+                "things": tuple(thing.model_copy(update={"model": self._numbered(thing.model)}) for thing in taken_shot.things),
                 "instants": tuple(instants),
                 "channels": self._channels(row.first),
             }

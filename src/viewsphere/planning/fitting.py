@@ -43,11 +43,11 @@ Settings = dict[str, str]
 
 def check_fit(planned: Plan, there: PlanRecord) -> None:
     """Raises RecipeError where the recipe's pictures, splits or models would not fit those that are there."""
-    own = settings(planned)
+    settings_of_plan = settings(planned)
     for part in there.parts:
         _check_sampler(planned, part)
-        _check_settings(planned, own, part)
-        _check_movements(planned, own, part)
+        _check_settings(planned, settings_of_plan, part)
+        _check_movements(planned, settings_of_plan, part)
         _check_splits(planned, part)
     _check_models(planned, there)
 

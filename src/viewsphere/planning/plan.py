@@ -207,16 +207,16 @@ class Plan(Shown, SamplingContext):
         """The same plan for a data set that has some of its models, scenes and sequences in these splits already, and these
         numbers for the plan's poses.
         """
-        own = self if not isinstance(self.pose_list, SequencePoses) else self._numbering(self.pose_list.instants, poses)
-        kept = {key: name for key, name in splits.items() if key in own.dealt_splits}
-        return _composed(own.changed(kept_splits=kept)) if kept else own
+        numbered = self if not isinstance(self.pose_list, SequencePoses) else self._numbering(self.pose_list.instants, poses)
+        kept = {key: name for key, name in splits.items() if key in numbered.dealt_splits}
+        return _composed(numbered.changed(kept_splits=kept)) if kept else numbered
 
     def changed(self, **fields: Any) -> Self:
         """The same plan with other fields, of which its blocks do not follow: they are not counted out again."""
-        made = replace(self, **fields)
+        changed_plan = replace(self, **fields)
         if "blocks" in vars(self):
-            vars(made)["blocks"] = self.blocks
-        return made
+            vars(changed_plan)["blocks"] = self.blocks
+        return changed_plan
 
     def _numbering(self, instants: int, poses: Sequence[int]) -> Plan:
         """The same plan, whose sequences are numbered as those of a data set, where it has these numbers for their poses."""
@@ -249,10 +249,10 @@ class Plan(Shown, SamplingContext):
 
     def with_variation(self, recipe: Recipe, variation: str) -> Self:
         """Return the plan of one variation; the two share all values that do not depend on the scene."""
-        made = replace(self, recipe=recipe, original=self, variation=variation)
+        varied = replace(self, recipe=recipe, original=self, variation=variation)
         known = {field.name for field in fields(self)} | {"scenes", "taken", "blocks", "rows", "_under"}
-        vars(made).update({name: value for name, value in vars(self).items() if name not in known})
-        return made
+        vars(varied).update({name: value for name, value in vars(self).items() if name not in known})
+        return varied
 
     @cached_property
     def rows(self) -> Index:
@@ -305,13 +305,13 @@ class Plan(Shown, SamplingContext):
         problems: list[RecipeError] = []
         for number in range(max(redraw, self._fits.get(names, 0)), max(redraw + 1, self.draws)):
             try:
-                made = make(number)
+                fitting = make(number)
             except RecipeError as error:
                 problems.append(error)
                 continue
             if names and redraw == 0 and number:
                 self._fits[names] = number
-            return made
+            return fitting
         raise problems[0]
 
     @cached_property
@@ -359,7 +359,7 @@ class Plan(Shown, SamplingContext):
             if self.recipe.empty is None:
                 return shot
             shares = (share(self.recipe.seed, "empty", subject, self.pose_list.name(pose)) for pose in poses)
-            return _emptied(shot, [one < self.recipe.empty for one in shares], box_of)
+            return _emptied(shot, [number < self.recipe.empty for number in shares], box_of)
 
     def cast(self, subject: str, pose: int | None = None) -> tuple[ModelSpec, ...]:
         """The recipe's models in a frame of a subject, from a pose (its number); without one, those in all of its frames."""
@@ -413,11 +413,11 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
     with recipe.located():
         check_names(recipe)
         check_blend(recipe)
-        for one in recipe.conditions.values():
-            check_catcher(one)
-            check_shutter(one)
-            check_photo(one)
-            check_night(one)
+        for condition in recipe.conditions.values():
+            check_catcher(condition)
+            check_shutter(condition)
+            check_photo(condition)
+            check_night(condition)
         check_splits(recipe)
         check_redraws(recipe)
         check_motions(recipe)
@@ -466,8 +466,8 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
 def _credits(planned: Plan) -> dict[str, Credit]:
     """The credits that are known of the models that a plan keeps."""
     entries = zip(planned.model_specs, planned.entries, strict=True)
-    said = {spec.key: planned.recipe.models[number].credit for spec, number in entries}
-    return credits_of(planned.kept_specs, {key: credit for key, credit in said.items() if credit is not None})
+    credits = {spec.key: planned.recipe.models[number].credit for spec, number in entries}
+    return credits_of(planned.kept_specs, {key: credit for key, credit in credits.items() if credit is not None})
 
 
 def _composed(planned: Plan) -> Plan:

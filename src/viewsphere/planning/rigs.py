@@ -122,8 +122,8 @@ def _channels(recipe: Recipe, name: str, entry: SensorEntry) -> tuple[str, ...] 
             raise RecipeError(f"rig.sensors.{name}.channels[{i}]: {wrong}: leave it out")
     if entry.channels is None:
         return None
-    own = {"rgba" if channel == "rgb" and "rgba" in recipe.channels else channel for channel in entry.channels}
-    return tuple(channel for channel in recipe.channels if channel in own)
+    channels_of_sensor = {"rgba" if channel == "rgb" and "rgba" in recipe.channels else channel for channel in entry.channels}
+    return tuple(channel for channel in recipe.channels if channel in channels_of_sensor)
 
 
 def _not_measured(channel: str, entry: SensorEntry) -> str | None:
@@ -194,7 +194,7 @@ def _around(entry: SurroundRig) -> Iterator[tuple[str, Float]]:
 def _calibrated(recipe: Recipe, entry: RigFile, lens: Intrinsics) -> Rig:
     paths = [recipe.folder / Path(path).expanduser() for path in entry.path]
     calibrated = read_rig(paths, entry.format, entry.rectified)
-    return _mounted({one.name: (_sized(one, lens), one.rig_from_sensor) for one in calibrated})
+    return _mounted({sensor.name: (_sized(sensor, lens), sensor.rig_from_sensor) for sensor in calibrated})
 
 
 def _sized(found: Calibrated, lens: Intrinsics) -> Intrinsics:

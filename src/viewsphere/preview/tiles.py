@@ -48,8 +48,8 @@ def contact_sheet(
 
 def _strip(samples: Sequence[Sample], film: Film, draw: Sequence[str], width: int, before: Before) -> list[Tile]:
     """One sequence; pictures beside have one meaning of colours in all of it."""
-    own = [samples[place] for places in film.places for place in places]
-    within, most = extents(own, draw), max(120, width + 80 - 80 * len(film.sensors))
+    film_samples = [samples[place] for places in film.places for place in places]
+    within, most = extents(film_samples, draw), max(120, width + 80 - 80 * len(film.sensors))
     return [
         (draw_instant([samples[place] for place in places], draw, most, before, within), film_caption(film, i))
         for i, places in enumerate(film.places)

@@ -191,9 +191,9 @@ class _Reader(NamedTuple):
             raise ValueError(f"expected choice; found {raw.kind}, which is for numbers")
         if raw.kind in ("normal", "log_uniform") and self.of == "whole number":
             raise ValueError(f"expected uniform or choice; found {raw.kind}, which is not for whole numbers")
-        made = raw.model_copy(update=self._replace(depth=self.depth + 1)._arguments(raw))
-        made._limits = self.limits  # pyright: ignore[reportPrivateUsage]
-        return made
+        distribution = raw.model_copy(update=self._replace(depth=self.depth + 1)._arguments(raw))
+        distribution._limits = self.limits  # pyright: ignore[reportPrivateUsage]
+        return distribution
 
     def _arguments(self, raw: Distribution) -> dict[str, Any]:
         if raw.normal is not None:

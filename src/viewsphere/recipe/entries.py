@@ -55,8 +55,8 @@ def concrete(entry: Frozen, **others: Any) -> Any:
     Fields that are None get the defaults of the scene's class.
     """
     part = cast("Entry", entry).part
-    said = {name: getattr(entry, name, None) for name in part.model_fields} | others
-    return part(**{name: value for name, value in said.items() if value is not None})
+    values = {name: getattr(entry, name, None) for name in part.model_fields} | others
+    return part(**{name: value for name, value in values.items() if value is not None})
 
 
 def pictures_of(part: type[Frozen]) -> tuple[str, ...]:

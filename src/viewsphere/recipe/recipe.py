@@ -346,7 +346,7 @@ class Recipe(Shown, Frozen):
     @property
     def is_new_each_frame(self) -> bool:
         """True if data shared by all frames of one shot is drawn for every frame."""
-        return any(one.scene.is_new_each_frame for one in self.conditions.values())
+        return any(recipe.scene.is_new_each_frame for recipe in self.conditions.values())
 
     @property
     def lasting_seed(self) -> int:

@@ -94,9 +94,9 @@ def _read(value: Any, handler: ValidatorFunctionWrapHandler) -> Variations:
         if not isinstance(paired, bool):
             with error_at(PAIRED):
                 raise ValueError(f"expected true or false, as no variation can have this name; found {paired!r:.40}")
-    made = Variations(handler(value))
-    made.paired = paired
-    return made
+    variations = Variations(handler(value))
+    variations.paired = paired
+    return variations
 
 
 def _written(value: Variations, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -105,8 +105,8 @@ def _written(value: Variations, handler: SerializerFunctionWrapHandler) -> dict[
 
 def varied(scene: SceneEntry, change: SceneEntry) -> SceneEntry:
     """A scene whose fields are those of a variation where it has them. Raises ValueError where they do not fit the others."""
-    said: dict[str, Any] = {name: getattr(scene, name) for name in scene.model_fields_set}
-    return SceneEntry.model_validate(said | {name: getattr(change, name) for name in change.model_fields_set})
+    fields: dict[str, Any] = {name: getattr(scene, name) for name in scene.model_fields_set}
+    return SceneEntry.model_validate(fields | {name: getattr(change, name) for name in change.model_fields_set})
 
 
 def check_alike(scenes: dict[str, SceneEntry]) -> None:

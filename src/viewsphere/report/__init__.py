@@ -99,11 +99,11 @@ def write_report(
 
 def _positions(films: Sequence[Film], table: FrameTable, frames: int) -> list[int]:
     """Positions of the shown frames, ascending: those of the films that are played, and others where these leave room."""
-    own = {place for film in films for places in film.places for place in places}
-    if not own:
+    places_of_films = {place for film in films for places in film.places for place in places}
+    if not places_of_films:
         return chosen_frames(table, frames)
-    stills = [i for i in chosen_frames(table, frames) if i not in own] if len(own) < frames else []
-    return sorted(own | set(stills[: frames - len(own)]))
+    stills = [i for i in chosen_frames(table, frames) if i not in places_of_films] if len(places_of_films) < frames else []
+    return sorted(places_of_films | set(stills[: frames - len(places_of_films)]))
 
 
 def report_data(
@@ -157,10 +157,10 @@ def _cameras(info: ModelInfo, table: FrameTable) -> dict[str, Any]:
     objects = table.objects
     if info.key not in table.models:
         return {"views": 0, "cameras": [], "center": numbers(info.box3d_object.mean(axis=0))}
-    own = objects[objects["model"] == table.models.index(info.key)]
-    picks = own[list(spread(len(own), CAMERAS))]
+    objects_of_model = objects[objects["model"] == table.models.index(info.key)]
+    picks = objects_of_model[list(spread(len(objects_of_model), CAMERAS))]
     cameras = [numbers(row) for row in zip(picks["azimuth"], picks["elevation"], picks["distance"], strict=True)]
-    return {"views": len(own), "cameras": cameras, "center": numbers(info.box3d_object.mean(axis=0))}
+    return {"views": len(objects_of_model), "cameras": cameras, "center": numbers(info.box3d_object.mean(axis=0))}
 
 
 def _unheard(phase: str, done: int, total: int) -> None:

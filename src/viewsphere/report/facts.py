@@ -62,7 +62,7 @@ def timing(found: list[tuple[float, int]]) -> Timing | None:
 def facts(dataset: Dataset, times: list[tuple[float, int]]) -> dict[str, Any]:
     """Recipe (YAML), plan, versions, timing (from what `finished` gives) and the folder's name, as plain data."""
     plan = dataset.plan
-    made = timing(times)
+    rendering = timing(times)
     return {
         "name": dataset.name,
         "folder": dataset.root.resolve().name,
@@ -77,7 +77,7 @@ def facts(dataset: Dataset, times: list[tuple[float, int]]) -> dict[str, Any]:
         "leftOut": dataset.store.skipped(),
         "warnings": {info.key: list(info.warnings) for info in dataset.models if info.warnings},
         "exports": sorted(p.name for p in dataset.root.iterdir() if p.is_dir() and p.name != "store"),
-        "timing": None if made is None else made.__dict__,
+        "timing": None if rendering is None else rendering.__dict__,
     }
 
 

@@ -34,7 +34,7 @@ def _changed(value: Any, change: Callable[[str], str]) -> Any:
     if isinstance(value, str):
         return change(value)
     if isinstance(value, Mapping):
-        return {key: _changed(one, change) for key, one in cast(Mapping[str, Any], value).items()}
+        return {key: _changed(item, change) for key, item in cast(Mapping[str, Any], value).items()}
     if isinstance(value, (list, tuple)):
-        return [_changed(one, change) for one in cast(list[Any], value)]
+        return [_changed(item, change) for item in cast(list[Any], value)]
     return value

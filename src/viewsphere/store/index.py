@@ -122,10 +122,10 @@ class Index(Sequence[Row]):
 
     def row_of(self, subject: str, place: int) -> Row:
         """One of the rows of a subject, by its place among them; raises IndexError past the end."""
-        for number, own in self._places.get(subject, ()):
-            chunks = self._own(number, own)
+        for number, stretch in self._places.get(subject, ()):
+            chunks = self._own(number, stretch)
             if place < len(chunks):
-                return self._row(number, own, chunks[place])
+                return self._row(number, stretch, chunks[place])
             place -= len(chunks)
         raise IndexError(f"expected a shot of {subject}, found no {place} more")
 

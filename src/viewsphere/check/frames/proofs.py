@@ -197,7 +197,7 @@ def _dealt_split(dataset: Dataset, row: Row, sequence: str) -> tuple[str, str | 
     A part keeps the splits of earlier ones; a merged part has its own alone.
     """
     part = dataset.plan.parts[row.part]
-    deals = [one.dealt_splits for one in ((part,) if part.merged else dataset.plan.parts[: row.part + 1])]
+    deals = [part_of_plan.dealt_splits for part_of_plan in ((part,) if part.merged else dataset.plan.parts[: row.part + 1])]
     names = part.world(sequence), part.world(row.subject)
     found = ((name, deal[name]) for name in names for deal in deals if name in deal)
     return next(found, (names[1], None))
@@ -219,10 +219,10 @@ def _contradictions(sample: Sample, shot: Shot, place: int) -> Iterator[str]:
     wanted, found = (pose and _unnumbered(pose) for pose in (shot.viewpoint(instant, sensor), sample.known_pose))
     if wanted != found:
         yield f"expected the pose {wanted} of the shot, found {found}"
-    said = (sample.split, sample.sequence.partition(MERGED)[0], sample.sensor, sample.instant, sample.time)
+    stored = (sample.split, sample.sequence.partition(MERGED)[0], sample.sensor, sample.instant, sample.time)
     known = (now.split, shot.sequence, shot.rig.sensors[sensor].name, now.index, now.seconds)
-    if said != known:
-        yield f"expected split, sequence, sensor, instant and time {known} of the shot, found {said}"
+    if stored != known:
+        yield f"expected split, sequence, sensor, instant and time {known} of the shot, found {stored}"
     poses = {thing.id: pose for thing in shot.objects if (pose := thing.motion.at(instant)) is not None}
     if [o.id for o in sample.objects] != list(poses):
         yield f"expected the objects {list(poses)} of the shot, found {[o.id for o in sample.objects]}"

@@ -209,9 +209,9 @@ def _target(corners: Float, single: NDArray[np.bool_], chosen: NDArray[np.bool_]
     if not chosen.any():
         return None
     scene = EmbreeScene(robust=True)
-    own = corners[chosen]
-    TriangleMesh(scene, own.astype(np.float32))
-    a, b, c = (own[:, i] for i in range(3))
+    target_corners = corners[chosen]
+    TriangleMesh(scene, target_corners.astype(np.float32))
+    a, b, c = (target_corners[:, i] for i in range(3))
     return _Target(scene, np.where(single[chosen, None], np.cross(b - a, c - a), 0.0))
 
 

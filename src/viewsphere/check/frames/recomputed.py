@@ -154,7 +154,7 @@ class Recomputed:
         record = NOTHING
         for planned in [*map(self.replanned.plan, range(number)), *([last] if last else [])]:
             record = extend(planned, record).record
-        wanted, found = (parsed(one.to_json()) for one in (record, self._record))
+        wanted, found = (parsed(plan_record.to_json()) for plan_record in (record, self._record))
         if len(record.parts) < len(self._record.parts):
             wanted, found = wanted["parts"][-1], found["parts"][number]
         yield from differences(wanted, found)
@@ -173,7 +173,7 @@ def _reads_tables(planned: Plan) -> bool:
     """Return whether a plan follows from what files say, such as tables of poses and calibrations."""
     path = getattr(planned.recipe.viewpoints, "path", None)
     read = (path, planned.blend, planned.own_rig, planned.tracks, script_digest(planned.recipe))
-    return any(one is not None for one in read)
+    return any(table is not None for table in read)
 
 
 def _inside(text: str, record: PlanRecord) -> Iterator[str]:
@@ -192,9 +192,9 @@ def _inside(text: str, record: PlanRecord) -> Iterator[str]:
         follows |= {name: getattr(part, name) for name in ("version", "digest", "name", "recipe", "channels")}
     held = vars(record) | {f"parts[{i}].first": part.first for i, part in enumerate(parts)}
     for name, value in follows.items():
-        one, other = parsed(json.dumps(value)), parsed(json.dumps(held[name]))
+        stored, other = parsed(json.dumps(value)), parsed(json.dumps(held[name]))
         yield from in_words(
-            differences(one, other, name), "plan.json", "the last part" if name in vars(record) else "the order"
+            differences(stored, other, name), "plan.json", "the last part" if name in vars(record) else "the order"
         )
 
 

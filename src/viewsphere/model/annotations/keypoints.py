@@ -36,9 +36,9 @@ def left_and_right(names: Iterable[str]) -> tuple[Pair, ...]:
 
 
 def _turned(side: re.Match[str]) -> str:
-    said = side[0]
-    other = _OTHER[said.lower()]
-    return other.upper() if said.isupper() else other.capitalize() if said[0].isupper() else other
+    side_name = side[0]
+    other = _OTHER[side_name.lower()]
+    return other.upper() if side_name.isupper() else other.capitalize() if side_name[0].isupper() else other
 
 
 def is_name(text: str) -> bool:
@@ -71,14 +71,14 @@ class Keypoints(Frozen):
     @model_validator(mode="after")
     def _check(self) -> Keypoints:
         for field, pairs in (("skeleton", self.skeleton), ("flips", self.flips)):
-            for one, other in pairs:
-                for name in (one, other):
+            for first, other in pairs:
+                for name in (first, other):
                     if name not in self.points:
                         raise ValueError(
                             f"expected {field} of names in points; found {shown(name)}{nearest(name, self.points)}"
                         )
-                if one == other:
-                    raise ValueError(f"expected two points in each pair of {field}; found {shown(one)} twice")
+                if first == other:
+                    raise ValueError(f"expected two points in each pair of {field}; found {shown(first)} twice")
         _once([frozenset(pair) for pair in self.skeleton], "line of skeleton", lambda pair: " - ".join(sorted(pair)))
         _once([*chain.from_iterable(self.flips)], "point of flips", lambda name: name)
         return self

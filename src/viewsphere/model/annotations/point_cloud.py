@@ -47,8 +47,8 @@ class PointCloud:
         for name, value, known in (("axes", axes, get_args(Axes)), ("surface", surface, get_args(Surface))):
             if value not in known:
                 raise UserError(f"point_cloud: {name}: {one_of(value, known)}")
-        made = _complete(sample) if surface == "complete" else _visible(sample)
-        return made.moved(sample) if axes == "world" else made
+        cloud = _complete(sample) if surface == "complete" else _visible(sample)
+        return cloud.moved(sample) if axes == "world" else cloud
 
     def moved(self, sample: Sample) -> PointCloud:
         """The same in the world's axes, of points in those of a sample's camera."""

@@ -110,9 +110,9 @@ class Symmetries(Frozen):
         turn = m[:3, :3] / scale
 
         def motion(matrix: Matrix) -> Any:
-            own = np.array(matrix)
-            rotation = transform(turn, transform(turn, own[:3, :3]).T).T
-            place = transform(m, own[:3, 3]) - transform(rotation, m[:3, 3])
+            before = np.array(matrix)
+            rotation = transform(turn, transform(turn, before[:3, :3]).T).T
+            place = transform(m, before[:3, 3]) - transform(rotation, m[:3, 3])
             return rigid(rotation, place).tolist()
 
         discrete = [motion(matrix) for matrix in self.discrete]

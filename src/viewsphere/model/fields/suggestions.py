@@ -98,22 +98,28 @@ def _singular(name: str) -> str:
 
 def _versioned(name: str, names: Iterable[str]) -> str | None:
     bare = re.sub(r"[-_ ]?v?\d+[a-z]?$", "", name.lower())
-    return next((one for one in names if bare != name.lower() and one.lower() == bare), None)
+    return next((candidate for candidate in names if bare != name.lower() and candidate.lower() == bare), None)
 
 
 def _begun(name: str, names: Iterable[str]) -> str | None:
     """The shortest name that begins with this one, or has it as one of its words; two letters often begin several."""
     lower = name.lower()
-    begun = [one for one in names if lower and (one.lower().startswith(lower) or lower in one.lower().split("_"))]
+    begun = [
+        candidate
+        for candidate in names
+        if lower and (candidate.lower().startswith(lower) or lower in candidate.lower().split("_"))
+    ]
     return min(begun, key=len, default=None) if len(lower) > 2 or len(begun) == 1 else None
 
 
 def _closest(name: str, names: Iterable[str]) -> str | None:
     lower = name.lower()
     most = next((edits for length, edits in CLOSE if len(lower.lstrip("-")) <= length), 0)
-    alike = (one for one in names if abs(len(one) - len(lower)) <= most)  # each letter more is an edit
-    longer = [one for one in alike if len(lower) > 2 or len(one) > len(lower)]  # of two letters, a changed one is half
-    near = [(edits(lower, one.lower()), one) for one in longer if not _is_opposite(lower, one.lower())]
+    alike = (candidate for candidate in names if abs(len(candidate) - len(lower)) <= most)  # each letter more is an edit
+    longer = [
+        candidate for candidate in alike if len(lower) > 2 or len(candidate) > len(lower)
+    ]  # of two letters, a changed one is half
+    near = [(edits(lower, candidate.lower()), candidate) for candidate in longer if not _is_opposite(lower, candidate.lower())]
     least = min(near, key=lambda pair: pair[0], default=(most + 1, ""))
     return least[1] if least[0] <= min(most, len(least[1]) - 1) else None
 

@@ -32,9 +32,11 @@ def read_rig(paths: Sequence[Path], kind: str = "auto", rectified: bool = False)
     else:
         from viewsphere.planning.rig_files.opencv import sensors
     calibrated = sensors(documents, rectified)
-    names = [one.name.casefold() for one in calibrated]
+    names = [sensor.name.casefold() for sensor in calibrated]
     if len(set(names)) < len(names):
-        raise RecipeError(f"{paths[0]}: expected sensors of different names; found {', '.join(one.name for one in calibrated)}")
+        raise RecipeError(
+            f"{paths[0]}: expected sensors of different names; found {', '.join(sensor.name for sensor in calibrated)}"
+        )
     return calibrated
 
 

@@ -84,7 +84,7 @@ def row(value: Any, where: str) -> list[float]:
     """A list of finite numbers."""
     if not isinstance(value, list):
         raise RecipeError(f"{where}: expected a list of numbers; found {'nothing' if value is None else repr(value)[:40]}")
-    return [number(one, where) for one in cast("Sequence[object]", value)]
+    return [number(cell, where) for cell in cast("Sequence[object]", value)]
 
 
 def size(width: Any, height: Any, where: str) -> tuple[int, int] | None:
@@ -92,6 +92,6 @@ def size(width: Any, height: Any, where: str) -> tuple[int, int] | None:
     if width is None or height is None:
         return None
     sides = number(width, where), number(height, where)
-    if min(sides) < 1 or any(one != int(one) for one in sides):
+    if min(sides) < 1 or any(side != int(side) for side in sides):
         raise RecipeError(f"{where}: expected whole numbers of pixels above 0; found {width} and {height}")
     return int(sides[0]), int(sides[1])

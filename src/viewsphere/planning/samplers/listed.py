@@ -71,7 +71,7 @@ def most_objects(recipe: Recipe) -> int:
 
 def cast(context: SamplingContext, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The models of a shot, in the order of their ids."""
-    return tuple(context.spec(one.model) for one in _shots(context)[subject].said.objects)
+    return tuple(context.spec(listed_object.model) for listed_object in _shots(context)[subject].said.objects)
 
 
 def split(context: SamplingContext, subject: str, pose: int) -> str:
@@ -95,11 +95,11 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
     view, number = context.view(context.pose_list, pose), first // len(context.rig.sensors)
     now = context.instant(subject, view, view.target, (0.0, 0.0, 0.0), split(context, subject, pose), number)
     scene = context.scene(subject, context.pose_list.name(pose))
-    things, own = context.repainted(things, subject, pose), now.intrinsics
-    if context.own_rig is not None or own is None:
+    things, lens = context.repainted(things, subject, pose), now.intrinsics
+    if context.own_rig is not None or lens is None:
         return context.finished(key, first, things, scene, [now])
-    made = context.finished(key, first, things, scene, [now.model_copy(update={"intrinsics": None})])
-    return made.model_copy(update={"rig": Rig.of(own)})
+    finished = context.finished(key, first, things, scene, [now.model_copy(update={"intrinsics": None})])
+    return finished.model_copy(update={"rig": Rig.of(lens)})
 
 
 def _things(context: SamplingContext, shot: Arranged) -> tuple[Thing, ...]:
@@ -107,13 +107,13 @@ def _things(context: SamplingContext, shot: Arranged) -> tuple[Thing, ...]:
     entry, file = _listed(context).viewpoints, _listed(context).file
     turn = world_turn(entry, file)
 
-    def thing(number: int, one: ListedObject, place: Extrinsics) -> Thing:
+    def thing(number: int, listed_object: ListedObject, place: Extrinsics) -> Thing:
         a, b, c = ((x, y, z, w) for x, y, z, w in placed(place, turn, entry)[:3].tolist())
         motion = Motion.still((a, b, c, IDENTITY[3]))
-        return Thing(id=number, model=context.spec(one.model), motion=motion, scenery=one.scenery)
+        return Thing(id=number, model=context.spec(listed_object.model), motion=motion, scenery=listed_object.scenery)
 
     pairs = zip(shot.said.objects, shot.places, strict=True)
-    return tuple(thing(number, one, place) for number, (one, place) in enumerate(pairs, 1))
+    return tuple(thing(number, listed_object, place) for number, (listed_object, place) in enumerate(pairs, 1))
 
 
 def _listed(context: SamplingContext) -> ListedPoses:

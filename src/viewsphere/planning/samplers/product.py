@@ -108,9 +108,9 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
     scene = _scene(context, subject, context.pose_list.name(poses[0]), run).model_copy(
         update=_floor(context, spec, things, box_of)
     )
-    own = context.pose_list.for_subject(subject)
+    poses_of_subject = context.pose_list.for_subject(subject)
     views = (
-        (i, context.view(own, pose), split(context, subject, pose))
+        (i, context.view(poses_of_subject, pose), split(context, subject, pose))
         for i, pose in enumerate(poses, first // len(context.rig.sensors))
     )
     instants = [context.instant(subject, view, target, focus, part, i) for i, view, part in views]

@@ -133,18 +133,20 @@ def shot(context: SamplingContext, subject: str, poses: Sequence[int], box_of: B
     """Some instants of a sequence, and those that their labels need."""
     start = poses[0] - poses[0] % time_of(context).count
     taken = {pose - start for pose in poses}
-    own = sequence_state(context, subject, start, box_of)
+    state = sequence_state(context, subject, start, box_of)
     numbers = sorted(taken | _needed(context, taken))
-    instants = [_instant(context, own, subject, start + i, box_of).model_copy(update={"recorded": i in taken}) for i in numbers]
+    instants = [
+        _instant(context, state, subject, start + i, box_of).model_copy(update={"recorded": i in taken}) for i in numbers
+    ]
     scene = context.scene(subject, context.scene_name(start)).model_copy(update={"floor": FLOOR})
-    made = context.finished(key, first, own.things_during(numbers), scene, instants)
+    finished = context.finished(key, first, state.things_during(numbers), scene, instants)
 
     def rig_at(instant: int) -> Matrix4:
-        return _instant(context, own, subject, start + instant, box_of).world_from_rig
+        return _instant(context, state, subject, start + instant, box_of).world_from_rig
 
-    blurred = _exposures(own, [i if i in taken else None for i in numbers], time_of(context), rig_at)
+    blurred = _exposures(state, [i if i in taken else None for i in numbers], time_of(context), rig_at)
     more = {"sequence": context.sequence(subject, start), "tracks": _tracks(context, subject, start)}
-    return made.model_copy(update=more | {"shutter": time_of(context).shutter, "exposures": blurred})
+    return finished.model_copy(update=more | {"shutter": time_of(context).shutter, "exposures": blurred})
 
 
 def _tracks(context: SamplingContext, subject: str, start: int) -> Tracks | None:

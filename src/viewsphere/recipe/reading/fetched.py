@@ -38,10 +38,10 @@ def fetched(path: str | os.PathLike[str]) -> Path:
     try:
         place.mkdir(parents=True, exist_ok=True)
         sweep(place, PREFIX)
-        with scratch_folder(place, PREFIX) as own:
-            _download(file.parent, own / "new")
+        with scratch_folder(place, PREFIX) as scratch:
+            _download(file.parent, scratch / "new")
             target = place / hashlib.sha256(str(file.parent).encode()).hexdigest()[:32]
-            _replace(target, own)
+            _replace(target, scratch)
     except FileNotFoundError as error:
         raise RecipeError(f"{file.parent}: a file disappeared while it was copied ({error}): run the command again") from None
     except OSError as error:
@@ -54,8 +54,8 @@ def _download(folder: RemotePath, copy: Path) -> None:
     more than may be copied: not all file systems know sizes.
     """
     files = folder.sizes_below()
-    made = tuple(file.removesuffix(PLAN) or "store/" for file in files if f"/{file}".endswith(f"/{PLAN}"))
-    wanted = {file: size for file, size in files.items() if not file.startswith(made)}
+    suffixes = tuple(file.removesuffix(PLAN) or "store/" for file in files if f"/{file}".endswith(f"/{PLAN}"))
+    wanted = {file: size for file, size in files.items() if not file.startswith(suffixes)}
     most = limits.MAX_FETCHED_BYTES
     fits, left = sum(wanted.values()) <= most, most
     for file in wanted if fits else ():

@@ -68,18 +68,18 @@ class Local:
 
     def others_at_work(self) -> bool:
         """As `Place` says."""
-        own = of_this_process()
-        return any(not path.name.startswith(own) for path in self._writing.iterdir())
+        this_process = of_this_process()
+        return any(not path.name.startswith(this_process) for path in self._writing.iterdir())
 
     @contextmanager
     def occupied(self) -> Generator[Path]:
         """As `Place` says."""
         with disk_errors(self.root):
-            own = ScratchDir.make(self._writing)
+            scratch = ScratchDir.make(self._writing)
         try:
-            yield own.folder
+            yield scratch.folder
         finally:
-            own.remove()
+            scratch.remove()
             with suppress(OSError):
                 self._sweep()
 
@@ -110,13 +110,13 @@ class Local:
         """As `Place` says."""
         with disk_errors(self.root):
             self._writing.mkdir(parents=True, exist_ok=True)
-            own = ScratchDir.make(self._writing)
+            scratch = ScratchDir.make(self._writing)
             try:
-                yield own.folder
+                yield scratch.folder
             except BaseException:
-                self._give_up(own)
+                self._give_up(scratch)
                 raise
-            own.remove()
+            scratch.remove()
 
     def put(self, made: Path, target: Path) -> None:
         """As `Place` says."""
@@ -205,8 +205,8 @@ class Local:
                     )
                 place.mkdir(parents=True, exist_ok=True)
                 sweep(place, prefix)
-                with scratch_folder(place, prefix) as own:
-                    folder = own / NEW
+                with scratch_folder(place, prefix) as scratch:
+                    folder = scratch / NEW
                     folder.mkdir()
                     yield folder
                     if target.exists():

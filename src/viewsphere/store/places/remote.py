@@ -66,8 +66,8 @@ class Remote:
     @contextmanager
     def scratch_folder(self) -> Generator[Path]:
         """As `Place` says."""
-        with disk_errors(self.root), temporary("aside") as own:
-            yield own
+        with disk_errors(self.root), temporary("aside") as scratch:
+            yield scratch
 
     def put(self, made: Path, target: Path) -> None:
         """As `Place` says."""
@@ -108,8 +108,8 @@ class Remote:
         """As `Place` says."""
         if self.is_foreign():
             raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another, or delete it")
-        with self.scratch_folder() as own:
-            folder = own / NEW
+        with self.scratch_folder() as scratch:
+            folder = scratch / NEW
             folder.mkdir()
             yield folder
             self.put(folder, self.root)

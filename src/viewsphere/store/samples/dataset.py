@@ -248,11 +248,11 @@ class Dataset(Shown, Sequence[Sample]):
             known = one_of(name, self.sequences) if self.sequences else "expected sequences, found still pictures only"
             raise StoreError(f"{self.root}: sequence: {known}")
         samples = [sample for key, places in self._sequences[name] for sample in self.samples_of(key, places)]
-        own = sorted((sample for sample in samples if sample.sensor == sensor), key=lambda sample: sample.instant)
-        if not own:
+        samples_of_sensor = sorted((sample for sample in samples if sample.sensor == sensor), key=lambda sample: sample.instant)
+        if not samples_of_sensor:
             sensors = tuple(dict.fromkeys(sample.sensor for sample in samples))
             raise StoreError(f"{self.root}: sensor: {one_of(sensor, sensors)}")
-        return tuple(own)
+        return tuple(samples_of_sensor)
 
     def tracks(self, sequence: str, sensor: str = CAMERA) -> PointTracks:
         """The points that a sensor followed through a sequence; raises StoreError for a sequence or a sensor that is not there,

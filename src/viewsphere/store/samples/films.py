@@ -85,9 +85,9 @@ def _in_shots(dataset: Dataset, is_shown: IsShown) -> Iterator[Seen]:
 def _in_shot(shot: Shot | None, places: Sequence[int], start: int, is_shown: IsShown) -> Iterator[Seen]:
     if shot is None or not shot.sequence:
         return
-    own = list(shot.samples)
+    samples_of_shot = list(shot.samples)
     for number, place in enumerate(places, start):
-        _, instant, sensor = own[place]
+        _, instant, sensor = samples_of_shot[place]
         if is_shown(shot.kept(sensor)):
             now = shot.instants[instant]
             yield shot.sequence, now.index, shot.rig.sensors[sensor].name, number, now.seconds

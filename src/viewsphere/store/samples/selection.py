@@ -106,7 +106,7 @@ def _stacked(sample: Sample, name: str) -> NDArray[Any] | list[Any]:
     field, values = _of_objects()[name], [getattr(o, name) for o in sample.objects]
     size = sample.height, sample.width
     if field.type is Rle:
-        return np.array([decode_rle(one.height, one.width, one.counts) for one in values], np.bool_).reshape(-1, *size)
+        return np.array([decode_rle(mask.height, mask.width, mask.counts) for mask in values], np.bool_).reshape(-1, *size)
     if field.type is ObjectView:
         return np.array([[*view.__dict__.values()] for view in values], np.float64).reshape(-1, 4)
     if not field.is_regular or field.type not in DTYPES:

@@ -52,9 +52,9 @@ class Watch:
         with os.scandir(group.path) as shots:
             for shot in shots:
                 with suppress(FileNotFoundError, NotADirectoryError):
-                    made = os.stat(f"{shot.path}/{MANIFEST}").st_mtime  # noqa: PTH116, Path takes as long again
-                    if (before := self._made.get(shot.name)) != made:
-                        self._made[shot.name] = made
-                        yield Finished(shot.name, made, before is not None)
+                    modified = os.stat(f"{shot.path}/{MANIFEST}").st_mtime  # noqa: PTH116, Path takes as long again
+                    if (before := self._made.get(shot.name)) != modified:
+                        self._made[shot.name] = modified
+                        yield Finished(shot.name, modified, before is not None)
         if is_settled:
             self._read[group.name] = changed

@@ -117,8 +117,8 @@ class Store:
         with ExitStack() as stack:
             with self.locked():
                 self.open_for(plan)
-                own = stack.enter_context(self.occupied())
-            yield own
+                occupied_folder = stack.enter_context(self.occupied())
+            yield occupied_folder
 
     def occupied(self) -> AbstractContextManager[Path]:
         """Show other runs that this one is at work, by a folder of this machine that it has aside as long as the block lasts;
@@ -162,7 +162,7 @@ class Store:
         Dead runs are included while their remains are not removed.
         """
         files = sorted((self.folder / "writing").glob(f"*/{RUN}"))
-        return tuple((told, lives(file.parent)) for file in files if (told := Heartbeat.read(file)))
+        return tuple((heartbeat_, lives(file.parent)) for file in files if (heartbeat_ := Heartbeat.read(file)))
 
     def failures(self) -> tuple[Heartbeat, ...]:
         """Return the last reports of failed runs that have not been tried again since."""
@@ -258,9 +258,9 @@ class Store:
             )
 
     def _write_atomically(self, file: Path, text: str) -> None:
-        with self.place.scratch_folder() as own:
-            (own / NEW).write_text(text, "utf-8", newline="\n")
-            self.place.put(own / NEW, file)
+        with self.place.scratch_folder() as scratch:
+            (scratch / NEW).write_text(text, "utf-8", newline="\n")
+            self.place.put(scratch / NEW, file)
 
     def shot_folder(self, key: str) -> Path:
         """Return the folder of a finished shot."""
@@ -295,8 +295,8 @@ class Store:
         If another writer finished the same target first, that one stays: both hold the same bytes. With `again` it takes the
         place of a damaged one; raises StoreError where it is not equal to what that was before, as far as that is known.
         """
-        with self.place.scratch_folder() as own:
-            folder = own / NEW
+        with self.place.scratch_folder() as scratch:
+            folder = scratch / NEW
             folder.mkdir()
             yield folder
             if not (folder / MANIFEST).is_file():
@@ -314,8 +314,8 @@ class Store:
         """
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
-        with self.place.scratch_folder() as own:
-            folder = own / NEW
+        with self.place.scratch_folder() as scratch:
+            folder = scratch / NEW
             folder.mkdir()
             yield folder
             if target.parent == self.folder / "models":
@@ -364,7 +364,7 @@ class Store:
         prefix = target.relative_to(self.root).as_posix()
         records: list[dict[str, Any]] = []
         kinds, table = kinds or Files(), channels()
-        own = {} if shot is None else {sensor.name: sensor.kept(shot.channels) for sensor in shot.rig.sensors}
+        channels_of_sensor = {} if shot is None else {sensor.name: sensor.kept(shot.channels) for sensor in shot.rig.sensors}
         with self.scratch_folder(target, again) as folder, ShotFiles(folder, kinds, painter) as put:
             for sample in samples:
                 files: dict[str, str] = {}
@@ -372,7 +372,7 @@ class Store:
                     inside = channel_path(name, sample.index, kinds)
                     put.add(inside, encode(table[name], array, kinds))
                     files[name] = f"{prefix}/{inside}"
-                short = own.get(sample.sensor) == tuple(files) and shot is not None and shot.files == kinds
+                short = channels_of_sensor.get(sample.sensor) == tuple(files) and shot is not None and shot.files == kinds
                 records.append(short_sample(sample) if short else whole_sample(replace(sample, files=files)))
             lines = (json.dumps(r, separators=(",", ":"), allow_nan=False) for r in records)
             text = "[\n" + ",\n".join(lines) + "\n]\n"

@@ -74,10 +74,10 @@ class Heartbeat:
             shown = tuple(map(str, value["working_on"]))
             begun, beat = float(value["begun"]), float(value["beat"])
             counts = {name: int(value[name]) for name in ("done", "total", "resumed", "under_way")}
-            told = Heartbeat(str(value["host"]), int(value["pid"]), (int(number), int(of)), begun=begun, beat=beat)
+            heartbeat = Heartbeat(str(value["host"]), int(value["pid"]), (int(number), int(of)), begun=begun, beat=beat)
             if not all(abs(number) < MOST for number in (begun, beat, *counts.values())):
                 return None
-            return replace(told, **counts, phase=str(value["phase"]), working_on=shown, error=str(value["error"]))
+            return replace(heartbeat, **counts, phase=str(value["phase"]), working_on=shown, error=str(value["error"]))
         except (OSError, LookupError, TypeError, ValueError, OverflowError):
             return None
 

@@ -116,8 +116,8 @@ class Manifest:
     @property
     def seals(self) -> Mapping[str, Seal]:
         """The seals of all files, with the files inside the shard instead of the shard itself."""
-        own = {path: told for path, told in self.files.items() if path != SHARD}
-        return own | {path: (size, found) for path, (_, size, found) in self.spans.items()}
+        seals_of_files = {path: seal for path, seal in self.files.items() if path != SHARD}
+        return seals_of_files | {path: (size, found) for path, (_, size, found) in self.spans.items()}
 
     def holder(self, path: str) -> str:
         """The file that holds another, both by their paths in the folder: the shard, or the file itself."""
@@ -140,9 +140,9 @@ class Manifest:
 
     def check(self, path: str, data: bytes, file: Path) -> None:
         """Raises StoreError where the bytes of a file, by its path in the folder, are not those that were written."""
-        told = self.files.get(path)
-        if told != (len(data), digest(data)):
-            raise StoreError(f"{file}: expected {said(told)}, found {said((len(data), digest(data)))}: {REPAIR}")
+        seal = self.files.get(path)
+        if seal != (len(data), digest(data)):
+            raise StoreError(f"{file}: expected {said(seal)}, found {said((len(data), digest(data)))}: {REPAIR}")
 
     def damage(self, folder: Path) -> Iterator[str]:
         """Yield the differences from the written state: files that are missing, changed, or additional."""
@@ -179,8 +179,8 @@ def refuse_another(damaged: Path, again: Path) -> None:
         known = manifest.files if any(manifest.damage(damaged)) else {}
     except StoreError:
         known = {name: seal_of(damaged / name) for name in KNOWN if _is_json(damaged / name)}
-    made = Manifest.read(again).files
-    other = [path for path, told in known.items() if made.get(path) != told]
+    files = Manifest.read(again).files
+    other = [path for path, seal in known.items() if files.get(path) != seal]
     if other:
         raise StoreError(
             f"{damaged}: expected what was made before, found another {other[0]}: the models or what is around them changed "

@@ -125,7 +125,9 @@ class ModelInfo:
         """Return the metadata at a time step, by the frame of the model's file (None: at rest); raises ValueError for another
         frame.
         """
-        step_info = self if frame is None else next((one for one in self.steps if one.step and one.step.frame == frame), None)
+        step_info = (
+            self if frame is None else next((step for step in self.steps if step.step and step.step.frame == frame), None)
+        )
         if step_info is None:
             raise ValueError(f"model {self.key}: expected time step {frame}, found none")
         return step_info
@@ -133,8 +135,8 @@ class ModelInfo:
     def moved(self, key: str, prefix: str, **changed: Any) -> ModelInfo:
         """The same model of another key, whose files lie in the folder `prefix`; `changed` are other fields of it."""
         obj, glb = (f"{prefix}/{PurePosixPath(file).name}" for file in (self.obj, self.glb))
-        keys = (step_key(key, one.step and one.step.frame) for one in self.steps)
-        steps = (replace(one.moved(own, prefix, **changed), track=key) for one, own in zip(self.steps, keys, strict=True))
+        keys = (step_key(key, step.step and step.step.frame) for step in self.steps)
+        steps = (replace(step.moved(own, prefix, **changed), track=key) for step, own in zip(self.steps, keys, strict=True))
         return replace(self, key=key, obj=obj, glb=glb, steps=tuple(steps), **changed)
 
     def to_plain(self) -> dict[str, Any]:
@@ -143,7 +145,7 @@ class ModelInfo:
         if self.step is None:
             del value["step"], value["steps"], value["track"]
         else:
-            value |= {"step": self.step.model_dump(mode="json"), "steps": [one.to_plain() for one in self.steps]}
+            value |= {"step": self.step.model_dump(mode="json"), "steps": [step.to_plain() for step in self.steps]}
         if self.credit is not None:
             value["credit"] = self.credit.model_dump(exclude_none=True)
         if not self.materials:  # of models that were exported elsewhere, or before they had names here
@@ -163,8 +165,8 @@ class ModelInfo:
     def from_plain(value: Mapping[str, Any]) -> ModelInfo:
         """The record that `to_plain` was asked of; raises LookupError, TypeError or ValueError for anything else."""
         info = typed(_adapter(ModelInfo), value)
-        for one in (info, *info.steps):
-            names([one.key, *([one.track] if one.track else [])], "the key")
+        for part in (info, *info.steps):
+            names([part.key, *([part.track] if part.track else [])], "the key")
         return info
 
 
@@ -388,7 +390,7 @@ class PlanRecord:
             "parts": [vars(part) | {"blocks": [vars(block) for block in part.blocks]} for part in self.parts],
         }
         if any(channel_labels()[name].holds_classes for name in self.channels if name in channel_labels()):
-            value["classes"] = [vars(one) for one in self.classes]
+            value["classes"] = [vars(row) for row in self.classes]
         return sealed(value)
 
     @staticmethod

@@ -66,8 +66,8 @@ def scene_cast(context: SamplingContext, subject: str) -> tuple[ModelSpec, ...]:
         return mixed(recipe.seed, models, _size(recipe, subject, context.redraw), names, entry.repeat)
     cast: list[ModelSpec] = []
     for category, count in _categories(context.root)[subject]:
-        own = tuple(spec for spec in models if spec.category == category)
-        cast += mixed(recipe.seed, own, count, names, entry.repeat)
+        specs_of_category = tuple(spec for spec in models if spec.category == category)
+        cast += mixed(recipe.seed, specs_of_category, count, names, entry.repeat)
     return tuple(sorted(cast, key=lambda spec: share(recipe.seed, "slot", subject, spec.key)))
 
 
@@ -151,14 +151,14 @@ def _laid(root: SamplingContext, redraw: int, subject: str, pose: str | None, bo
 
 def scene_things(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """The models of a scene where they stand; raises RecipeError where there is no room."""
-    made, cast = scene_laid(context, subject, pose, box_of), scene_cast(context, subject)
-    return still(cast, made.poses[: len(cast)])
+    layout, cast = scene_laid(context, subject, pose, box_of), scene_cast(context, subject)
+    return still(cast, layout.poses[: len(cast)])
 
 
 def scene_distractors(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """The models of a scene that are not labelled, where they stand."""
-    made, count = scene_laid(context, subject, pose, box_of), len(scene_cast(context, subject))
-    placed = zip(made.members[count:], made.poses[count:], strict=True)
+    layout, count = scene_laid(context, subject, pose, box_of), len(scene_cast(context, subject))
+    placed = zip(layout.members[count:], layout.poses[count:], strict=True)
     return tuple(Thing(id=0, model=spec, motion=Motion.still(at), scenery=True) for spec, at in placed)
 
 
@@ -207,7 +207,9 @@ def check_surface(recipe: Recipe) -> None:
         surfaces: dict[str, Surface] = {}
         for redraw in range(draws):
             if on not in surfaces:
-                surfaces |= {one.name: one for one in place_surfaces(recipe, place, (*names, *redraw_names(redraw)))}
+                surfaces |= {
+                    surface.name: surface for surface in place_surfaces(recipe, place, (*names, *redraw_names(redraw)))
+                }
         _named(on, tuple(surfaces.values()))
 
 
@@ -222,7 +224,7 @@ def surface(context: SamplingContext, subject: str, pose: str | None) -> Surface
 
 
 def _named(name: str, found: Sequence[Surface]) -> Surface:
-    names = {one.name: one for one in found}
+    names = {surface.name: surface for surface in found}
     if not names:
         raise RecipeError(
             f"scenes.surface: expected a scene.place that has surfaces, or {{size: [1.2, 0.8], height: 0.75}}; found {name!r}"

@@ -77,10 +77,10 @@ class SamplingContext(Sendable):
         return self if number == self.redraw else self._sharing(redraw=number)
 
     def _sharing(self, **changes: Any) -> Self:
-        made = replace(self, **changes, original=self.original or self)
+        context = replace(self, **changes, original=self.original or self)
         known = {field.name for field in fields(self)}
-        vars(made).update({name: value for name, value in vars(self).items() if name not in known})
-        return made
+        vars(context).update({name: value for name, value in vars(self).items() if name not in known})
+        return context
 
     @property
     def root(self) -> SamplingContext:
@@ -135,9 +135,9 @@ class SamplingContext(Sendable):
         if place is not None and line is not None:
             return shown_steps(self.recipe, self.entries[place], spec, line)
         timing = self.timings[self.position[spec.key]] if self.timings and spec.key in self.position else None
-        own = (step.model for step in (timing.steps if timing else ()))
+        steps = (step.model for step in (timing.steps if timing else ()))
         blend = () if self.blend is None else self.blend.steps(spec)
-        return tuple(chain((step for step in own if step is not None), blend))
+        return tuple(chain((step for step in steps if step is not None), blend))
 
     def with_company(self, key: str, pose: int | None) -> tuple[ModelSpec, ...]:
         """The model of this key and its company; without a pose only the model, where company is drawn for each frame."""

@@ -96,11 +96,11 @@ def sequence_state(context: SamplingContext, subject: str, start: int, box_of: B
         own_ways = zip(among, ways[len(targets) :], strict=True)
         moving = [_distractor_moving(context, thing, way, (*names, str(i)), lanes) for i, (thing, way) in enumerate(own_ways)]
         things, pieces = (*things, *among, *beneath), [*pieces, *moving, *[None] * len(beneath)]
-    own = [
+    target_movements = [
         target_moving(context, thing, i, names, lanes, way) for (i, thing), way in zip(enumerate(targets), ways, strict=False)
     ]
-    made = SequenceState(context.repainted(things, subject, start), (*own, *pieces), focus, None)
-    return replace(made, rig=_rig(context, made, subject, start, lanes, box_of))
+    unmoved = SequenceState(context.repainted(things, subject, start), (*target_movements, *pieces), focus, None)
+    return replace(unmoved, rig=_rig(context, unmoved, subject, start, lanes, box_of))
 
 
 def placed_targets(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
@@ -117,8 +117,8 @@ def placed_targets(context: SamplingContext, subject: str, pose: str | None, box
 def target_ways(context: SamplingContext, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Way | None, ...]:
     """Return the path to its place of each target of a sequence, then of each distractor; None for a thing without a path."""
     if context.recipe.scenes is not None:
-        made = scene_laid(context, subject, pose, box_of)
-        return tuple(way.at for way in made.ways) or (None,) * len(made.members)
+        layout = scene_laid(context, subject, pose, box_of)
+        return tuple(way.at for way in layout.ways) or (None,) * len(layout.members)
     spec = context.spec(subject)
     company = None
     if context.composition is not None:
