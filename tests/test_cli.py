@@ -142,7 +142,7 @@ def test_mistakes_are_one_line_and_status_2(tmp_path):
     assert "data set" in fails("check", tmp_path)
     assert "data set" in fails("export", tmp_path, "-f", "coco")
     assert fails("inspect", tmp_path / "gone.glb").count("\n") == 1
-    assert "zoo" in fails("inspect", "zoo:spaceship")
+    assert "spaceship" in fails("inspect", "zoo:spaceship")
     bad = small_recipe(models=[{"source": "zoo:spaceship", "category": "ship", "count": 2}])
     (tmp_path / "ship.yaml").write_text(bad.to_yaml())
     assert "spaceship" in fails("render", tmp_path / "ship.yaml", "-o", tmp_path / "out")

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from pydantic import Field, ValidationError
 
+from viewsphere import plugins
 from viewsphere.model import scene
 from viewsphere.model.annotations.procedural_material import ProceduralMaterial
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Length, Portion
 from viewsphere.model.fields.omit_none import OmitNone
 from viewsphere.model.scene import Color, Effects, Picture, Srgb
+from viewsphere.plugins.light import LightSpec
 from viewsphere.recipe.draws import drawn, is_random
 from viewsphere.recipe.entries import Entry, concrete, entry_of, pictures_of, words_of
+from viewsphere.recipe.lights.shared import lamps
 from viewsphere.recipe.world import finish, light, surface, weather
 
 
@@ -177,7 +180,9 @@ def test_what_is_drawn_may_be_beyond_no_limit_of_the_scene():
 
 
 def test_all_parts_of_a_scene_have_an_entry():
-    entries = [kind for module in (finish, light, surface, weather) for kind in vars(module).values() if isinstance(kind, type)]
+    modules = (finish, light, surface, weather, lamps)
+    entries = [kind for module in modules for kind in vars(module).values() if isinstance(kind, type)]
+    entries += [plugins.load(LightSpec, name).options for name in plugins.names("lights")]
     derived = {kind.part for kind in entries if issubclass(kind, Entry) and kind is not Entry}
     parts = {kind for kind in vars(scene).values() if isinstance(kind, type) and issubclass(kind, Frozen)}
     assert parts - derived == {
