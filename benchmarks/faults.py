@@ -21,7 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from faults import SIGNALS, WORKS, SequenceState, Tally, make_stock, recipe  # noqa: E402, which is found now
+from faults import SIGNALS, WORKS, Course, Tally, make_stock, recipe  # noqa: E402, which is found now
 
 PAGE = ROOT / "docs" / "reliability.md"
 TABLE = re.compile(r"(<!-- written by benchmarks/faults -->\n).*?(\n<!-- end -->)", re.DOTALL)
@@ -58,7 +58,7 @@ def campaign(share: float, seed: int) -> bool:
         stock.mkdir()
         make_stock(stock)
         for (fault, work), times in TIMES.items():
-            course = SequenceState(WORKS[work], stock, Path(place, f"{fault} {work}"), random.Random(f"{seed} {fault} {work}"))
+            course = Course(WORKS[work], stock, Path(place, f"{fault} {work}"), random.Random(f"{seed} {fault} {work}"))
             course.suffer(SIGNALS[fault], max(round(share * times), 1))
             course.renew()
             rows.append(row(fault, work, course.tally))
