@@ -14,13 +14,13 @@ QUICK = {"name": "raster", "bounces": "off", "ambient_occlusion": "off", "antial
 @contextmanager
 def built_once():
     """Within it, a family's builder is called once for each state of its random numbers. Nothing changes a mesh."""
-    build, kept = zoo._built, {}
+    build, kept = zoo.build, {}
 
-    def built(family, rng):
-        key = family, str(rng.bit_generator.state)
+    def built(name, rng):
+        key = name, str(rng.bit_generator.state)
         if key not in kept:
-            kept[key] = build(family, rng)
+            kept[key] = build(name, rng)
         return kept[key]
 
-    with patch.object(zoo, "_built", built):
+    with patch.object(zoo, "build", built):
         yield
