@@ -1,7 +1,7 @@
-"""Labels: everything computed about a picture from truth's triangles; each label is one file, which defines `LABEL`.
+"""Labels: everything computed about a picture from truth's triangles. A file defines `LABEL`, or several `LABELS`.
 
 `ChannelLabel`s are arrays of pixels, computed if a recipe's `channels` name them. `ObjectLabel`s are fields of objects,
-`SampleLabel`s of whole pictures; those that are on request are computed if a recipe's `annotations` name them. Third parties
+`SampleLabel`s of whole pictures; labels on request are computed if a recipe's `annotations` name them. Third parties
 add a label by an entry point of the group `viewsphere.labels` that names such a module.
 """
 

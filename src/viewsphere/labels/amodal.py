@@ -47,7 +47,7 @@ def _fields(height: int, width: int, counts: str) -> Mapping[str, Any]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The mask holds the visible one, which is as large a share of it as visibility and truncation say; the box is tight."""
+    """The mask contains the visible one, at the share that follows from visibility and truncation; the box is tight."""
     for o in rendered(sample):
         amodal = decode_rle(o.amodal.height, o.amodal.width, o.amodal.counts)
         if amodal.shape != (sample.height, sample.width):

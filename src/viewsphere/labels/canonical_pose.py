@@ -1,4 +1,4 @@
-"""canonical_pose: of all poses in which a symmetric object looks the same, the one that stands for all of them."""
+"""canonical_pose: the representative of all poses in which a symmetric object looks the same."""
 
 from __future__ import annotations
 

@@ -164,7 +164,7 @@ def _weather(scenery: Scenery) -> tuple[str, bool]:
 
 
 def _air(scenery: Scenery) -> tuple[str, ...]:
-    """Words for what hangs in the air, and what falls: mist that rain makes by itself is not told of."""
+    """Words for fog, rain and snow; mist that follows from rain alone is left out."""
     scene = scenery.shot.scene
     falls = [word for word, what in (("raining", scene.rain), ("snowing", scene.snow)) if what is not None]
     is_foggy = scene.fog is not None and (not falls or scene.fog.visibility < FOGGY)

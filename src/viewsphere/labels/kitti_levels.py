@@ -38,7 +38,7 @@ def occlusion(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[
 
 
 def prove_occlusion(sample: Sample, models: Models) -> Iterator[str]:
-    """An object of which nothing is seen is largely occluded or unknown; one that nothing hides is fully visible."""
+    """An invisible object is largely occluded or unknown, and a visible one has a known grade."""
     for o in rendered(sample):
         grade, seen = o.occlusion_level, o.mask.any()
         if grade not in (0, 1, 2, 3) or (not seen and grade < 2) or (seen and grade == 3):
@@ -51,7 +51,7 @@ def truncation(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping
 
 
 def prove_truncation(sample: Sample, models: Models) -> Iterator[str]:
-    """An object whose projected box lies in the image is not truncated; one whose box lies outside is largely so."""
+    """An object with its projected box in the image is not truncated; with its box outside, it is largely truncated."""
     for o in rendered(sample):
         grade, inside = o.truncation_level, o.box2d_projected
         within = inside is not None and inside == o.box2d_unclipped
@@ -67,7 +67,7 @@ def _label(
     prove: Proof,
     key: str,
 ) -> ObjectLabel:
-    """A label of one grade, which is drawn at each object's box."""
+    """A label of a grade, drawn at each object's box."""
 
     def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
         for o in sample.objects:

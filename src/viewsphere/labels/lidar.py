@@ -97,7 +97,7 @@ def in_lidar_axes(vectors: Float) -> Float:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Each point lies on the ray of its ring and column, as far away as it says, on a known object; a ray has one point."""
+    """Each point is on the ray of its ring and column, at its range and on an object of the sample; a ray has one point."""
     rows = channel_of(sample, "lidar")
     if rows is None:
         return

@@ -34,7 +34,7 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Words are printable and short; a model of which nothing is known has none."""
+    """Words are printable and short; a model without known looks has none."""
     for o in rendered(sample):
         known = models.get(o.key)
         for word in filter(None, (o.color, o.material)):

@@ -68,8 +68,9 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def _foreign(o: ObjectAnnotation, size: tuple[int, int]) -> Iterator[str]:
-    """The run lengths of an imported object's mask, which no map says again, fill the picture and are its area; one may have a
-    box alone. No pixel is drawn: a few characters may stand for the largest picture.
+    """The run lengths of an imported object's mask fill the picture and sum to its area; an object may have a box alone.
+
+    No pixel is drawn, because a few characters can encode the largest picture.
     """
     if (o.rle.height, o.rle.width) != size:
         yield f"object {o.id}: expected a mask of the image's size, found {(o.rle.height, o.rle.width)}"

@@ -20,7 +20,7 @@ def prove_parts(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def prove_body_parts(sample: Sample, models: Models) -> Iterator[str]:
-    """Parts are seen on objects alone, and are those that the object's model has; a triangle has one."""
+    """Only objects have parts, of their own models, and a triangle has one."""
     found, instances = channel_of(sample, "body_parts"), channel_of(sample, "instances")
     if found is None or instances is None:
         return
@@ -39,7 +39,7 @@ def prove_body_parts(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def prove_materials(sample: Sample, models: Models) -> Iterator[str]:
-    """Objects have materials, which their models have, the background has none, and a triangle has one."""
+    """Objects have materials of their models, the background has none, and a triangle has one."""
     materials, instances = channel_of(sample, "materials"), channel_of(sample, "instances")
     if materials is None or instances is None:
         return

@@ -52,7 +52,7 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Shares are those of the image's pixels, so with the visible share they are 1; ids are those of other objects, once."""
+    """Shares and the visible share add up to the pixels in the image; each id is of another object, and occurs once."""
     known = {0, *(o.id for o in sample.objects)}
     for o in rendered(sample):
         ids = [one.id for one in o.occluders]

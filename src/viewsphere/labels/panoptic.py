@@ -53,7 +53,7 @@ def object_of(codes: Array) -> Array:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The objects are those of `instances`, and their classes those of their categories."""
+    """Objects match `instances`, and classes match the objects' categories."""
     codes, instances = channel_of(sample, "panoptic"), channel_of(sample, "instances")
     if codes is None or instances is None:
         return

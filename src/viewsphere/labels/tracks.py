@@ -48,7 +48,7 @@ def compute(context: LabelContext) -> NDArray[np.void]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """States are known ones, points lie on known objects, and are somewhere unless they are invalid."""
+    """States are valid, points are on objects of the sample, and each point that is not invalid has a place."""
     rows = channel_of(sample, "tracks")
     if rows is None:
         return

@@ -199,7 +199,7 @@ def _lifted(camera: Camera, grid: Grid, points: Float) -> Float:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Runs are whole, classes those of their objects, which lie in their boxes, and surface is seen where depth shows it."""
+    """Runs fill the grid, classes match their objects, objects are in their boxes, and depth agrees with surface cells."""
     runs = channel_of(sample, "voxels")
     if runs is None or sample.known_camera is None:
         return

@@ -1,4 +1,4 @@
-"""Labels of a picture, computed from truth: what loads the rasterizer, which those that only name labels do without."""
+"""Labels of a picture, computed from truth. This module loads the rasterizer, so modules that only name labels avoid it."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def observe(
     neighbours: NeighbourViews | None = None,
     options: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """The named labels of pixels, each (H, W) or (H, W, components) as its file says.
+    """The named labels of pixels, each (H, W) or (H, W, components).
 
-    `visibility` is `rasterize(geometry, camera)`; `neighbours`: what labels of motion and of stereo pairs compare it with;
-    `options`: those of labels, by their names. The array of `instances` is shared with the visibility and must not be written
-    to. Raises ValueError for names that are no labels of pixels.
+    `visibility` is `rasterize(geometry, camera)`; `neighbours` are views that labels of motion and of stereo pairs compare it
+    with; `options` are those of labels, by their names. The array of `instances` is shared with the visibility and must not
+    be written to. Raises ValueError for names that are no labels of pixels.
     """
     known, names = channel_labels(), tuple(names)
     context = LabelContext(geometry, camera, visibility, neighbours=neighbours, options=options or {})

@@ -27,7 +27,7 @@ Ids = Mapping[IdKind, Renumber]
 
 
 def by_table(array: NDArray[Any], ids: Table) -> NDArray[Any]:
-    """The array with other ids for those that have one; numbers below 0 stay."""
+    """The array with the new ids in place of the old ones; ids without a new one and numbers below 0 stay."""
     table = np.arange(max([int(array.max(initial=0)), *ids]) + 1, dtype=array.dtype)
     table[list(ids)] = list(ids.values())
     return np.where(array < 0, array, table[np.maximum(array, 0)])

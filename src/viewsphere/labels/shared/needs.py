@@ -43,12 +43,12 @@ class Need(ABC, Generic[T]):
 
     @property
     def view_offset(self) -> int:
-        """Instants from the picture's own to the one whose triangles are read; 0: no other one's are."""
+        """The instant whose triangles are read, counted from the picture's own; 0: no other instant's."""
         return 0
 
     @property
     def pose_offset(self) -> int:
-        """Instants from the picture's own to the one whose poses are read; 0: no other one's are."""
+        """The instant whose poses are read, counted from the picture's own; 0: no other instant's."""
         return self.view_offset
 
 

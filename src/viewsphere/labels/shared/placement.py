@@ -92,7 +92,7 @@ class ModelFacts(Protocol):
 @dataclass(frozen=True, eq=False)
 class Placement:
     """One object in one picture: its model and pose (world from object), the camera, and the angular resolution of pose
-    categories. `known` gives what is known of its model at the time step that it shows, and is asked when that is needed.
+    categories. `known` returns the facts about its model at the time step that it shows, at the first access to `facts`.
     """
 
     spec: ModelSpec

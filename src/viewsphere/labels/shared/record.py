@@ -85,17 +85,17 @@ class Makers:
 
     @cached_property
     def requested(self) -> tuple[str, ...]:
-        """The fields of labels that were asked for and follow from others."""
+        """The fields of requested labels that follow from others."""
         derived_ones = (label for label in self.labels if label.on_request and label.compute is derived)
         return tuple(field.name for label in derived_ones for field in label.fields)
 
     def has(self, field: str) -> bool:
-        """Return whether an object is told to have a field."""
+        """Return whether objects have a field, always or by request."""
         label = self.of[field]
         return not label.on_request or label.name in self.asked
 
     def label(self, field: str) -> ObjectLabel | None:
-        """The label that restores a field; None for a field that is not known, or that nobody asked for and does not follow."""
+        """The label that restores a field; None for an unknown field, or one that was not requested and does not follow."""
         label = self.of.get(field)
         return label if label and (label.follows or self.has(field)) else None
 
@@ -110,7 +110,7 @@ def from_short_record(record: Mapping[str, Any], placement: Placement, makers: M
 
 
 class _Restored(ObjectAnnotation):
-    """An object whose fields are restored when they are first asked for."""
+    """An object whose fields are restored at the first access."""
 
     def __getattr__(self, name: str) -> Any:
         own = self.__dict__

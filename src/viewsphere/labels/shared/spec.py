@@ -112,12 +112,12 @@ class LabelSpec(Spec):
 
     @property
     def view_offsets(self) -> frozenset[int]:
-        """Instants from a picture's own to those whose triangles the label reads."""
+        """Instants whose triangles the label reads, counted from the picture's own."""
         return frozenset(need.view_offset for need in self.needs) - {0}
 
     @property
     def pose_offsets(self) -> frozenset[int]:
-        """Instants from a picture's own to those whose poses the label reads, with or without triangles."""
+        """Instants whose poses the label reads, with or without triangles, counted from the picture's own."""
         return frozenset(need.pose_offset for need in self.needs) - {0}
 
     def is_in(self, sample: Sample) -> bool:
@@ -260,7 +260,7 @@ def channel_of(sample: Sample, name: str) -> Array | None:
 
 
 def mixed(triangles: Array, numbers: Array) -> int:
-    """Return the number of the given triangles that have several numbers; each pixel has one triangle and one number."""
+    """Return how many of the given triangles have several numbers; each pixel has a triangle and a number."""
     one = np.zeros(int(triangles.max()) + 1, numbers.dtype)
     one[triangles] = numbers  # of each triangle one of its numbers
     return len(np.unique(triangles[one[triangles] != numbers]))

@@ -1,4 +1,4 @@
-"""Sentences about pictures: what is kept of one, the user's templates, and what contradicts a sentence."""
+"""Sentences about pictures: their stored parts, the user's templates, and the proof of a sentence."""
 
 from __future__ import annotations
 

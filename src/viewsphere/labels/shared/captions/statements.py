@@ -165,7 +165,7 @@ def of_one(form: str, o: ObjectAnnotation, size: tuple[int, int], has_front: boo
 
 @dataclass(frozen=True, eq=False)
 class Company:
-    """Visible objects together: which relation holds of which two."""
+    """Visible objects together, with the relations between them."""
 
     objects: Sequence[ObjectAnnotation]
 
