@@ -18,8 +18,7 @@ from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels import annotated, channels, context_of, observe
-from viewsphere.labels.surface_samples import LABEL
-from viewsphere.model.annotations.surface_samples import SURFACE_SAMPLE
+from viewsphere.labels.surface_samples import LABEL, SURFACE_SAMPLE
 from viewsphere.model.sample import Sample
 from viewsphere.model.thing import Motion
 from viewsphere.store import Dataset, encode

@@ -177,7 +177,7 @@ def test_a_share_of_an_index_is_counted_as_its_rows_are(data):
     assert [own.find(row.key) == row for row in rows] == [row in rows[k::of] for row in rows]
     for subject in "abc":
         shots = [row for row in rows[k::of] if row.subject == subject]
-        assert list(own.of(subject)) == shots and own.counts[subject] == own.count_of(subject) == len(shots)
+        assert list(own.rows_of(subject)) == shots and own.counts[subject] == own.count_of(subject) == len(shots)
         assert own.samples_of(subject) == sum(row.count for row in shots)
 
 

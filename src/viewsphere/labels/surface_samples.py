@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.camera import project
@@ -15,7 +16,8 @@ from viewsphere.labels.shared.drawing.colors import color_of
 from viewsphere.labels.shared.ids import in_column
 from viewsphere.labels.shared.needs import ObjectPoints
 from viewsphere.labels.shared.spec import Array, ChannelLabel, Drawing, Models, channel_of, rendered
-from viewsphere.model.annotations.surface_samples import SURFACE_SAMPLE, SurfaceSamples
+from viewsphere.model.fields.frozen import Frozen
+from viewsphere.model.fields.numbers import Count
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.truth.surface_points.raster import BEHIND, OUTSIDE, VISIBLE
 
@@ -23,6 +25,33 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
     from viewsphere.labels.shared.context import LabelContext
+
+MOST = 100_000
+"""Points on one object."""
+
+SURFACE_SAMPLE = np.dtype(
+    [
+        ("object", "<i4"),
+        ("triangle", "<i4"),
+        ("point_object", "<f8", (3,)),
+        ("normal_object", "<f4", (3,)),
+        ("point", "<f8", (3,)),
+        ("normal", "<f4", (3,)),
+        ("pixel", "<f8", (2,)),
+        ("state", "u1"),
+    ]
+)
+"""One point in one sample: the id of the object that it lies on, and the triangle of its model; the point, metres, and the
+triangle's normal, outwards by its winding, in the object's axes and in the world's; where the point is in the picture, pixels,
+NaN behind the camera; and its state there: 0 visible, 1 occluded, 2 outside, 3 behind.
+"""
+
+
+class SurfaceSamples(Frozen):
+    """Options of the label surface_samples."""
+
+    count: Annotated[Count, Field(le=MOST)] = Field(default=1024, description="points on each object")
+
 
 Float = NDArray[np.float64]
 

@@ -45,11 +45,40 @@ from viewsphere.recipe.cameras.viewpoints import Viewpoints
 from viewsphere.recipe.formats import FormatEntry, FormatField
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.reading.former_names import former_paths, is_former, renamed, with_present_names
-from viewsphere.recipe.values import OrShort, shape_of
+from viewsphere.recipe.values import Interval, OrShort, shape_of
 from viewsphere.recipe.variations import Variations, check_alike, varied
-from viewsphere.recipe.wanted import WantedEntry
 from viewsphere.recipe.world.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
 from viewsphere.recipe.world.scenes import ScenesField
+
+
+def _shares(value: tuple[float, float]) -> tuple[float, float]:
+    if value[0] < 0 or value[1] > 1:
+        raise ValueError(f"expected shares of 0 to 1; found {shown(value)}")
+    return value
+
+
+class WantedEntry(Frozen):
+    """Shares [low, high] in which the labels of these names of a frame's model shall lie; of random scenes those of the model
+    of which least is seen, and of the one of which most is cut off.
+    """
+
+    visibility: Shares | None = Field(default=None, description="visible share: [0.3, 0.6]")
+    truncation: Shares | None = Field(default=None, description="share outside the picture: [0.2, 0.5]")
+
+    @model_validator(mode="after")
+    def _check(self) -> WantedEntry:
+        if self.visibility is None and self.truncation is None:
+            raise ValueError("expected visibility or truncation; found neither")
+        return self
+
+    def miss(self, visibility: float, truncation: float) -> float:
+        """The sum of a frame's distances from both wanted ranges; 0 within them."""
+        pairs = ((self.visibility, visibility), (self.truncation, truncation))
+        return sum(max(ends[0] - value, value - ends[1], 0.0) for ends, value in pairs if ends is not None)
+
+
+Shares = Annotated[Interval, AfterValidator(_shares)]
+
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames", "keep_annotations_above"}
 """Fields of a recipe that change neither a picture nor a label, as the credits of its models do not."""

@@ -86,10 +86,9 @@ def generate(
     instead, such as "auto" (the one that this machine is of), "host:6379" or "ray://host:10001": at most `workers` of them, 0
     or None for all; `out` is where all its machines see it.
 
-    A model that cannot be used is an error before rendering starts, or with `keep_going` left out and reported. Raises
-    UserError for the user's mistakes, and WorkerDied, when all others are made, for shots that were lost with their workers
-    again and again (with `keep_going` they are left out, too); whatever was finished stays, and the same call goes on from
-    there.
+    A model that cannot be used is an error before rendering starts; `keep_going` leaves it out and reports it. Raises UserError
+    for the user's mistakes. Raises WorkerDied, when all others are made, for shots that were lost with their workers again and
+    again; `keep_going` leaves them out. Finished frames stay, and the same call goes on from there.
     """
     begun = time.monotonic()
     own_shard = ALL if shard is None else shard_of(shard)
@@ -114,16 +113,27 @@ def generate(
             notes += export(store.root, due, workers=0 if ray else cores() if workers is None else workers, listener=tell)
             store.forget_failures()
             wanted = _united(wanted, due) if own_shard.is_all else due
-    summary = Summary(store.root, len(dataset), rendered, skipped, 0.0, (), notes)
+    summary = Summary(store.root, len(dataset), rendered, skipped, 0.0, (), notes, _warnings(planned, dataset))
     if left_over is not None and not left_over.complete:
-        notes += (_left_to_others(portion, left_over),)
-        summary = replace(summary, notes=notes, warnings=_warnings(planned, dataset), missing=left_over.missing)
+        summary = replace(summary, notes=(*notes, _left_to_others(portion, left_over)), missing=left_over.missing)
     else:
-        notes += tuple(_remarks(portion, dataset, wanted, nothing_added=append and not rendered))
-        misses = materials_not_found(recipe, [s for s in planned.model_specs if s.key not in skipped], store)
-        warnings = _warnings(planned, dataset, misses)
-        summary = replace(summary, formats=tuple(options_of(wanted)), notes=notes, warnings=warnings)
+        summary = _completed(summary, planned, portion, dataset, wanted, nothing_added=append and not rendered)
     return replace(summary, seconds=time.monotonic() - begun)
+
+
+def _completed(
+    summary: Summary,
+    planned: Plan,
+    portion: DatasetPart,
+    dataset: Dataset,
+    wanted: tuple[FormatEntry, ...],
+    nothing_added: bool,
+) -> Summary:
+    """The summary of a run after which nothing is missing."""
+    notes = (*summary.notes, *_remarks(portion, dataset, wanted, nothing_added))
+    specs = [spec for spec in planned.model_specs if spec.key not in summary.skipped]
+    warnings = _warnings(planned, dataset, materials_not_found(planned.recipe, specs, dataset.store))
+    return replace(summary, formats=tuple(options_of(wanted)), notes=notes, warnings=warnings)
 
 
 def _check_reach(store: Store, workers: int | None) -> None:

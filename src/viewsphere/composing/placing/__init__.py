@@ -6,6 +6,7 @@ What a placer needs stands here: what it is asked (`Room`, `Shape`, `Draws`), an
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,9 +16,13 @@ from viewsphere.composing.placing.shared.footprint import Footprint, Outline, fo
 from viewsphere.composing.placing.shared.obstacles import Obstacles, obstacles
 from viewsphere.composing.placing.shared.room import Memory, Room, Spot, checked, forgetful
 from viewsphere.composing.placing.shared.shape import Shape
-from viewsphere.composing.placing.shared.way import Way
+from viewsphere.geometry.rotation import matrix_from_quaternion, rigid, slerp
 from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import RngOf
+
+State = tuple[float, ...]
+"""x, y, z in metres and a unit quaternion w, x, y, z: world from object."""
+
 
 __all__ = [
     "Draws",
@@ -64,3 +69,20 @@ class Piece:
     source: str
     size: tuple[float, float, float]
     world_from_piece: Matrix4
+
+
+@dataclass(frozen=True)
+class Way:
+    """The states of a thing at moments that follow one another, seconds from its first; it stays in the last one."""
+
+    seconds: tuple[float, ...]
+    states: tuple[State, ...]
+
+    def at(self, seconds: float) -> Matrix4:
+        """World from object at a time: straight from state to state."""
+        after = min(max(bisect_right(self.seconds, seconds), 1), len(self.states) - 1)
+        a, b = np.array(self.states[after - 1]), np.array(self.states[after])
+        begin, stop = self.seconds[after - 1], self.seconds[after]
+        share = min(max((seconds - begin) / (stop - begin), 0.0), 1.0)
+        matrix = rigid(matrix_from_quaternion(slerp(a[3:], b[3:], share)), a[:3] + share * (b[:3] - a[:3]))
+        return tuple(map(tuple, matrix.tolist()))  # type: ignore[return-value]
