@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from viewsphere.geometry.lens import Camera
+from viewsphere.geometry.lenses import NEAR, Bounds, Camera
 
 Float = NDArray[np.float64]
-Bounds = tuple[float, float, float, float]
-
-NEAR = 1e-6
-"""Distance in front of the camera, metres, from which on geometry is projected; nearer parts are cut off."""
 
 ROUNDING = 1e-9
 """By how much, in metres a metre, a sum of coordinates may miss the depth that it stands for: generously."""

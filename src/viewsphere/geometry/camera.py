@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from viewsphere.geometry.lens import Intrinsics
-    from viewsphere.geometry.lenses import Window
+    from viewsphere.geometry.lenses import Intrinsics, Window
 
 Float = NDArray[np.float64]
 

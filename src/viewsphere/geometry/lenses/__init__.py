@@ -4,6 +4,8 @@ A file holds `LENS = LensSpec(...)`, whose name in recipes is the file's. Nothin
 lens is: it uses the methods and the properties of `Lens`, which `lens_of` returns.
 """
 
+# ruff: noqa: D102, the classes in `viewsphere.model` say what each name of the protocols means
+
 from __future__ import annotations
 
 import importlib
@@ -11,20 +13,22 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, model_validator
 
 from viewsphere.errors import PluginError
-from viewsphere.geometry.box import Bounds
-from viewsphere.geometry.lens import Intrinsics
 from viewsphere.plugin_modules import entry_points, listed
 
 Float = NDArray[np.float64]
+Bounds = tuple[float, float, float, float]
 Window = tuple[int, int, int, int]
 """Pixels [x0, x1) x [y0, y1) as (x0, y0, x1, y1); may reach outside the image."""
+
+NEAR = 1e-6
+"""Distance in front of the camera, metres, from which on geometry is projected; nearer parts are cut off."""
 
 DEFAULT = "pinhole"
 """The lens of intrinsics without `distortion`."""
@@ -241,6 +245,52 @@ class Lens:
 def angles_off_axis(directions: Float) -> Float:
     """Angles of directions (N, 3) to the optical axis, degrees."""
     return np.degrees(np.arctan2(np.hypot(directions[:, 0], directions[:, 1]), directions[:, 2]))
+
+
+class Intrinsics(Protocol):
+    """Image size in pixels, the camera matrix K (3, 3), its numbers, and the lens; None for `distortion` means a pinhole."""
+
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def fx(self) -> float: ...
+    @property
+    def fy(self) -> float: ...
+    @property
+    def cx(self) -> float: ...
+    @property
+    def cy(self) -> float: ...
+    @property
+    def skew(self) -> float: ...
+    @property
+    def distortion(self) -> LensParameters | None: ...
+    @property
+    def K(self) -> Float: ...
+    @property
+    def lens(self) -> Lens: ...
+
+
+class Camera(Protocol):
+    """Intrinsics and the world-to-camera motion x_camera = R x_world + t (OpenCV axes, metres); P is K [R|t], (3, 4)."""
+
+    @property
+    def intrinsics(self) -> Intrinsics: ...
+    @property
+    def R(self) -> Float: ...
+    @property
+    def t(self) -> Float: ...
+    @property
+    def K(self) -> Float: ...
+    @property
+    def P(self) -> Float: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def lens(self) -> Lens: ...
 
 
 @lru_cache(maxsize=64)

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from viewsphere.geometry.box import NEAR, Bounds
-from viewsphere.geometry.lenses import Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
+from viewsphere.geometry.lenses import NEAR, Bounds, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
 from viewsphere.geometry.lenses.shared.bent import BentLens, bent_bounds, first_positive_root, padded
 
 Float = NDArray[np.float64]

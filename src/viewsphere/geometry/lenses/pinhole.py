@@ -8,8 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.box import NEAR, Bounds
-from viewsphere.geometry.lenses import Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
+from viewsphere.geometry.lenses import NEAR, Bounds, Lens, LensParameters, LensSpec, OpenCVLens, Rays, central
 
 Float = NDArray[np.float64]
 

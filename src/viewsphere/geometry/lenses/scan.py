@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from viewsphere.geometry.box import Bounds
-from viewsphere.geometry.lenses import Lens, LensParameters, LensSpec, Rays, central
+from viewsphere.geometry.lenses import Bounds, Lens, LensParameters, LensSpec, Rays, central
 
 Float = NDArray[np.float64]
 Degrees = Annotated[float, Field(ge=-90, le=90)]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.box import Bounds
+from viewsphere.geometry.lenses import Bounds
 
 Float = NDArray[np.float64]
 

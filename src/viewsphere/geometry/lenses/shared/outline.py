@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.box import Bounds
-from viewsphere.geometry.lenses import Lens
-
 Float = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Bounds = tuple[float, float, float, float]
 
 TOLERANCE = 1e-4
 """Pixels that an edge may bend beyond the box before it is halved: ten times finer than box2d_projected's proof needs."""
@@ -24,8 +24,17 @@ MOST = 1 << 16
 """Triangles and rim directions that are compared at once."""
 
 
+class Shows(Protocol):
+    """What the search asks of a `viewsphere.geometry.lenses.Lens`."""
+
+    @property
+    def has_unit_rays(self) -> bool: ...  # noqa: D102
+    def project(self, points: Float) -> tuple[Float, Flags]: ...  # noqa: D102
+    def directions(self) -> Float: ...  # noqa: D102
+
+
 def bounds(
-    lens: Lens, R: Float, t: Float, vertices: Float, is_used: Flags, triangles: NDArray[np.int32]
+    lens: Shows, R: Float, t: Float, vertices: Float, is_used: Flags, triangles: NDArray[np.int32]
 ) -> tuple[Bounds | None, bool]:
     """As `viewsphere.geometry.lenses.Lens.bounds`. Edges are halved until they cannot leave the box. Where the lens shows a
     triangle in part, or a triangle may surround the direction behind the camera, the box also holds what the picture's
@@ -50,7 +59,7 @@ def _grown(box: Bounds, pixels: Float) -> Bounds:
     return min(box[0], x0), min(box[1], y0), max(box[2], x1), max(box[3], y1)
 
 
-def _followed(lens: Lens, box: Bounds, ends: Float, pixels: Float) -> tuple[Bounds, bool]:
+def _followed(lens: Shows, box: Bounds, ends: Float, pixels: Float) -> tuple[Bounds, bool]:
     """The box grown by edges (n, 2, 3), whose ends' positions are known, and whether the lens shows all of them."""
     whole = True
     for depth in range(HALVINGS):
@@ -75,7 +84,7 @@ def _followed(lens: Lens, box: Bounds, ends: Float, pixels: Float) -> tuple[Boun
     return box, whole
 
 
-def _rim_inside(lens: Lens, triangles: Float) -> Float:
+def _rim_inside(lens: Shows, triangles: Float) -> Float:
     """The positions of the outermost pixels that have a ray, of each row and each column, whose rays meet one of the triangles
     (n, 3, 3) in camera axes.
     """
