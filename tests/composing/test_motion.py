@@ -395,8 +395,8 @@ POINTS = [[0, 0, 0], [1, 0, 0]]
         ({"kind": "path", "speed": 1}, f"{WHERE}: expected one of lane, points; found none"),
         (
             {"kind": "path", "lane": "any", "speed": 1},
-            f"{WHERE}.lane: expected a place with lanes, such as scene.place: zoo:neighbourhood; found none: set one, or list "
-            "points",
+            f"{WHERE}.lane: expected a place with lanes, such as scene.place: zoo:neighbourhood or zoo:town; found none: "
+            "set one, or list points",
         ),
         (
             {"kind": "path", "points": POINTS, "speed": 1, "offset": 2},
