@@ -15,7 +15,7 @@ import os
 from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from viewsphere import plugins
 from viewsphere.caches import cache_of
@@ -24,6 +24,8 @@ from viewsphere.files import read_bytes
 from viewsphere.scratch import temporary
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
 
     from viewsphere.assets.mesh import Mesh
@@ -41,6 +43,16 @@ def family(name: str) -> ZooFamily:
     from viewsphere.plugins.family import ZooFamily
 
     return plugins.load(ZooFamily, name)
+
+
+def drawing_of(name: str) -> Callable[[np.random.Generator], Any]:
+    """The function that draws a family's parameters; raises PluginError for a family without one."""
+    from viewsphere.errors import PluginError
+
+    draw = family(name).draw
+    if draw is None:
+        raise PluginError(f"family {name}: places need `draw`, which it does not have")
+    return draw
 
 
 def home(name: str) -> str:

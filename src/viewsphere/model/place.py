@@ -54,6 +54,20 @@ class Surface:
 
 
 @dataclass(frozen=True)
+class LevelFace:
+    """A level face of a model on which things stand, in the model's axes, metres.
+
+    rectangle: low x, low y, high x, high y of what is free of it; height: its z; clearance: what is free above it, inf under
+    the open sky. On cushions and bedding the mesh may lie up to 3 cm above or below `height`.
+    """
+
+    name: str
+    rectangle: tuple[float, float, float, float]
+    height: float
+    clearance: float = math.inf
+
+
+@dataclass(frozen=True)
 class Bay:
     """A space to park in: a frame whose origin is its middle, +Z up, -Y where a parked vehicle's front points, and its size
     along the frame's x and y, metres.

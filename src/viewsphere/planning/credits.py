@@ -32,7 +32,7 @@ def credits_of(specs: Iterable[ModelSpec], said: Mapping[str, Credit]) -> dict[s
 
     Raises RecipeError, which names file and line, for a table that cannot be used.
     """
-    table, source = cache(_read), cache(lambda prefix: source_of(f"{prefix}:"))
+    table, source = cache(_read), cache(_source)
     credits = {spec.key: said.get(spec.key) or _looked_up(spec, table, source) for spec in specs}
     return {key: credit for key, credit in credits.items() if credit is not None}
 
@@ -53,6 +53,10 @@ def _looked_up(spec: ModelSpec, table: Callable[[Path, bool], Table], source: Ca
     file = split_source(Path(spec.source))[0]
     rows = table(file.parent, spec.confined)
     return rows.get(file.name) or next((credit for name, credit in rows.items() if fnmatchcase(file.name, name)), None)
+
+
+def _source(prefix: str) -> Named | None:
+    return source_of(f"{prefix}:")
 
 
 def _read(folder: Path, confined: bool) -> Table:

@@ -13,7 +13,7 @@ from viewsphere.model.annotations.classes import STUFF_IDS
 from viewsphere.model.annotations.keypoints import At
 from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import Size
-from viewsphere.model.place import Surface
+from viewsphere.model.place import LevelFace
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import Spec
 
@@ -42,7 +42,7 @@ class ZooFamily(Spec):
         default=None, description="`sized(rng, (width, height, length))`: a model of this size"
     )
     draw: Callable[[Rng], Any] | None = Field(default=None, description="`draw(rng)`: the parameters that `random` draws")
-    surfaces: Callable[[Any], tuple[Surface, ...]] | None = Field(
+    surfaces: Callable[[Any], tuple[LevelFace, ...]] | None = Field(
         default=None, description="`surfaces(parameters)`: level rectangles where things may stand"
     )
     rooms: Callable[[Any], Any] | None = Field(

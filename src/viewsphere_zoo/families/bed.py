@@ -10,6 +10,7 @@ import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.model.annotations.keypoints import sided
+from viewsphere.model.place import LevelFace
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.furnishing.casework import Leg, block, leg
 from viewsphere_zoo.furnishing.coats import (
@@ -29,7 +30,6 @@ from viewsphere_zoo.joinery.coats import BRASS
 from viewsphere_zoo.joinery.members import pipe
 from viewsphere_zoo.joinery.slabs import level, slab
 from viewsphere_zoo.shapes.assembly import Piece
-from viewsphere_zoo.shapes.resting import Surface
 from viewsphere_zoo.shapes.rods import rod
 from viewsphere_zoo.shapes.solids import Solid, join, lathe, moved, turned
 
@@ -279,14 +279,14 @@ def _pillows(p: Bed, coats: _Coats, rng: np.random.Generator) -> list[Piece]:
     return found
 
 
-def surfaces(parameters: Bed) -> tuple[Surface, ...]:
+def surfaces(parameters: Bed) -> tuple[LevelFace, ...]:
     """Return the even surfaces: the blanket's top, and the duvet from its band or pillows to the blanket or foot."""
     p, x, foot = parameters, parameters.width / 2 - 0.1, -parameters.length / 2
     low, high = foot + (0.82 if p.throw else 0.12), p.duvet_end - (p.folded or 0.08) - 0.06 - (0.15 if p.cushions else 0)
     clear = p.posts - p.top - 0.1 if p.posts else float("inf")
-    found = [Surface("duvet", (-x, low, x, high), p.top + 0.045, clear)] if high - low > 0.15 else []
+    found = [LevelFace("duvet", (-x, low, x, high), p.top + 0.045, clear)] if high - low > 0.15 else []
     if p.throw:
-        found.append(Surface("throw", (-x, foot + 0.25, x, foot + 0.75), p.top + 0.06, clear - 0.02))
+        found.append(LevelFace("throw", (-x, foot + 0.25, x, foot + 0.75), p.top + 0.06, clear - 0.02))
     return tuple(found)
 
 

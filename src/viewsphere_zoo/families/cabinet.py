@@ -9,6 +9,7 @@ import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.model.annotations.keypoints import sided
+from viewsphere.model.place import LevelFace
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.furnishing.carcass import BOARD, Carcass, Column, carcass, fronts
 from viewsphere_zoo.furnishing.casework import Leg, Pull, block, four
@@ -17,7 +18,6 @@ from viewsphere_zoo.furnishing.kitchen import HOB, SINK, hob, sink, worktop
 from viewsphere_zoo.joinery.coats import BRASS, CHROME
 from viewsphere_zoo.shapes.assembly import Piece
 from viewsphere_zoo.shapes.paint import linear
-from viewsphere_zoo.shapes.resting import Surface
 from viewsphere_zoo.shapes.solids import join
 
 KEYPOINTS = {
@@ -166,7 +166,7 @@ def _top(p: Cabinet, over: Timber) -> list[Piece]:
     return [Piece("top", over.along, join(*steps))]
 
 
-def surfaces(parameters: Cabinet) -> tuple[Surface, ...]:
+def surfaces(parameters: Cabinet) -> tuple[LevelFace, ...]:
     """The top, cut where a sink or a hob is, and the floors of open bays."""
     p, margin = parameters, 0.02
     y = p.depth / 2
@@ -177,14 +177,14 @@ def surfaces(parameters: Cabinet) -> tuple[Surface, ...]:
     name = "worktop" if p.style == "kitchen" else "top"
     free = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 0.12]
     found = [
-        Surface(f"{name}_{k}" if len(free) > 1 else name, (a, -y + margin, b, y - margin), height)
+        LevelFace(f"{name}_{k}" if len(free) > 1 else name, (a, -y + margin, b, y - margin), height)
         for k, (a, b) in enumerate(free, 1)
     ]
     for x0, x1, z0, z1, kind, number in p.box.bays:
         if kind == "open":
             rect = (x0 + margin, p.box.face + margin, x1 - margin, y - 0.03)
             floor = z0 + (BOARD / 2 if abs(z0 - BOARD / 2 - p.box.low) < 1e-9 else 0.0)
-            found.append(Surface(f"bay_{number}", rect, floor, z1 - floor - BOARD / 2))
+            found.append(LevelFace(f"bay_{number}", rect, floor, z1 - floor - BOARD / 2))
     return tuple(found)
 
 

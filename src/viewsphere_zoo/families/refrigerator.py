@@ -10,6 +10,7 @@ import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.model.annotations.keypoints import sided
+from viewsphere.model.place import LevelFace
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.furnishing.casework import block
 from viewsphere_zoo.furnishing.coats import DYES
@@ -17,7 +18,6 @@ from viewsphere_zoo.joinery.coats import CHROME, STEEL, drawn_color
 from viewsphere_zoo.joinery.members import pipe
 from viewsphere_zoo.shapes.assembly import Piece, assemble
 from viewsphere_zoo.shapes.paint import Color, coated, linear, metal
-from viewsphere_zoo.shapes.resting import Surface
 from viewsphere_zoo.shapes.rods import rod
 from viewsphere_zoo.shapes.solids import Solid, join, lathe, moved, rounded_box, tube, turned
 
@@ -338,10 +338,10 @@ def _notes(p: Refrigerator, door: Door, y: float, rng: np.random.Generator) -> I
         yield Piece("magnet", Material(f"magnet_{dye}", linear(DYES[dye]), roughness=0.4), moved(knob, (x, y - 0.001, z)))
 
 
-def surfaces(parameters: Refrigerator) -> tuple[Surface, ...]:
+def surfaces(parameters: Refrigerator) -> tuple[LevelFace, ...]:
     """The top."""
     p = parameters
-    return (Surface("top", (-p.width / 2 + 0.06, p.face + 0.06, p.width / 2 - 0.06, p.depth / 2 - 0.1), p.height - 0.004),)
+    return (LevelFace("top", (-p.width / 2 + 0.06, p.face + 0.06, p.width / 2 - 0.06, p.depth / 2 - 0.1), p.height - 0.004),)
 
 
 def refrigerator_random(rng: np.random.Generator) -> Mesh:

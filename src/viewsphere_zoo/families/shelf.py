@@ -10,13 +10,13 @@ import numpy as np
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.annotations.keypoints import sided
+from viewsphere.model.place import LevelFace
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.furnishing.casework import block, footed
 from viewsphere_zoo.furnishing.coats import BLACK_STEEL, WHITE_STEEL, Timber, Wood, drawn_wood, furnished, grain
 from viewsphere_zoo.furnishing.stock import books, box, vase
 from viewsphere_zoo.joinery.coats import BRASS, STEEL
 from viewsphere_zoo.shapes.assembly import Piece
-from viewsphere_zoo.shapes.resting import Surface
 from viewsphere_zoo.shapes.rods import rod
 from viewsphere_zoo.shapes.solids import join
 
@@ -223,18 +223,18 @@ def _stock(p: Shelf, rng: np.random.Generator) -> list[Piece]:
     return found
 
 
-def surfaces(parameters: Shelf) -> tuple[Surface, ...]:
+def surfaces(parameters: Shelf) -> tuple[LevelFace, ...]:
     """The boards of bays in which nothing stands, and the top of a shelf that ends in a board."""
     p = parameters
     taken, rear = _taken(p), p.depth / 2 - 0.02
     found = [
-        Surface(f"board_{number}", (x0 + 0.02, rear - p.deep(level) + 0.04, x1 - 0.02, rear), p.tops[level], _free(p, level))
+        LevelFace(f"board_{number}", (x0 + 0.02, rear - p.deep(level) + 0.04, x1 - 0.02, rear), p.tops[level], _free(p, level))
         for number, (x0, x1, level) in enumerate(_bays(p))
         if number not in taken and p.deep(level) > 0.14 and _free(p, level) > 0.08
     ]
     if p.style in ("bookcase", "cubes"):
         top = (-p.width / 2 + 0.02, -p.depth / 2 + 0.02, p.width / 2 - 0.02, p.depth / 2 - 0.02)
-        found.append(Surface("top", top, p.tops[-1]))
+        found.append(LevelFace("top", top, p.tops[-1]))
     return tuple(found)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.model.annotations.keypoints import sided
+from viewsphere.model.place import LevelFace
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.furnishing.casework import Leg, block, leg
 from viewsphere_zoo.furnishing.coats import Cloth, Wood, drawn_cloth, drawn_wood, furnished, grain, weave
@@ -16,7 +17,6 @@ from viewsphere_zoo.furnishing.softs import cushion, draped, padded, pillow, tuf
 from viewsphere_zoo.joinery.coats import BRASS, drawn_cover
 from viewsphere_zoo.joinery.slabs import box_outline
 from viewsphere_zoo.shapes.assembly import Piece
-from viewsphere_zoo.shapes.resting import Surface
 from viewsphere_zoo.shapes.solids import Float, Solid, both_sides, join, lathe, loft, moved, turned
 
 KEYPOINTS = {
@@ -255,19 +255,19 @@ def _loose(p: Sofa, coats: _Coats, rng: np.random.Generator) -> list[Piece]:
     return found
 
 
-def surfaces(parameters: Sofa) -> tuple[Surface, ...]:
+def surfaces(parameters: Sofa) -> tuple[LevelFace, ...]:
     """Each seat from the sitter's right (-X), before the cushions and pillows, and the end of a chaise."""
     p, front = parameters, -parameters.depth / 2
     rear = p.seat_rear - (0.3 if p.scattered else 0.04)
     edges = [-p.inner + k * p.seat_width for k in range(p.seats)]
     found = [
-        Surface(f"seat_{k}", (x + 0.06, front + 0.07, x + p.seat_width - 0.06, rear), p.seat_height)
+        LevelFace(f"seat_{k}", (x + 0.06, front + 0.07, x + p.seat_width - 0.06, rear), p.seat_height)
         for k, x in enumerate(edges, 1)
     ]
     if s := _side(p):
         x = edges[-1] if s > 0 else edges[0]
         place = (x + 0.06, front - REACH + 0.07, x + p.seat_width - 0.06, front - 0.02)
-        found.append(Surface("chaise", place, p.seat_height))
+        found.append(LevelFace("chaise", place, p.seat_height))
     return tuple(found)
 
 

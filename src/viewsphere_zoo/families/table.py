@@ -10,6 +10,7 @@ import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.model.annotations.keypoints import sided
+from viewsphere.model.place import LevelFace
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.furnishing.casework import Leg, Pull, block, four, front, handles, pull
 from viewsphere_zoo.furnishing.coats import BLACK_STEEL, GLASS, WHITE_STEEL, Timber, Wood, drawn_wood, furnished, grain
@@ -17,7 +18,7 @@ from viewsphere_zoo.furnishing.underframes import pedestal, sleds, trestles, tri
 from viewsphere_zoo.joinery.coats import BRASS, CHROME
 from viewsphere_zoo.joinery.slabs import level, polygon, slab
 from viewsphere_zoo.shapes.assembly import Piece
-from viewsphere_zoo.shapes.resting import Surface, shrunk
+from viewsphere_zoo.shapes.resting import shrunk
 from viewsphere_zoo.shapes.rods import circle
 from viewsphere_zoo.shapes.solids import Float, Solid, join, superellipse
 
@@ -207,7 +208,7 @@ def _riser(p: Table, wood: Timber) -> list[Piece]:
     return pieces
 
 
-def surfaces(parameters: Table) -> tuple[Surface, ...]:
+def surfaces(parameters: Table) -> tuple[LevelFace, ...]:
     """The top (before the riser), the riser's ledge and the lower shelf; of round tops the square within."""
     p = parameters
     x, y = p.width / 2, p.depth / 2
@@ -215,8 +216,8 @@ def surfaces(parameters: Table) -> tuple[Surface, ...]:
         x, y = 0.7 * x, 0.7 * y
     found = [shrunk("top", (x, y), p.height)]
     if p.riser:
-        found = [Surface("top", (0.02 - x, 0.02 - y, x - 0.02, y - 0.22), p.height)]
-        found.append(Surface("riser", (0.02 - x, y - 0.19, x - 0.02, y - 0.02), p.height + p.riser))
+        found = [LevelFace("top", (0.02 - x, 0.02 - y, x - 0.02, y - 0.22), p.height)]
+        found.append(LevelFace("riser", (0.02 - x, y - 0.19, x - 0.02, y - 0.02), p.height + p.riser))
     if p.shelf:
         a, b = _shelf(p)
         share = 0.66 if p.top != "rectangle" else 1.0

@@ -9,6 +9,7 @@ import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.model.annotations.keypoints import sided
+from viewsphere.model.place import LevelFace
 from viewsphere.plugins.family import ZooFamily
 from viewsphere_zoo.furnishing.broadcasts import Show, broadcast
 from viewsphere_zoo.furnishing.carcass import Carcass, Column, carcass, fronts
@@ -17,7 +18,6 @@ from viewsphere_zoo.furnishing.coats import BLACK_STEEL, Wood, drawn_wood, furni
 from viewsphere_zoo.joinery.coats import STEEL
 from viewsphere_zoo.shapes.assembly import Piece
 from viewsphere_zoo.shapes.paint import Color, linear
-from viewsphere_zoo.shapes.resting import Surface
 from viewsphere_zoo.shapes.rods import circle, rod
 from viewsphere_zoo.shapes.sheets import sheet
 from viewsphere_zoo.shapes.solids import join, lathe, loft, moved, rounded_box, tube, turned
@@ -279,15 +279,15 @@ def _tube(p: Television, plastic: Material) -> list[Piece]:
 _STANDS = {"feet": _feet, "foot": _foot, "easel": _easel, "console": _console}
 
 
-def surfaces(parameters: Television) -> tuple[Surface, ...]:
+def surfaces(parameters: Television) -> tuple[LevelFace, ...]:
     """Return the free surfaces of the low cabinet's top, at both sides of the set; empty without a cabinet."""
     p = parameters
     if p.style != "console":
         return ()
     width, depth = p.console
     inner, outer, y = p.width / 2 + 0.01, width / 2 - 0.02, depth / 2 - 0.02
-    left = Surface("console_left", (inner, -y, outer, y), p.console_height)
-    return left, Surface("console_right", (-outer, -y, -inner, y), p.console_height)
+    left = LevelFace("console_left", (inner, -y, outer, y), p.console_height)
+    return left, LevelFace("console_right", (-outer, -y, -inner, y), p.console_height)
 
 
 def television_random(rng: np.random.Generator) -> Mesh:

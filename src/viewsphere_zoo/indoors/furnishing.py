@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.model.place import LevelFace
+from viewsphere_zoo import drawing_of
 from viewsphere_zoo import family as zoo_family
 from viewsphere_zoo.indoors.plan import SIDES, Room, Side
-from viewsphere_zoo.shapes.resting import Surface
 
 DRAWS = 400
 """Members of a family that are drawn until one is as it is wanted."""
@@ -74,7 +75,7 @@ class Stand:
         c, s = math.cos(math.radians(self.turn_deg)), math.sin(math.radians(self.turn_deg))
         return self.x + right * c + ahead * s, self.y + right * s - ahead * c
 
-    def surfaces(self) -> tuple[Surface, ...]:
+    def surfaces(self) -> tuple[LevelFace, ...]:
         """The level faces on which things stand, in the member's axes."""
         found = zoo_family(self.family).surfaces
         return () if found is None else found(self.parameters)
@@ -109,7 +110,7 @@ class Furnishing:
 
     def design(self, family: str, fits: Fits = lambda p: True) -> tuple[int, Any] | None:
         """A seed of the family and the parameters that it draws, which are as they are wanted; None where none is found."""
-        draw = zoo_family(family).draw
+        draw = drawing_of(family)
         for _ in range(DRAWS):
             seed = int(self.rng.integers(1 << 31))
             if fits(parameters := draw(np.random.default_rng(seed))):
@@ -207,7 +208,7 @@ class Furnishing:
                 for _ in range(count):
                     self._scatter(other, surface, families[int(self.rng.integers(len(families)))], gap)
 
-    def _scatter(self, other: Stand, surface: Surface, family: str, gap: float) -> None:
+    def _scatter(self, other: Stand, surface: LevelFace, family: str, gap: float) -> None:
         found = self.design(family, lambda p: extent(p)[2] < surface.clearance)
         if found is None:
             return

@@ -10,7 +10,7 @@ import numpy as np
 
 from viewsphere.errors import UserError
 from viewsphere.model.place import Place, PlacePiece, Surface, standing
-from viewsphere_zoo import family as zoo_family
+from viewsphere_zoo import drawing_of
 from viewsphere_zoo.families.interior import Interior
 from viewsphere_zoo.indoors.furnishing import Rectangle, Stand
 from viewsphere_zoo.indoors.habits import furnished
@@ -24,7 +24,7 @@ LEAST = 1.1
 
 def drawn(rng: np.random.Generator, wanted: Callable[[Interior], bool]) -> tuple[int, Interior]:
     """A seed of an interior that is as it is wanted, and its parameters."""
-    draw = zoo_family("interior").draw
+    draw = drawing_of("interior")
     while True:
         seed = int(rng.integers(1 << 31))
         if wanted(parameters := draw(np.random.default_rng(seed))):

@@ -12,7 +12,7 @@ import numpy as np
 from viewsphere.model.place import USUAL, Bay, Place, PlacePiece, Traffic, standing
 from viewsphere.model.scene import Matrix4
 from viewsphere.plugins.place import PlaceSpec
-from viewsphere_zoo import family as zoo_family
+from viewsphere_zoo import drawing_of
 from viewsphere_zoo.families import car, driveway, fence, hedge, house, street, tree
 from viewsphere_zoo.townscape import street_life
 from viewsphere_zoo.townscape.plan import HALF_LENGTH, ROAD, STEP
@@ -167,7 +167,7 @@ def _traffic(
 
 def _designs(rng: np.random.Generator, family: str, count: int, wanted: Callable[[Any], bool] = lambda p: True) -> list[int]:
     """Seeds of `count` members of a family whose parameters `wanted` accepts."""
-    draw = zoo_family(family).draw
+    draw = drawing_of(family)
     seeds: list[int] = []
     while len(seeds) < count:
         seed = int(rng.integers(1 << 31))

@@ -13,7 +13,7 @@ import numpy as np
 from viewsphere.model.place import USUAL, Bay, Lane, Place, PlacePiece, Traffic, standing
 from viewsphere.model.scene import Matrix4
 from viewsphere.plugins.place import PlaceSpec
-from viewsphere_zoo import family as zoo_family
+from viewsphere_zoo import drawing_of
 from viewsphere_zoo.families.town_ground import TownGround
 from viewsphere_zoo.townscape import blocks, street_life
 from viewsphere_zoo.townscape.blocks import CORNER, HALF, LANE, PAVED, Block
@@ -85,7 +85,7 @@ class _Town:
     def drawn(self, family: str, kind: str = "") -> tuple[int, Any]:
         """One of the town's members of a family, or of a kind of it: its seed and parameters."""
         if (family, kind) not in self.designs:
-            draw, found, fits = zoo_family(family).draw, list[tuple[int, Any]](), KINDS[kind]
+            draw, found, fits = drawing_of(family), list[tuple[int, Any]](), KINDS[kind]
             while len(found) < DESIGNS.get(family, 1):
                 seed = int(self.rng.integers(1 << 31))
                 if fits(parameters := draw(np.random.default_rng(seed))):
@@ -116,7 +116,7 @@ def town(seed: int = 0, traffic: Traffic = USUAL) -> Place:
     """The town of this seed; the roads are z = 0, the origin is on the middle of a road between two junctions."""
     rng = np.random.default_rng(seed)
     own = int(rng.integers(1 << 31))
-    ground: TownGround = zoo_family("town_ground").draw(np.random.default_rng(own))
+    ground: TownGround = drawing_of("town_ground")(np.random.default_rng(own))
     made = _Town(rng)
     made.put("town_ground", own, 0.0, 0.0, z=0.0)
     made.put("outskirts", own, *ground.middle, z=0.0)
@@ -236,7 +236,7 @@ def _traffic(t: _Town, traffic: Traffic, bays: Sequence[Bay], pavements: Sequenc
 
 def _crowns(t: _Town) -> list[street_life.Crown]:
     """The crowns of all trees."""
-    draw = zoo_family("tree").draw
+    draw = drawing_of("tree")
     known = {piece.seed: draw(np.random.default_rng(piece.seed)) for piece in t.pieces if piece.family == "tree"}
     trees = [(_spot(piece), known[piece.seed]) for piece in t.pieces if piece.family == "tree"]
     return [(x, y, p.crown / 2, p.clear + STEP) for (x, y), p in trees]
