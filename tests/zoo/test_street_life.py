@@ -128,8 +128,9 @@ def test_cars_and_people_keep_apart_and_stand_on_the_ground(name, seed):
         assert not meet(own, other), (p.name, q.name)
     for q in (p for p in place.pieces if p.family not in (*GROUND, "car", "person")):
         points = placed(q)
+        ends = points.min(axis=0) + points.max(axis=0)
         for p, own in traffic:
-            if np.hypot(*(own[0] + own[1] - points.min(axis=0) - points.max(axis=0))[:2]) < 40:
+            if np.hypot(*(own[0] + own[1] - ends)[:2]) < 40:
                 assert not reaches(points, q.family, own), (p.name, q.name)
     heights = {"car": 0.13 if name == "neighbourhood" else 0.0, "person": 0.1}
     for p, (low, _) in traffic:
