@@ -148,7 +148,7 @@ COMMANDS = {
     "(limit MAX_SIZE) across": "inspect here/huge.obj",
     "m across: set unit": "inspect here/wide.obj",
     "wider than long": "inspect here/wide.obj",
-    "zoo family": "inspect zoo:spaceship",
+    "family": "inspect zoo:spaceship",
     "axes at right angles": "inspect here/ok.obj --up +z --forward -z",
     "(store/plan.json)": "check folder",
     "expected an empty or new folder": "render r.yaml -o folder --workers 0",
