@@ -180,7 +180,7 @@ def test_a_camera_inside_at_any_time_step_is_found():
         ({"frames": [1, 49]}, "expected frames of 1 to 48, as "),
         ({"frames": {"first": 50}}, "found none of them"),
         ({"source": "still.fbx"}, "something moves; found no animation in "),
-        ({"source": "zoo:car"}, "models[0].frames: expected a file, or a family that moves, such as zoo:person; found zoo:car"),
+        ({"source": "zoo:car"}, "models[0].frames: expected a file, or a model that moves; found zoo:car"),
         ({"frames": None, "poses": "moving"}, "expected frames, for poses: moving; found none"),
         (
             {"frames": None, "clip": "a"},
