@@ -401,7 +401,7 @@ def test_recipes_keep_what_their_formats_read(tmp_path, kind):
 def test_the_command_line_makes_a_recipe_that_can_be_planned_and_shown(tmp_path):
     transforms(tmp_path / "scene")
     answer = viewsphere("new", "--from", "nerfstudio", tmp_path / "scene", cwd=tmp_path)
-    assert answer.returncode == 0 and "scene-again/recipe.yaml: 6 shots, a model of the zoo's" in answer.stdout
+    assert answer.returncode == 0 and "scene-again/recipe.yaml: 6 shots, a stand-in model" in answer.stdout
     recipe = tmp_path / "scene-again/recipe.yaml"
     assert json.loads(viewsphere("plan", recipe, "--json").stdout)["frames"] == 6
     assert viewsphere("preview", recipe, "-o", tmp_path / "sheet.png").returncode == 0
