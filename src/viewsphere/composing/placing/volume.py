@@ -72,7 +72,7 @@ def _extent(shapes: Sequence[Shape], rng: Draws, options: Options) -> tuple[Floa
     if options.size is not None:
         return np.array(drawn(options.size, draws_of(rng, "size"))), height
     volume = sum(math.prod(Box3d(shape.box).size) for shape in shapes) / ROOMY
-    longest = max(float(np.linalg.normBox3d(shape.box).diagonal) for shape in shapes)
+    longest = max(float(np.linalg.norm(Box3d(shape.box).diagonal)) for shape in shapes)
     return np.full(3, max(volume ** (1 / 3), 1.2 * longest)), height
 
 

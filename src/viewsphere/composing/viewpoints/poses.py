@@ -468,8 +468,8 @@ def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
             return GridPoses(viewpoints, seed)
         case _:
             raise RecipeError(
-                f"viewpoints.kind: expected grid, sphere, normal, jitter or file without time; found {viewpoints.kind}, which "
-                "needs time: set time: {frames: 50, fps: 25}"
+                "viewpoints.kind: expected grid, sphere, normal, jitter or file without time; found "
+                f"{viewpoints.model_dump()['kind']}, which needs time: set time: {{frames: 50, fps: 25}}"
             )
 
 

@@ -17,7 +17,16 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 
 from viewsphere.errors import PluginError
 from viewsphere.plugin_modules import entry_points, listed
@@ -38,6 +47,10 @@ class LensParameters(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     """The parameters of a lens besides its camera matrix K; each lens model has a class of its own."""
 
     model: str = Field(description="the lens model")
+
+    @model_serializer(mode="wrap")
+    def _with_model(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {"model": self.model, **handler(self)}  # also where defaults are left out
 
     @property
     def numbers(self) -> tuple[float, ...]:

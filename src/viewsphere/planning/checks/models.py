@@ -41,8 +41,8 @@ def check_redraws(recipe: Recipe) -> None:
         if getattr(recipe, name) is not None and not redraws_frames(recipe):
             raise RecipeError(
                 f"{name}: expected something to draw again, viewpoints of kind sphere, normal or jitter, scene.jitter or "
-                f"scene.company.draw: per_frame; found viewpoints of kind {recipe.viewpoints.kind} and nothing drawn for each "
-                "frame"
+                f"scene.company.draw: per_frame; found viewpoints of kind {recipe.viewpoints.model_dump()['kind']} and nothing "
+                "drawn for each frame"
             )
 
 

@@ -164,7 +164,7 @@ class ModelInfo:
     @staticmethod
     def from_plain(value: Mapping[str, Any]) -> ModelInfo:
         """The record that `to_plain` was asked of; raises LookupError, TypeError or ValueError for anything else."""
-        info = typed(_adapter(ModelInfo), value)
+        info = typed(_model_adapter(), value)
         for part in (info, *info.steps):
             names([part.key, *([part.track] if part.track else [])], "the key")
         return info
@@ -407,7 +407,7 @@ class PlanRecord:
         value = unsealed(text)
         del value["store"]
         value.pop("classes", None)  # for other readers: they follow from the categories
-        record = typed(_adapter(PlanRecord), value)
+        record = typed(_plan_adapter(), value)
         for number, part in enumerate(map(Part.checked, record.parts)):
             if any(not 0 <= other < number for other, _ in part.supplies):
                 raise ValueError("channels that were added to a part that was not there")
@@ -424,10 +424,14 @@ def _keeping(recipe: dict[str, Any], least: float | None) -> dict[str, Any]:
 Record = TypeVar("Record")
 
 
+@cache  # making both takes 10 ms, and planning needs none
+def _model_adapter() -> TypeAdapter[ModelInfo]:
+    return TypeAdapter(ModelInfo)
+
+
 @cache
-def _adapter(kind: type[Record]) -> TypeAdapter[Record]:
-    """The validator of a record: making those of models and plans takes 10 ms, and planning needs none."""
-    return TypeAdapter(kind)
+def _plan_adapter() -> TypeAdapter[PlanRecord]:
+    return TypeAdapter(PlanRecord)
 
 
 def typed(kind: TypeAdapter[Record], value: Any) -> Record:
