@@ -187,10 +187,12 @@ def object_labels() -> tuple[ObjectLabel, ...]:
     return tuple(label for label in labels().values() if isinstance(label, ObjectLabel))
 
 
-def labels_of(asked: Container[str]) -> tuple[ObjectLabel, ...]:
-    """The labels of objects that data sets have where these were asked for; imports no others."""
-    found = (_loadable(name) for name in label_names() if name in regular() or name in asked)
-    return tuple(label for label in found if isinstance(label, ObjectLabel) and (not label.on_request or label.name in asked))
+def labels_of(requested: Container[str]) -> tuple[ObjectLabel, ...]:
+    """The labels of objects in data sets with these requests; imports no others."""
+    found = (_loadable(name) for name in label_names() if name in regular() or name in requested)
+    return tuple(
+        label for label in found if isinstance(label, ObjectLabel) and (not label.on_request or label.name in requested)
+    )
 
 
 @cache
@@ -221,9 +223,9 @@ def sample_labels() -> Table[SampleLabel]:
     return Table(label_names, lambda name: label if isinstance(label := _loadable(name), SampleLabel) else None)
 
 
-def sample_labels_of(asked: Container[str]) -> tuple[SampleLabel, ...]:
+def sample_labels_of(requested: Container[str]) -> tuple[SampleLabel, ...]:
     """The labels of whole pictures that were asked for; imports no others."""
-    found = (_loadable(name) for name in label_names() if name in asked)
+    found = (_loadable(name) for name in label_names() if name in requested)
     return tuple(label for label in found if isinstance(label, SampleLabel))
 
 

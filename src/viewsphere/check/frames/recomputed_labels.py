@@ -51,7 +51,7 @@ class RecomputedLabels:
                 yield from ((name, problem) for problem in self._pixels(sample, name, self._computed(label, context)))
         objects = annotated(context)
         for o, again in zip(sample.objects, objects, strict=True):
-            yield from _fields(o, again, context.asked)
+            yield from _fields(o, again, context.requested)
         yield from _of_picture(sample.extra, sample_values(context, objects))
 
     def _computed(self, label: ChannelLabel, context: LabelContext) -> NDArray[Any] | None:

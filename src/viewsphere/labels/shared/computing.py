@@ -108,9 +108,9 @@ def annotated(context: LabelContext) -> tuple[ObjectAnnotation, ...]:
     """Annotations of the objects that are placed in a context, visible or not, in the order of their ids. An object that covers
     no pixel has an empty mask, no `box2d` and visibility 0.
     """
-    asked = labels_of(context.asked)
-    seen = [(label, context.read_by(label)) for label in asked if label.compute is not derived]
-    every = Makers(makers(), asked, context.asked, "this frame")
+    requested = labels_of(context.requested)
+    seen = [(label, context.read_by(label)) for label in requested if label.compute is not derived]
+    every = Makers(makers(), requested, context.requested, "this frame")
     return tuple(
         computed(i + 1, [label.compute(own, i) for label, own in seen], place, every)
         for i, place in enumerate(context.placements)
@@ -121,7 +121,7 @@ def annotated(context: LabelContext) -> tuple[ObjectAnnotation, ...]:
 def sample_values(context: LabelContext, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
     """The fields of the labels of whole pictures that were asked for; `objects` are `annotated(context)`."""
     found: dict[str, Any] = {}
-    for label in sample_labels_of(context.asked):
+    for label in sample_labels_of(context.requested):
         found |= label.compute(context.read_by(label), objects)
     return found
 

@@ -75,8 +75,8 @@ class LabelContext:
     """The inputs that the labels of a picture share: a camera's view of a geometry, seen as `rasterize(geometry, camera)`.
 
     `placements` belong to the objects 1, 2, ...; an absent object's is None; labels of pixels need no placements. `neighbours`
-    are the views that the picture is compared with; `asked` are the requested annotations; `options` are those of labels, by
-    their names. `label` is the one that reads the context, and gets no inputs but its `needs`; None: all inputs.
+    are views to compare the picture with; `requested` are names of annotations; `options` are those of labels, by their
+    names. `label` is the one that reads the context, and gets no inputs but its `needs`; None: all inputs.
     """
 
     geometry: Geometry
@@ -84,7 +84,7 @@ class LabelContext:
     visibility: Visibility
     placements: Sequence[Placement | None] = ()
     neighbours: NeighbourViews | None = None
-    asked: tuple[str, ...] = ()
+    requested: tuple[str, ...] = ()
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     label: LabelSpec | None = None
     _isolated: dict[int, IsolatedMask] = field(default_factory=dict[int, "IsolatedMask"], repr=False)

@@ -74,13 +74,13 @@ def short_record(o: ObjectAnnotation, labels: Iterable[ObjectLabel]) -> dict[str
 
 @dataclass(frozen=True)
 class Makers:
-    """The labels that short records are restored by: by the names of fields, and `labels`, those that were `asked` for among
+    """The labels that short records are restored by: by the names of fields, and `labels`, `wanted` ones among
     them.
     """
 
     of: Mapping[str, ObjectLabel]
     labels: Sequence[ObjectLabel]
-    asked: Container[str]
+    wanted: Container[str]
     where: str
 
     @cached_property
@@ -92,7 +92,7 @@ class Makers:
     def has(self, field: str) -> bool:
         """Return whether objects have a field, always or by request."""
         label = self.of[field]
-        return not label.on_request or label.name in self.asked
+        return not label.on_request or label.name in self.wanted
 
     def label(self, field: str) -> ObjectLabel | None:
         """The label that restores a field; None for an unknown field, or one that was not requested and does not follow."""

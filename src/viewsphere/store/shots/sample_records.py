@@ -45,20 +45,20 @@ Facts = Callable[[str, int | None], ModelFacts]
 def short_sample(sample: Sample) -> dict[str, Any]:
     """The short record of a sample whose shot is stored, too, as `json.dumps(..., allow_nan=False)` takes it."""
     labels = labels_of(sample.requested)
-    return {"index": sample.index, "objects": [short_record(o, labels) for o in sample.objects], **_plain_more(sample)}
+    return {"index": sample.index, "objects": [short_record(o, labels) for o in sample.objects], **_plain_extra(sample)}
 
 
-def _plain_more(sample: Sample) -> dict[str, Any]:
+def _plain_extra(sample: Sample) -> dict[str, Any]:
     """The fields of the labels of whole pictures as JSON; none without any."""
     if not sample.extra:
         return {}
     fields = {field.name: field for label in sample_labels().values() for field in label.fields}
-    return {"more": {name: fields[name].plain(value) for name, value in sample.extra.items()}}
+    return {"extra": {name: fields[name].plain(value) for name, value in sample.extra.items()}}
 
 
-def _more(asked: Sequence[str], plain: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields that `_plain_more` wrote, of the labels that were asked for."""
-    fields = (field for label in sample_labels_of(asked) for field in label.fields)
+def _extra(requested: Sequence[str], plain: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields that `_plain_extra` wrote, of the requested labels."""
+    fields = (field for label in sample_labels_of(requested) for field in label.fields)
     return {field.name: field.value(plain[field.name]) for field in fields}
 
 
@@ -84,9 +84,9 @@ def whole_sample(sample: Sample) -> dict[str, Any]:
         **({"source": dict(sample.source)} if sample.source is not None else {}),
         "objects": [whole_record(o, labels) for o in sample.objects],
         "files": dict(sample.files),
-        **({"asked": list(sample.requested)} if sample.requested else {}),
+        **({"requested": list(sample.requested)} if sample.requested else {}),
         **({"options": {name: dict(of) for name, of in sample.options.items()}} if sample.options else {}),
-        **_plain_more(sample),
+        **_plain_extra(sample),
     }
 
 
@@ -106,9 +106,9 @@ class _Picture:
     time: float = 0.0
     size: tuple[PositiveInt, PositiveInt] | None = None
     source: dict[str, Any] | None = None
-    asked: tuple[str, ...] = ()
+    requested: tuple[str, ...] = ()
     options: dict[str, dict[str, JsonValue]] = field(default_factory=dict[str, dict[str, JsonValue]])
-    more: dict[str, Any] = field(default_factory=dict[str, Any])
+    extra: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 _PICTURE = TypeAdapter(_Picture)
@@ -138,8 +138,8 @@ def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapp
         sensor=picture.sensor,
         instant=picture.instant,
         time=picture.time,
-        requested=picture.asked,
-        extra=_more(picture.asked, picture.more),
+        requested=picture.requested,
+        extra=_extra(picture.requested, picture.extra),
         options=picture.options,
     )
 
@@ -198,7 +198,7 @@ class ShotRecords:
             time=now.seconds,
             origin=Origin(instant, sensor, None, self.root, self.shot.key),
             requested=self.shot.annotations,
-            extra=_more(self.shot.annotations, record.get("more", {})),
+            extra=_extra(self.shot.annotations, record.get("extra", {})),
             options=self.shot.labels,
         )
 
