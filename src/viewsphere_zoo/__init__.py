@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 ZOO = "zoo:"
 
 ANY = "any"
-"""Stands for every family whose members are things."""
+"""Stands for every shipped family whose members are things."""
 
 
 def family(name: str) -> ZooFamily:
@@ -61,8 +61,10 @@ def home(name: str) -> str:
 
 
 def things() -> tuple[str, ...]:
-    """Names of the families that are things, not parts of places, sorted; all families are imported."""
-    return tuple(name for name in family_names() if home(name) != "place")
+    """Names of the shipped families that are things, not parts of places, sorted; all of them are imported. Families of other
+    packages are left out: installing one does not change what a recipe draws.
+    """
+    return tuple(sorted(name for name in plugins.shipped("families") if home(name) != "place"))
 
 
 def family_names() -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import os
 import platform
 import re
 import sys
+from collections import ChainMap
 from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
@@ -77,7 +78,7 @@ def examine() -> dict[str, Any]:
 def _downloads() -> Mapping[str, Download]:
     from viewsphere.plugins.source import sources
 
-    return {name: download for spec in sources().values() for name, download in spec.downloads.items()}
+    return dict(ChainMap(*(dict(spec.downloads) for spec in sources().values())))  # the first of a name counts
 
 
 def _set_up_blender() -> None:

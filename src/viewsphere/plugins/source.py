@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, InstanceOf
 
-from viewsphere.errors import UserError
+from viewsphere.errors import PluginError, UserError
 from viewsphere.model.credit import Credit
 from viewsphere.model.fields.validation_errors import nearest
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
-from viewsphere.plugins.registry import Kind, load, names, prefix_of
+from viewsphere.plugins.registry import Kind, is_third_party, load, loadable, names, prefix_of
 from viewsphere.plugins.spec import Spec
 
 Role = Literal["example", "table", "box"]
@@ -107,18 +107,41 @@ def place_of(text: str) -> PlaceSpec | None:
 
 
 def place_names() -> tuple[str, ...]:
-    """All places of all sources, such as `zoo:town`, sorted."""
-    return tuple(f"{prefix}:{name}" for prefix, spec in sources().items() for name in spec.places())
+    """All places of all sources, such as `zoo:town`: shipped sources first."""
+    return tuple(f"{prefix}:{name}" for prefix, spec in sources().items() for name in _asked(prefix, (), spec.places))
 
 
 def with_roads() -> str:
-    """The places of all sources that have roads, in words, for messages; `a file` where there are none."""
-    return " or ".join(name for name in place_names() if (place := place_of(name)) is not None and place.roads) or "a file"
+    """The places of all sources that have roads, in words, for messages; `a file` where there are none. A place that cannot be
+    loaded is left out: the message is about another mistake.
+    """
+    places = ((name, _asked(prefix_of(name), None, place_of, name)) for name in place_names())
+    return " or ".join(name for name, place in places if place is not None and place.roads) or "a file"
 
 
 def model_names() -> tuple[str, ...]:
-    """All models of all sources, such as `zoo:car`, sorted."""
-    return tuple(f"{prefix}:{name}" for prefix, spec in sources().items() for name in spec.names())
+    """All models of all sources, such as `zoo:car`: shipped sources first."""
+    return tuple(f"{prefix}:{name}" for prefix, spec in sources().items() for name in _asked(prefix, (), spec.names))
+
+
+def families_named(name: str) -> Iterator[ZooFamily]:
+    """The families of this name in all sources, shipped sources first, without those that cannot be loaded."""
+    found = (_asked(prefix, None, spec.family, name) for prefix, spec in sources().items())
+    return (family for family in found if family is not None)
+
+
+def _asked(prefix: str, otherwise: Any, ask: Callable[..., Any], *about: str) -> Any:
+    """What a source answers about everything it has; `otherwise` where a plug-in of a third party fails, as that is an error
+    only for those that name it.
+    """
+    try:
+        return ask(*about)
+    except PluginError:  # in the family or place that a shipped source loads
+        return otherwise
+    except Exception:
+        if not is_third_party("sources", prefix):
+            raise
+        return otherwise
 
 
 def family_of(text: str) -> ZooFamily | None:
@@ -128,8 +151,10 @@ def family_of(text: str) -> ZooFamily | None:
 
 
 def sources() -> Mapping[str, SourceSpec]:
-    """All sources by prefix; raises PluginError for one that cannot be loaded."""
-    return {prefix: load(SourceSpec, prefix) for prefix in names("sources")}
+    """All sources by prefix, without third-party ones that cannot be loaded. Those that come with viewsphere are first, so that
+    another's does not stand in for them.
+    """
+    return dict(sorted(loadable(SourceSpec).items(), key=lambda found: is_third_party("sources", found[0])))
 
 
 def model_for(role: Role) -> str:

@@ -97,7 +97,7 @@ class ModelEntry(OmitNone):
     ] = Field(
         min_length=1,
         description="a file, a pattern such as cars/*.obj, a folder, zoo:<family>, or a list of these. zoo:any draws "
-        "among all families of things. Paths are relative to the recipe",
+        "among all shipped families of things. Paths are relative to the recipe",
     )
     category: str = Field(
         default="",

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from viewsphere.model.annotations.classes import SCENERY, STUFF_IDS
-from viewsphere.plugins.source import sources
+from viewsphere.plugins.source import families_named
 
 
 def stuff_of(category: str, parts: Sequence[str]) -> list[int]:
@@ -15,8 +15,7 @@ def stuff_of(category: str, parts: Sequence[str]) -> list[int]:
     A family of models with the category's name states the classes of its parts. Elsewhere names decide: of a part, else of its
     category, without numbers at their end and what comes before a slash: Road.001 is road. Else it is scenery.
     """
-    families = (source.family(category.replace(" ", "_")) for source in sources().values())
-    family = next((each for each in families if each is not None), None)
+    family = next(families_named(category.replace(" ", "_")), None)
     if family is not None:
         return [STUFF_IDS[family.classes.get(part, family.classes[""])] for part in parts]
     return [next((STUFF_IDS[name] for name in map(_plain, (part, category)) if name in STUFF_IDS), SCENERY) for part in parts]
