@@ -10,6 +10,7 @@ import pytest
 
 import viewsphere_zoo as zoo
 from deadline import DEADLINE
+from installed import installed
 from quick import quick
 from viewsphere import cli, plugins
 from viewsphere.cli import completion
@@ -69,6 +70,12 @@ def offered(*words, cwd=None):
 )
 def test_what_is_offered(words, expected):
     assert [line for line in offered(*words) if line] == expected
+
+
+@pytest.mark.parametrize("code", ["1 / 0", "def names():\n    raise OSError", "names = None"])
+def test_a_source_whose_names_cannot_be_listed_hides_no_other(code, tmp_path):
+    with installed(tmp_path, "source_names", "names", code):
+        assert offered("inspect", "z") == ZOO
 
 
 def test_models_are_offered_beside_the_zoo(tmp_path):

@@ -30,10 +30,12 @@ from viewsphere.assets.sandbox.client import READ_HERE
 from viewsphere.check import check
 from viewsphere.errors import ModelError, PluginError, RecipeError, UserError
 from viewsphere.formats import coco
+from viewsphere.labels import LabelSpec
 from viewsphere.planning.models import model_specs
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.exports.exporting import export
 from viewsphere.run.exports.writable import writable_formats
+from viewsphere.run.reports import plugin_list
 from viewsphere.run.reports.format_list import listed
 from viewsphere.run.reports.plugin_list import overview
 from viewsphere.store.shots.sample_records import from_whole_sample, whole_sample
@@ -466,6 +468,49 @@ def test_a_package_of_plug_ins_is_listed_and_one_that_is_broken_breaks_nothing_e
     assert zoo.build("peg", np.random.default_rng(0)).parts == ("foot", "stem")
     with pytest.raises(PluginError, match="bad_families cannot be imported: ZeroDivisionError"):
         zoo.family("bad_families")
+
+
+def write_packages(site: Path, package: str, entries: str, **modules: str) -> None:
+    """Write a distribution with these modules, named by entry points of the group of packages."""
+    folder = write_package(site, package, {("packages", name): code for name, code in modules.items()})
+    entry = folder.parent / f"{package}-1.0.dist-info" / "entry_points.txt"
+    entry.write_text(f"[viewsphere.packages]\n{entries}\n")
+
+
+@pytest.mark.parametrize(
+    ("code", "error"),
+    [
+        ("LABELS = (\n  oops oops", "plug-in lab cannot be imported: SyntaxError"),
+        ("LABELS = make()", "plug-in lab cannot be imported: NameError"),
+        ("def make():\n    return ()\n\n\nLABELS = make()", "LABELS: expected a tuple of calls, each with its name as text"),
+        ("TEXT = '''\nLABELS = (oops oops)\n'''", "LABELS: cannot be read: "),
+    ],
+)
+def test_labels_of_a_package_whose_names_cannot_be_read_break_nothing_else(code, error, tmp_path, monkeypatch):
+    package = f"odd_labels_{len(code)}"
+    write_packages(tmp_path, package, f"labels = {package}", lab=code)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert {"lab", "depth"} < set(plugins.names("labels"))
+    assert plan(small_recipe()).frames
+    with pytest.raises(PluginError, match=f"^{re.escape(str(tmp_path / package / 'lab.py'))}: {error}"):
+        plugins.load(LabelSpec, "lab")
+
+
+def test_several_labels_are_one_file_of_a_package(tmp_path, monkeypatch):
+    write_packages(tmp_path, "edge_labels", "labels = edge_labels", edges=EDGES)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert {plugins.load(LabelSpec, name).name for name in TWINS.split()} == set(TWINS.split())
+
+
+def test_a_package_of_a_kind_that_there_is_not_is_listed_with_the_one_that_was_meant(tmp_path, monkeypatch):
+    write_packages(tmp_path, "odd_kinds", "family = odd_kinds")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(plugin_list, "names", lambda _kind: ())
+    (found,) = overview()
+    assert (found.kind, found.name, found.distribution) == ("viewsphere.packages", "odd_kinds", "odd_kinds 1.0")
+    assert found.error.startswith(
+        "viewsphere.packages: 'family' is unknown; did you mean 'families'? Valid: engines, families,"
+    )
 
 
 @pytest.mark.slow

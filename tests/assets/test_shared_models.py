@@ -13,17 +13,23 @@ from quick import quick
 from viewsphere.assets.exporting.export import export_glb, export_obj
 from viewsphere.assets.load import load_model
 from viewsphere.assets.normalise import normalise
-from viewsphere.assets.readers import suffixes
+from viewsphere.assets.readers import readers
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 
 MODELS = Path(__file__).parents[3] / "shared" / "models"
 FOLDERS = ("car", "chair", "bicycle", "boat", "hair_drier", "misc", "scene", "awkward")
+READ_ALONE = {  # by a reader that needs no other package, nor Blender
+    suffix
+    for reader in readers().values()
+    if not (reader.packages or reader.by_blender or reader.is_picture)
+    for suffix in reader.suffixes
+}
 FILES = sorted(
     path.relative_to(MODELS).as_posix()
     for folder in FOLDERS
     for path in (MODELS / folder).rglob("*")
-    if path.suffix[1:].lower() in suffixes(by_blender=False)
+    if path.suffix[1:].lower() in READ_ALONE
 )
 LARGE = {"scene/street_assembled.glb", "awkward/1500_instances_unicode_names.glb"}
 NO_NUMBERS = "awkward/number_formats.obj"  # not all of its words are numbers

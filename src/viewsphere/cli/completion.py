@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, MutableMapping
 from contextlib import redirect_stdout
+from importlib.metadata import EntryPoint
 from io import StringIO
 from pathlib import Path
 
@@ -21,9 +22,17 @@ def models(incomplete: str) -> list[str]:
     prefixes = [f"{prefix}:" for prefix in plugins.names("sources")]
     if not any(prefix.startswith(incomplete[: len(prefix)]) for prefix in prefixes):
         return []
-    listed = (f"{e.name}:{name}" for e in plugins.entry_points("viewsphere.source_names") for name in e.load()())
+    listed = (f"{entry.name}:{name}" for entry in plugins.entry_points("viewsphere.source_names") for name in _names(entry))
     here = () if incomplete.startswith(tuple(prefixes)) else Path().glob(f"{incomplete}[!.]*")
     return [*listed, *sorted(f"{p}/" if p.is_dir() else str(p) for p in here)]
+
+
+def _names(entry: EntryPoint) -> list[str]:
+    """The names that a source's entry point lists; none where it cannot: a traceback in the middle of a line helps nobody."""
+    try:
+        return list(entry.load()())
+    except Exception:
+        return []
 
 
 def formats(incomplete: str) -> list[str]:

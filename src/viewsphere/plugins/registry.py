@@ -141,14 +141,15 @@ def module_file(kind: Kind, name: str) -> Path | None:
 
 
 class _Found(NamedTuple):
-    """A plug-in's module, the object in it that an entry point names (empty: the module), and the distribution of the entry
-    point (None: the plug-in is built in).
+    """A plug-in's module, the object in it that an entry point names (empty: the module), the distribution of the entry point
+    (None: the plug-in is built in), and why its names cannot be read in its text (empty: they can).
     """
 
     module: str
     attribute: str = ""
     distribution: metadata.Distribution | None = None
     is_third_party: bool = False
+    fault: str = ""
 
 
 def shipped(kind: Kind) -> Mapping[str, str]:
@@ -185,8 +186,7 @@ def _table(installed: Changes, kind: Kind, packages: tuple[tuple[_Found, Changes
     """
     found: dict[str, _Found] = {}
     for package, folders in packages:
-        held = _plugins_in(folders, package.module, SEAMS[kind]) if folders else {package.module: package.module}
-        found |= {name: package._replace(module=module) for name, module in held.items()}
+        found |= _plugins_in(folders, package, SEAMS[kind]) if folders else {package.module: package}
     return found | {entry.name: _entered(entry) for entry in of_group(installed, f"viewsphere.{kind}")}
 
 
@@ -200,7 +200,10 @@ def _module_of(kind: Kind, name: str) -> Any:
     found = _found(kind).get(name)
     if found is None:
         raise _unknown(SEAMS[kind].constant.lower(), name, names(kind))
-    return _imported(found, name)
+    module = _imported(found, name)
+    if found.fault:  # after the import, whose own error says more
+        raise PluginError(found.fault)
+    return module
 
 
 def _imported(found: _Found, name: str) -> Any:
@@ -251,7 +254,7 @@ def _one_of_several(spec: type[S], where: str, held: Any, module: str, name: str
     specs = {vars(each)["name"]: each for each in held}
     entries = entry_points(group=f"viewsphere.{spec.KIND}")
     named = {entry.name for entry in entries if entry.module == module} or {
-        each for each, home in shipped(spec.KIND).items() if home == module
+        each for each, home in _found(spec.KIND).items() if home.module == module
     }
     if len(specs) < len(held) or specs.keys() != named:
         raise PluginError(
@@ -276,13 +279,23 @@ def attribute(path: str) -> Any:
     return getattr(importlib.import_module(f"viewsphere.{module}"), name)
 
 
-def _plugins_in(paths: Changes, package: str, seam: Seam) -> Mapping[str, str]:
-    """The modules in a package's folders by the names of the plug-ins that they hold."""
-    homes: dict[str, str] = {}
+def _plugins_in(paths: Changes, package: _Found, seam: Seam) -> dict[str, _Found]:
+    """The modules in a package's folders by the names of the plug-ins that they hold. A third party's module whose names cannot
+    be read stands for itself: loading it says why.
+    """
+    homes: dict[str, _Found] = {}
     for module in pkgutil.iter_modules([path for path, _ in paths]):
-        if not module.name.startswith("_") and module.name != "shared":
+        if module.name.startswith("_") or module.name == "shared":
+            continue
+        held, fault = None, ""
+        try:
             held = _names_in_text(module, seam.several) if seam.several else None
-            homes |= dict.fromkeys(held or (module.name,), f"{package}.{module.name}")
+        except PluginError as error:
+            if not package.is_third_party:
+                raise
+            fault = str(error)
+        home = package._replace(module=f"{package.module}.{module.name}", fault=fault)
+        homes |= dict.fromkeys(held or (module.name,), home)
     return homes
 
 
@@ -301,7 +314,10 @@ def _names_in_text(module: pkgutil.ModuleInfo, constant: str) -> tuple[str, ...]
         return None
     import ast
 
-    statement: Any = ast.parse(text[start.start() :]).body[0]
+    try:
+        statement: Any = ast.parse(text[start.start() :]).body[0]
+    except (SyntaxError, ValueError) as error:
+        raise PluginError(f"{found.origin}: {constant}: cannot be read: {error}") from error
     elements = getattr(statement.value, "elts", ())
     names = [name for each in elements if (name := _literal_name(each)) is not None]
     if not names or len(names) < len(elements):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from viewsphere.errors import UserError
 from viewsphere.labels import LabelSpec
+from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.format import FormatSpec
@@ -16,7 +18,7 @@ from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.plugins.reader import ReaderSpec
-from viewsphere.plugins.registry import SEAMS, Kind, load, names, origin
+from viewsphere.plugins.registry import PACKAGES, SEAMS, Kind, entry_points, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.source import SourceSpec
 from viewsphere.plugins.spec import Spec
@@ -43,17 +45,27 @@ SPECS: tuple[type[Spec | LensSpec], ...] = (
 
 @dataclass(frozen=True)
 class Installed:
-    """A plug-in, the distribution that it comes from, with its version, and why it cannot be loaded (None: it can)."""
+    """A plug-in, the distribution that it comes from, with its version, and why it cannot be loaded (None: it can). Of a
+    package of no kind, `kind` is the group of its entry point.
+    """
 
-    kind: Kind
+    kind: str
     name: str
     distribution: str
     error: str | None
 
 
 def overview() -> tuple[Installed, ...]:
-    """Return all plug-ins, by kind and name; each is loaded."""
-    return tuple(Installed(kind, name, origin(kind, name), _error(kind, name)) for kind in SEAMS for name in names(kind))
+    """Return all plug-ins, by kind and name; each is loaded. Packages of a kind that there is not follow."""
+    found = [Installed(kind, name, origin(kind, name), _error(kind, name)) for kind in SEAMS for name in names(kind)]
+    return (*found, *_packages_of_no_kind())
+
+
+def _packages_of_no_kind() -> Iterator[Installed]:
+    for entry in entry_points(PACKAGES):
+        if entry.name not in SEAMS:
+            distribution = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
+            yield Installed(PACKAGES, entry.value, distribution, f"{PACKAGES}: {one_of(entry.name, sorted(SEAMS))}")
 
 
 def _error(kind: Kind, name: str) -> str | None:
