@@ -67,9 +67,21 @@ def test_a_data_set_of_a_lens_that_is_not_installed_is_an_error_that_names_it():
 @pytest.mark.parametrize(
     "wrong, told",
     [
-        ("rays=rays, project=project", "LensSpec.parameters: field required"),
-        ("parameters=Division, rays=rays, project=project, is_liner=True", "LensSpec.is_liner: extra"),
-        ("parameters=Division, rays=3, project=project", "LensSpec.rays: input should be callable"),
+        ("rays=rays, project=project", "LensSpec.parameters: expected a value; found nothing"),
+        (
+            "parameters=Division, rays=rays, project=project, is_liner=True",
+            r"LensSpec.is_liner: 'is_liner' is unknown; did you mean 'is_linear'\?",
+        ),
+        ("parameters=Division, rays=3, project=project", "LensSpec.rays: expected a function; found 3"),
+        (
+            "parameters=Division, ray=rays",
+            "LensSpec.ray: 'ray' is unknown; did you mean 'rays'.*\n.*LensSpec.project: expected a value; found nothing$",
+        ),
+        ("parameters=Division, rays=lambda a: a, project=project", "LensSpec.rays: expected a function of 2 values; found"),
+        (
+            "parameters=Division, rays=rays, project=project, bounds=rays",
+            "LensSpec.bounds: expected a function of 6 values; found rays",
+        ),
     ],
 )
 def test_a_spec_that_is_not_valid_is_an_error_that_names_file_and_field(tmp_path, wrong, told):

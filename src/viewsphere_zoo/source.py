@@ -7,11 +7,11 @@ from collections.abc import Callable
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.model.credit import Credit
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.source import Download, SourceSpec
+from viewsphere.validation.errors import one_of
 from viewsphere_zoo import ANY, build_zoo_model, family, family_names, things
 
 CREDIT = Credit(licence="Apache-2.0", attribution="The viewsphere contributors")

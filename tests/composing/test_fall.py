@@ -16,12 +16,12 @@ from viewsphere.composing.placing import Room, Shape, footprint
 from viewsphere.composing.seeds import generator
 from viewsphere.errors import RecipeError, StoreError
 from viewsphere.geometry.box3d import Box3d
-from viewsphere.model.fields.validation_errors import read_options
 from viewsphere.model.scene import IDENTITY
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.run.generate import generate
 from viewsphere.store import Simulated
+from viewsphere.validation.errors import read_options
 from viewsphere_zoo.families.open_box import boards
 
 

@@ -3,9 +3,9 @@
 import pytest
 
 from viewsphere.errors import MOST_TOLD
-from viewsphere.model.fields import validation_errors as mistakes
-from viewsphere.model.fields.suggestions import suggestion
-from viewsphere.model.fields.validation_errors import Nearest, nearest
+from viewsphere.validation import errors as mistakes
+from viewsphere.validation.errors import Nearest, nearest
+from viewsphere.validation.suggestions import suggestion
 
 
 def test_as_many_names_are_compared_as_are_shown(monkeypatch: pytest.MonkeyPatch):

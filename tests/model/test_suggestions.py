@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from viewsphere.model.fields.suggestions import OPPOSITES, edits, suggestion
-from viewsphere.model.fields.validation_errors import one_of
+from viewsphere.validation.errors import one_of
+from viewsphere.validation.suggestions import OPPOSITES, edits, suggestion
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 FORMATS = ("bop", "coco", "csv", "hdf5", "kitti", "nuscenes", "voc", "yolo")

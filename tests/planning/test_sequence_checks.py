@@ -3,9 +3,9 @@
 import pytest
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import Marks, Place
 from viewsphere.planning.plan import plan
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.validation.errors import Marks, Place
 
 RECIPE = """\
 models: [{{source: zoo:car, count: 2, motion: {motion}}}]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import ValidationError
 
 from viewsphere.errors import ViewsphereError
-from viewsphere.model.fields.validation_errors import first_of
+from viewsphere.validation.errors import first_of
 
 _BY_DATA = (
     *(ViewsphereError, OSError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError),

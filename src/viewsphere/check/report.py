@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from viewsphere.model.fields.quantity import quantity
+from viewsphere.validation.quantity import quantity
 
 
 @dataclass(frozen=True)

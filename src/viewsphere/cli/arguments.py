@@ -138,9 +138,9 @@ def asked_formats(formats: str | None, option: str = "--format") -> tuple[str, .
 
 def with_options(names: Sequence[str], options: Sequence[str] | None) -> tuple[FormatEntry, ...]:
     """The formats of these names with the options that are set for them; RecipeError names what cannot be set."""
-    from viewsphere.model.fields.validation_errors import one_of
     from viewsphere.recipe.formats import FormatEntry
     from viewsphere.recipe.reading.extends import parse_change
+    from viewsphere.validation.errors import one_of
 
     entries = {name: FormatEntry(name=name) for name in names}
     for text in options or ():

@@ -46,7 +46,7 @@ def doctor(
     if setup_blender:
         _set_up_blender()
     for name in setup or ():
-        from viewsphere.model.fields.validation_errors import one_of
+        from viewsphere.validation.errors import one_of
 
         downloads = _downloads()
         if name not in downloads:

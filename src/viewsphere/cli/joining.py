@@ -12,8 +12,8 @@ from viewsphere.cli import completion
 from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, Workers, asked_formats, at, with_options
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json, say
 from viewsphere.errors import UserError
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.run.workers.worker_count import cores
+from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.recipe.formats import FormatEntry

@@ -37,10 +37,10 @@ from viewsphere.cli.terminal import (
 )
 from viewsphere.errors import StoreError, UserError
 from viewsphere.kernels.garbage import importing
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.recipe.starts import FIRST, FoundFiles, kinds, start, with_models
 from viewsphere.run.workers.worker_count import cores
 from viewsphere.scratch import write_whole
+from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.planning.plan import Plan
@@ -98,7 +98,7 @@ def _new_again(format_: str, source: Path, folder: Path | None) -> None:
 
 def _new_start(folder: Path, kind: str) -> None:
     if kind not in kinds():
-        from viewsphere.model.fields.validation_errors import one_of
+        from viewsphere.validation.errors import one_of
 
         raise UserError(f"--kind: {one_of(kind, kinds())}")
     file = folder if folder.suffix in {".yaml", ".yml"} else folder / "recipe.yaml"

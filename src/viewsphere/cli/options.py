@@ -26,7 +26,7 @@ def said(error: Any) -> str:
     """Return the message of an error, with a hint to the help of its command."""
     from pydantic import ValidationError
 
-    from viewsphere.model.fields.validation_errors import first_of, nearest
+    from viewsphere.validation.errors import first_of, nearest
 
     context: Any = error.ctx
     name = "" if context is None or context.parent is None else context.info_name

@@ -17,9 +17,9 @@ import typer
 
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.kernels.garbage import importing
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.printable import printable
 from viewsphere.scratch import write_whole
+from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.check import Report

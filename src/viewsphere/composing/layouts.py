@@ -19,7 +19,6 @@ from viewsphere.composing.scene.scenery import composed
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import random_rotation, rigid, rotation_about
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.thing import TimeStep
@@ -27,6 +26,7 @@ from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.recipe.world.layout import Layout, options_of, placer_of
 from viewsphere.recipe.world.scenery import CompanyEntry
 from viewsphere.recipe.world.scenes import ScenesEntry
+from viewsphere.validation.errors import one_of
 
 NEEDS = ("trimesh", "networkx", "scipy")
 """Packages of the extra physics."""

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from viewsphere.model.fields.frozen import Frozen
-from viewsphere.model.fields.validation_errors import shown
+from viewsphere.validation.errors import shown
 
 LONGEST_CREDIT = 1000
 """Characters of a licence, of an attribution, or of a URL."""

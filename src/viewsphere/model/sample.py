@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from viewsphere.errors import NotKeptError, StoreError
 from viewsphere.model.channel import picture_of
 from viewsphere.model.fields.notebook import Shown
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import Size
 from viewsphere.model.sensors.camera import Camera
 from viewsphere.model.sensors.rig import CAMERA
 from viewsphere.model.shot import Shot
+from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.model.annotations.point_cloud import Axes, PointCloud, Surface

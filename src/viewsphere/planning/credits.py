@@ -13,10 +13,10 @@ from viewsphere.assets.paths.inside import split_source
 from viewsphere.composing.tables import Cells, table_rows
 from viewsphere.errors import RecipeError
 from viewsphere.model.credit import Credit
-from viewsphere.model.fields.quantity import first_few, quantity
-from viewsphere.model.fields.validation_errors import report, shown
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.plugins.source import Named, source_of
+from viewsphere.validation.errors import report, shown
+from viewsphere.validation.quantity import first_few, quantity
 
 TABLE = "credits.csv"
 """Name of the table in a folder of models: its column `file` has names of files, and patterns, of which the first counts."""

@@ -29,7 +29,6 @@ from viewsphere.composing.viewpoints.pose_numbers import (
     numbered,
 )
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shard import ALL, Shard
@@ -38,6 +37,7 @@ from viewsphere.model.thing import TimeStep
 from viewsphere.planning.fitting import check_fit, settings
 from viewsphere.planning.plan import Plan
 from viewsphere.store import Block, Category, Part, PlanRecord, Row
+from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.store import Store

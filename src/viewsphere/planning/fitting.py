@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from pydantic import JsonValue
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.planning.engine_digest import engine_digest, script_digest
 from viewsphere.planning.plan import Plan
 from viewsphere.recipe.recipe import Splits
 from viewsphere.recipe.variations import PAIRED
 from viewsphere.store import Part, PlanRecord
+from viewsphere.validation.errors import shown
 
 FITTING = "appended frames have to fit those that are there; choose another output folder for others"
 

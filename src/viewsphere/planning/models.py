@@ -24,13 +24,13 @@ from viewsphere.composing.tables import Cells, table_rows
 from viewsphere.errors import ModelError, RecipeError, UserError, each
 from viewsphere.limits import limits
 from viewsphere.model.fields.file_names import is_reserved
-from viewsphere.model.fields.validation_errors import Nearest
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.plugins.source import Named, model_for, source_of, suggested
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import Category
+from viewsphere.validation.errors import Nearest
 
 LONGEST_KEY = 150
 """Bytes; names of files and of folders that are being written add up to some hundred more."""

@@ -14,7 +14,6 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.labels import Partner, label_named, requires
 from viewsphere.model.channel import PASSES
-from viewsphere.model.fields.validation_errors import one_of, told_of
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.lidar import LIDAR, Lidar
@@ -23,6 +22,7 @@ from viewsphere.planning.rig_files import Calibrated, read_rig
 from viewsphere.recipe.cameras.rig import RigFile, SensorEntry, SensorList, StereoRig, SurroundRig
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.scene import CameraEntry
+from viewsphere.validation.errors import one_of, told_of
 
 Float = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ from pydantic import Field, InstanceOf, field_validator, model_validator
 from viewsphere.errors import PluginError
 from viewsphere.model.annotations.classes import STUFF_IDS
 from viewsphere.model.annotations.keypoints import At
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import Size
 from viewsphere.model.place import LevelFace
 from viewsphere.plugins.registry import Kind
 from viewsphere.plugins.spec import Spec
+from viewsphere.validation.errors import one_of
 
 Home = Literal["table", "floor", "street", "garden", "water", "place"]
 """Usual surroundings of a family; `place`: the ground or building of a place, not a thing in it."""

@@ -9,7 +9,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from viewsphere.plugins.registry import Kind
-from viewsphere.plugins.spec import SpecWithOptions, Takes
+from viewsphere.plugins.spec import SpecWithOptions
+from viewsphere.validation.specs import Takes
 
 Remark = tuple[int | None, str]
 """A fault of an export: the number of its frame in the plan (None: of the whole export), and what is wrong."""

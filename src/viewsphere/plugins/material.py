@@ -8,7 +8,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from viewsphere.plugins.registry import Kind
-from viewsphere.plugins.spec import Spec, Takes
+from viewsphere.plugins.spec import Spec
+from viewsphere.validation.specs import Takes
 
 
 class MaterialSpec(Spec):

@@ -9,7 +9,8 @@ from pydantic import Field
 
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.plugins.registry import Kind
-from viewsphere.plugins.spec import Spec, Takes
+from viewsphere.plugins.spec import Spec
+from viewsphere.validation.specs import Takes
 
 
 class MotionSpec(Spec):

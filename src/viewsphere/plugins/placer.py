@@ -9,7 +9,8 @@ from pydantic import Field
 
 from viewsphere.model.scene import Matrix4
 from viewsphere.plugins.registry import Kind
-from viewsphere.plugins.spec import SpecWithOptions, Takes
+from viewsphere.plugins.spec import SpecWithOptions
+from viewsphere.validation.specs import Takes
 
 
 class PlacerSpec(SpecWithOptions):

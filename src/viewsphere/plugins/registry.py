@@ -224,7 +224,7 @@ def _imported(found: _Found, name: str) -> Any:
 
 def _spec(spec: type[S], found: Any, name: str) -> S:
     """The spec in a plug-in's module; raises PluginError where there is none."""
-    from viewsphere.model.fields.validation_errors import nearest, shown
+    from viewsphere.validation.errors import nearest, shown
 
     if isinstance(found, spec):
         return found
@@ -246,7 +246,7 @@ def _spec(spec: type[S], found: Any, name: str) -> S:
 
 def _one_of_several(spec: type[S], where: str, held: Any, module: str, name: str) -> S:
     """The spec of this name among those of a module; raises PluginError where listing does not name all of them."""
-    from viewsphere.model.fields.validation_errors import shown
+    from viewsphere.validation.errors import shown
 
     for i, each in enumerate(held if isinstance(held, tuple) else (held,)):
         if not isinstance(held, tuple) or not isinstance(each, spec):
@@ -338,6 +338,6 @@ def _literal_name(call: object) -> str | None:
 
 
 def _unknown(what: str, name: str, known: tuple[str, ...]) -> UserError:
-    from viewsphere.model.fields.validation_errors import one_of
+    from viewsphere.validation.errors import one_of
 
     return UserError(f"{what}: {one_of(name, known)}")

@@ -14,12 +14,12 @@ from pydantic import Field, InstanceOf
 
 from viewsphere.errors import PluginError, UserError
 from viewsphere.model.credit import Credit
-from viewsphere.model.fields.validation_errors import nearest
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.registry import Kind, is_third_party, load, loadable, names, prefix_of
 from viewsphere.plugins.spec import Spec
+from viewsphere.validation.errors import nearest
 
 Role = Literal["example", "table", "box"]
 """Uses of a model by viewsphere itself: to show and measure something, as a table's top, as an open box."""

@@ -11,8 +11,8 @@ from PIL import Image, ImageDraw
 from viewsphere.errors import StoreError
 from viewsphere.labels import Drawing, Extent, channels, drawable, is_in, stand_in_for
 from viewsphere.model.channel import picture_of
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.sample import Sample
+from viewsphere.validation.errors import one_of
 
 Picture = NDArray[np.uint8]
 

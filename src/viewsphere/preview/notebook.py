@@ -9,7 +9,6 @@ from typing import Any
 
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.model.channel import picture_of
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.planning.plan import Plan
 from viewsphere.preview.frame import Picture, draw_sample
@@ -18,6 +17,7 @@ from viewsphere.preview.tiles import contact_sheet
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.memory import Frames
 from viewsphere.store import Dataset
+from viewsphere.validation.errors import shown
 
 WIDTH = 480
 """Pixels across, at most, of a sample's picture."""

@@ -29,10 +29,10 @@ from pydantic_core import CoreSchema, core_schema
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Metres, Natural, Number
 from viewsphere.model.fields.omit_none import OmitNone
-from viewsphere.model.fields.quantity import quantity
-from viewsphere.model.fields.validation_errors import error_at, nearest, shown
 from viewsphere.recipe.seed_names import seed_name
 from viewsphere.recipe.values import OrShort
+from viewsphere.validation.errors import error_at, nearest, shown
+from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from numpy.random import Generator

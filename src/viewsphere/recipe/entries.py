@@ -14,10 +14,10 @@ from pydantic_core import PydanticUndefined
 
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import whole
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.scene import LINEAR, PICTURE, SRGB
 from viewsphere.recipe.draws import KINDS, Distribution, Drawn
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color
+from viewsphere.validation.errors import shown
 
 Part = TypeVar("Part", bound=Frozen)
 Names = Collection[str]

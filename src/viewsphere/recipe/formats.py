@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Field, JsonValue, TypeAdapter, ValidationE
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.fields.frozen import Frozen
-from viewsphere.model.fields.validation_errors import report, shown
 from viewsphere.plugins.format import FormatSpec
+from viewsphere.validation.errors import report, shown
 
 FORM = {
     "anyOf": [

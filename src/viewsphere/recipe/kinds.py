@@ -11,8 +11,8 @@ from pydantic_core import CoreSchema, core_schema
 
 from viewsphere import plugins
 from viewsphere.model.fields.frozen import Frozen
-from viewsphere.model.fields.validation_errors import error_at, one_of, shown
 from viewsphere.plugins.spec import Spec
+from viewsphere.validation.errors import error_at, one_of, shown
 
 
 def _by_reference(options: type[Frozen]) -> CoreSchema:

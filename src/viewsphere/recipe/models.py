@@ -12,7 +12,6 @@ from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Positive
 from viewsphere.model.fields.omit_none import OmitNone
-from viewsphere.model.fields.validation_errors import one_of, shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.plugins import prefix_of
 from viewsphere.plugins.source import suggested
@@ -20,6 +19,7 @@ from viewsphere.recipe.cameras.time import RATE, STEPS, Frames, Rate, Steps
 from viewsphere.recipe.draws import CountDrawn, Drawn, is_random
 from viewsphere.recipe.values import OrShort, shape_of
 from viewsphere.recipe.world.motion import MOTION, MotionField
+from viewsphere.validation.errors import one_of, shown
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 

@@ -36,7 +36,6 @@ from viewsphere.model.fields.files import Files
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.notebook import Shown
 from viewsphere.model.fields.numbers import Count, Natural, Number
-from viewsphere.model.fields.validation_errors import Marks, error_at, report, shown
 from viewsphere.model.sensors.lidar import LIDAR
 from viewsphere.recipe.cameras.rig import RigField, SensorList
 from viewsphere.recipe.cameras.sequence import TimeEntry
@@ -49,6 +48,7 @@ from viewsphere.recipe.values import Interval, OrShort, shape_of
 from viewsphere.recipe.variations import Variations, check_alike, varied
 from viewsphere.recipe.world.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
 from viewsphere.recipe.world.scenes import ScenesField
+from viewsphere.validation.errors import Marks, error_at, report, shown
 
 
 def _shares(value: tuple[float, float]) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from pydantic_core import CoreSchema
 
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Number, Positive
-from viewsphere.model.fields.validation_errors import nearest, shown
+from viewsphere.validation.errors import nearest, shown
 
 
 class OrShort:

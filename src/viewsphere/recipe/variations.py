@@ -16,9 +16,9 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
-from viewsphere.model.fields.validation_errors import error_at
 from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.world.scene import SceneEntry
+from viewsphere.validation.errors import error_at
 
 CONDITIONS = ("sun", "sky", "lights", "fog", "rain", "snow", "wet", "lamps", "background", "smoother", "view", "effects")
 """Fields of a scene that no label depends on."""

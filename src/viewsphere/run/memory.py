@@ -12,8 +12,6 @@ from typing import Any
 from viewsphere.composing.seeds import generator
 from viewsphere.errors import UserError
 from viewsphere.model.fields.notebook import Shown
-from viewsphere.model.fields.quantity import quantity
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.sample import Sample
 from viewsphere.model.shard import Shard
 from viewsphere.model.shot import Shot
@@ -28,6 +26,8 @@ from viewsphere.run.shots.precompile import precompile, told_to
 from viewsphere.run.shots.stages import Stages
 from viewsphere.store import Row
 from viewsphere.store.index import Index
+from viewsphere.validation.errors import shown
+from viewsphere.validation.quantity import quantity
 
 
 class Frames(Shown, Iterable[Sample]):

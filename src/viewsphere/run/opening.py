@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from viewsphere.errors import RecipeError, StoreError, UserError
 from viewsphere.labels import on_request
 from viewsphere.model.channel import PASSES, missing
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.sensors.rig import Sensor
 from viewsphere.planning.checks.models import check_needs
 from viewsphere.planning.engine_digest import engine_digest
@@ -23,6 +22,7 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exports.scope import is_computed, needs_of, not_held, scope_of_plan
 from viewsphere.run.exports.writable import writable
 from viewsphere.store import check_codecs
+from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.store import Part, PlanRecord, Store

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError, UserError
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.planning.plan import plan
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.reproduce_recipe import RECIPE, draft
 from viewsphere.store import new_folder
 from viewsphere.store.source_cameras import SourceCameras
+from viewsphere.validation.errors import one_of
 
 
 @dataclass(frozen=True)

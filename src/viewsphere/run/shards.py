@@ -10,8 +10,8 @@ import sys
 from typing import Any
 
 from viewsphere.errors import UserError
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.shard import Shard
+from viewsphere.validation.errors import shown
 
 
 def shard_of(shard: object) -> Shard:

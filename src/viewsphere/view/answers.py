@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.labels import channel_labels, is_shown
 from viewsphere.model.channel import PASSES, PICTURES
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.report import conventions, model_data
 from viewsphere.report.facts import facts
 from viewsphere.report.frames import frame_data
@@ -27,6 +26,7 @@ from viewsphere.report.paths import without_folders
 from viewsphere.report.pictures import Scale, layer, layer_names
 from viewsphere.report.summary import hues, summary
 from viewsphere.report.unknown import number
+from viewsphere.validation.errors import one_of
 from viewsphere.view.live import Live
 from viewsphere.view.query import MEASURES, Query
 

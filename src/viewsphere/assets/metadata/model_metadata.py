@@ -23,10 +23,10 @@ from viewsphere.geometry.diameter import diameter
 from viewsphere.model.annotations.keypoints import Keypoints, Place
 from viewsphere.model.annotations.metadata import ModelMetadata
 from viewsphere.model.annotations.symmetries import Symmetries
-from viewsphere.model.fields.validation_errors import nearest, shown
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.reading.sidecar import Sidecar
+from viewsphere.validation.errors import nearest, shown
 
 Float = NDArray[np.float64]
 

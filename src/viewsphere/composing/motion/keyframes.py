@@ -14,9 +14,9 @@ from viewsphere.composing.motion import Move, Origin, Pose, Start
 from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_about, quaternion_product, slerp
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Number
-from viewsphere.model.fields.validation_errors import error_at, shown
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
+from viewsphere.validation.errors import error_at, shown
 
 Float = NDArray[np.float64]
 Quaternion = tuple[Number, Number, Number, Number]

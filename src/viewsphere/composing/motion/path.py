@@ -11,10 +11,10 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.curve import Curve
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Positive
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.source import with_roads
 from viewsphere.recipe.draws import Coordinate, Drawn, PointDrawn
+from viewsphere.validation.errors import one_of
 
 ANY = "any"
 

@@ -18,13 +18,13 @@ from viewsphere.composing.sendable import Sendable
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.files import open_file
 from viewsphere.geometry.rotation import Float, compose, transform
-from viewsphere.model.fields.validation_errors import nearest
 from viewsphere.model.model_spec import ModelSpec, Parts
 from viewsphere.model.scene import BlendScene, Matrix4
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.blend import VALUE, BlendEntry, LabelRule, VariantEntry
 from viewsphere.recipe.world.scenery import Labels
+from viewsphere.validation.errors import nearest
 
 if TYPE_CHECKING:
     from viewsphere.assets.scene_file import SceneFile, SceneObject

@@ -15,12 +15,12 @@ from viewsphere.composing.scene.entries_walked import named
 from viewsphere.errors import RecipeError
 from viewsphere.files import open_file
 from viewsphere.limits import limits
-from viewsphere.model.fields.validation_errors import nearest
 from viewsphere.model.scene import Background, Ground
 from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.light import SKY_SUFFIXES
+from viewsphere.validation.errors import nearest
 
 if TYPE_CHECKING:
     from PIL.Image import Image

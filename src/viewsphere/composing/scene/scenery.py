@@ -22,7 +22,6 @@ from viewsphere.composing.seeds import Names, generator, scene_generators, share
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.geometry.rotation import compose, transform
-from viewsphere.model.fields.validation_errors import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Bay, Lane, Place, Surface, Traffic
 from viewsphere.model.scene import Matrix4
@@ -32,6 +31,7 @@ from viewsphere.recipe.models import unit_metres
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.motion import Motions
 from viewsphere.recipe.world.scenery import Labels, PlaceEntry, PlaneEntry
+from viewsphere.validation.errors import nearest, one_of
 
 TRIES = 200
 """Spots that are tried for one plane."""

@@ -16,10 +16,10 @@ from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.curve import Curve, spline
 from viewsphere.model.fields.numbers import Length, Metres, Positive
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.recipe.cameras.trajectories import LOOK, Look, Moving
+from viewsphere.validation.errors import one_of
 
 Float = NDArray[np.float64]
 

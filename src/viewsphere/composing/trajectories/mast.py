@@ -13,10 +13,10 @@ from pydantic import Field, model_validator
 from viewsphere.composing.trajectories.shared.aim import aimed, focuses, overhead, posed
 from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.model.fields.numbers import Length, Number
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.recipe.cameras.trajectories import LOOK, Look, Moving, Place
+from viewsphere.validation.errors import shown
 
 Float = NDArray[np.float64]
 

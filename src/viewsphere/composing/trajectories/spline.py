@@ -16,10 +16,10 @@ from viewsphere.composing.trajectories.shared.aim import aimed, focuses
 from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.geometry.curve import Curve, spline
 from viewsphere.model.fields.numbers import Number, Positive
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.recipe.cameras.trajectories import LOOK, MOST_POINTS, Look, Moving, Place
+from viewsphere.validation.errors import shown
 
 Float = NDArray[np.float64]
 

@@ -20,10 +20,10 @@ from viewsphere.composing.trajectories.shared.world import RigPose, World
 from viewsphere.geometry.curve import Curve, spline
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Length, Metres, Number, Positive
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.recipe.cameras.trajectories import LOOK, MOST_POINTS, MOST_TURNS, Look, Moving, Spot
+from viewsphere.validation.errors import shown
 
 Float = NDArray[np.float64]
 

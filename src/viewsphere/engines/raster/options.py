@@ -10,7 +10,7 @@ from typing import Literal
 from pydantic import JsonValue
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import one_of
+from viewsphere.validation.errors import one_of
 
 ANTIALIAS = (1, 4, 16, 64)
 """Allowed numbers of samples in an edge pixel; beyond four, every pixel has a quarter as many."""

@@ -33,7 +33,6 @@ from viewsphere.formats import Scope
 from viewsphere.formats.shared.writing.refusals import any_view
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.fields.files import Files
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -45,6 +44,7 @@ from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.store import Dataset
 from viewsphere.urls import here
+from viewsphere.validation.quantity import quantity
 
 ENGINE = "cycles"
 """The engine that builds and saves the scenes."""

@@ -17,12 +17,12 @@ from viewsphere.formats.bop.entries import MM
 from viewsphere.formats.shared.reading.image_lists import one_line
 from viewsphere.formats.shared.reading.source_models import foreign_model
 from viewsphere.model.annotations.symmetries import RIGID, Symmetries
-from viewsphere.model.fields.validation_errors import first_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignModel
 from viewsphere.store.paths import file_inside
 from viewsphere.store.texts import parsed
+from viewsphere.validation.errors import first_of
 
 FOLDERS = ("models", "models_cad", "models_reconst", "models_eval", "models_fine")
 """The folders in which data sets have their models; the first that exists counts."""

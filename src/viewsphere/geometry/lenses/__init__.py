@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, NamedTuple, Protocol, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,7 @@ from pydantic import (
 
 from viewsphere.errors import PluginError
 from viewsphere.plugin_modules import entry_points, listed
+from viewsphere.validation.specs import Takes, check_calls, mistakes
 
 Float = NDArray[np.float64]
 Bounds = tuple[float, float, float, float]
@@ -108,7 +109,7 @@ class LensSpec(BaseModel):
         default=False, description="whether pixels are K times points, as a pinhole's: straight lines stay straight"
     )
     is_scan: bool = Field(default=False, description="whether pixels are a LiDAR's measurements instead of a picture")
-    bounds: Callable[..., tuple[Bounds | None, bool]] | None = Field(
+    bounds: Annotated[Callable[..., tuple[Bounds | None, bool]] | None, Takes(6)] = Field(
         default=None,
         description="`bounds(lens, R, t, vertices, is_used, triangles)`: the 2D box of what the lens shows of triangles (n, 3) "
         "of world vertices (v, 3), None without, and whether it shows all. Default: a search that needs `project` alone",
@@ -135,10 +136,11 @@ class LensSpec(BaseModel):
     @classmethod
     def _explain(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         try:
-            return handler(data)
+            made = handler(data)
         except ValidationError as error:
-            lines = (f"LensSpec.{'.'.join(map(str, e['loc']))}: {e['msg'].lower()}" for e in error.errors())
-            raise PluginError("\n".join(lines)) from None
+            raise mistakes(cls, error, data) from None
+        check_calls(made)
+        return made
 
 
 @dataclass(frozen=True, eq=False)

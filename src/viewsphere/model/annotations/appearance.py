@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Amount, Portion
 from viewsphere.model.fields.omit_none import OmitNone
-from viewsphere.model.fields.validation_errors import shown
+from viewsphere.validation.errors import shown
 
 LONGEST = 40
 """Characters of a word for a colour or a material."""

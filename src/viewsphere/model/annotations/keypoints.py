@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, model_validator
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Number
-from viewsphere.model.fields.validation_errors import nearest, shown
+from viewsphere.validation.errors import nearest, shown
 
 MOST_POINTS = 1000
 """Points of one model."""

@@ -12,8 +12,8 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.channel import picture_of
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.sample import Sample
+from viewsphere.validation.errors import one_of
 
 Float = NDArray[np.float64]
 Axes = Literal["camera", "world"]

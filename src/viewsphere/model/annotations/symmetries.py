@@ -13,8 +13,8 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from viewsphere.geometry.rotation import Float, compose, product, rigid, rotation_about, transform
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Number
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.scene import IDENTITY, Vector
+from viewsphere.validation.errors import shown
 
 MOST = 1000
 """Symmetries of one model."""

@@ -17,7 +17,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from viewsphere.model.fields.validation_errors import explained
+from viewsphere.validation.errors import explained
 
 _built: ContextVar[type[BaseModel] | None] = ContextVar("_built", default=None)
 """The class that pydantic builds a validator of; classes within it get theirs when they are first used."""

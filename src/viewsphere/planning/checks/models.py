@@ -15,8 +15,6 @@ from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.errors import RecipeError
 from viewsphere.labels import channels, is_channel, is_on_request, label_named, labels, on_request
 from viewsphere.model.channel import MATERIAL_PASSES, PASSES
-from viewsphere.model.fields.suggestions import suggestion
-from viewsphere.model.fields.validation_errors import nearest, one_of, read_options, shown
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.planning.models import count_models
 from viewsphere.plugins.engine import EngineSpec
@@ -28,6 +26,8 @@ from viewsphere.recipe.world.light import NightSky
 from viewsphere.recipe.world.scenes import SamplerEntry, ScenesEntry
 from viewsphere.recipe.world.surface import GroundEntry
 from viewsphere.recipe.world.weather import FogEntry
+from viewsphere.validation.errors import nearest, one_of, read_options, shown
+from viewsphere.validation.suggestions import suggestion
 
 
 def check_redraws(recipe: Recipe) -> None:

@@ -12,7 +12,7 @@ from viewsphere.composing.viewpoints.pose_files.motions import nearest_rotation
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
 from viewsphere.geometry.rotation import rigid, transform
-from viewsphere.model.fields.validation_errors import told_of
+from viewsphere.validation.errors import told_of
 
 Float = NDArray[np.float64]
 

@@ -11,12 +11,12 @@ from typing import TypeVar
 
 from viewsphere.composing.viewpoints.poses import Poses
 from viewsphere.model.fields.frozen import Frozen
-from viewsphere.model.fields.validation_errors import read_options
 from viewsphere.model.scene import Vector
 from viewsphere.model.thing import Thing
 from viewsphere.planning.samplers.shared.sampling_context import SamplingContext, lens
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.scenes import SamplerEntry
+from viewsphere.validation.errors import read_options
 
 __all__ = ["SamplingContext", "Standing", "lens", "options_of"]
 

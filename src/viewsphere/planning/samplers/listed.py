@@ -11,8 +11,6 @@ from viewsphere.composing.time_steps import is_animated
 from viewsphere.composing.viewpoints.pose_files import Arranged, Extrinsics
 from viewsphere.composing.viewpoints.poses import ListedPoses, placed, pose_file, world_turn
 from viewsphere.errors import RecipeError, each
-from viewsphere.model.fields.quantity import quantity
-from viewsphere.model.fields.validation_errors import Nearest, one_of
 from viewsphere.model.listed import ListedObject
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
@@ -24,6 +22,8 @@ from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.cameras.viewpoints import PoseList
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import Block
+from viewsphere.validation.errors import Nearest, one_of
+from viewsphere.validation.quantity import quantity
 
 
 def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:

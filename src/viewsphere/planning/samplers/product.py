@@ -11,7 +11,6 @@ from viewsphere.composing.redraws import redraw_names
 from viewsphere.composing.time_steps import Run, TimedPoses, at_step
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor, Scene, Vector
 from viewsphere.model.shot import Shot
@@ -20,6 +19,7 @@ from viewsphere.planning.samplers import SamplingContext, Standing
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import Block
+from viewsphere.validation.quantity import quantity
 
 
 def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:

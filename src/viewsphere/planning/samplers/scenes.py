@@ -14,7 +14,6 @@ from viewsphere.composing.time_steps import is_animated
 from viewsphere.composing.viewpoints.pose_numbers import as_ranges
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
@@ -35,6 +34,7 @@ from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.store import Block
 from viewsphere.store.index import Ranges, numbers
+from viewsphere.validation.quantity import quantity
 
 IN_THE_AIR = 1e-3
 """Metres between the floor and models that do not stand on it."""

@@ -22,7 +22,6 @@ from viewsphere.composing.viewpoints.sequence_poses import SequencePoses
 from viewsphere.errors import RecipeError
 from viewsphere.labels import label_named
 from viewsphere.model.annotations.tracks import Tracks
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor, Matrix4
@@ -45,6 +44,7 @@ from viewsphere.recipe.cameras.sequence import TimeEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.scenes import ScenesEntry
 from viewsphere.store import Block
+from viewsphere.validation.quantity import quantity
 
 NODES = 5
 """Moments of an open shutter at which a thing's pose is recorded; it goes straight on in between."""

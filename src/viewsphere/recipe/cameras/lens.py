@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, SerializeAsAny, ValidationError, WithJsonS
 
 from viewsphere import plugins
 from viewsphere.geometry.lenses import LensParameters
-from viewsphere.model.fields.validation_errors import error_at, explained, one_of
 from viewsphere.plugins.lens import LensSpec
+from viewsphere.validation.errors import error_at, explained, one_of
 
 
 def _read(value: Any) -> Any:

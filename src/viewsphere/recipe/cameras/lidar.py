@@ -11,9 +11,9 @@ from pydantic import AfterValidator, Field, model_validator
 from viewsphere.geometry.lenses import lens_parameters
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Length, Metres, Number, Portion, Positive
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.lidar import Lidar
+from viewsphere.validation.errors import shown
 
 MOST_RAYS = 10_000_000
 MOST_COLUMNS = 65_535

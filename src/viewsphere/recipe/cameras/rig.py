@@ -9,11 +9,11 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator
 
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Length, Metres, Number, Positive
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.recipe.cameras.lens import DistortionField
 from viewsphere.recipe.cameras.lidar import LidarEntry
 from viewsphere.recipe.values import OrShort, pair
 from viewsphere.recipe.world.scene import CameraEntry, CameraMatrix, PictureSize, Row
+from viewsphere.validation.errors import shown
 
 MOST_SENSORS = 64
 AXES = "OpenCV axes of the first sensor: x right, y down, z forward"

@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Positive
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.recipe.values import shape_of
+from viewsphere.validation.errors import shown
 
 FrameNumber = Annotated[int, Field(strict=True, ge=-1_000_000, le=1_000_000)]
 

@@ -15,7 +15,6 @@ from pydantic import (
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Number, Positive
 from viewsphere.model.fields.omit_none import OmitNone
-from viewsphere.model.fields.validation_errors import error_at
 from viewsphere.model.model_spec import Axis
 from viewsphere.plugins.trajectory import TrajectorySpec
 from viewsphere.recipe.cameras.aim import (
@@ -38,6 +37,7 @@ from viewsphere.recipe.cameras.time import RATE, Frames, Rate
 from viewsphere.recipe.cameras.trajectories import Moving
 from viewsphere.recipe.kinds import ByKind
 from viewsphere.recipe.values import Interval, Point, Range, Values
+from viewsphere.validation.errors import error_at
 
 AxisValues = float | tuple[float, ...] | Range
 """One value, a list of them, or evenly spaced ones."""

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any, cast
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import Marks, Place, dotted, shown
-from viewsphere.model.fields.validation_errors import Path as Steps
 from viewsphere.model.scene import Background, Ground
 from viewsphere.plugins import prefix_of
 from viewsphere.recipe.draws import KINDS
 from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.reading.file import parse, read
 from viewsphere.recipe.reading.former_names import present, with_present_names
+from viewsphere.validation.errors import Marks, Place, dotted, shown
+from viewsphere.validation.errors import Path as Steps
 
 PATHS: tuple[tuple[str, ...], ...] = (
     ("models", "*", "source"),

@@ -14,9 +14,9 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from viewsphere.errors import RecipeError
 from viewsphere.files import read_bytes
 from viewsphere.limits import limits
-from viewsphere.model.fields.validation_errors import Marks, Place, dotted, shown
-from viewsphere.model.fields.validation_errors import Path as Steps
 from viewsphere.recipe.reading.yaml_errors import syntax_error
+from viewsphere.validation.errors import Marks, Place, dotted, shown
+from viewsphere.validation.errors import Path as Steps
 
 DEEPEST = 200
 """Brackets within one another: each takes the YAML reader as long as all those around it."""

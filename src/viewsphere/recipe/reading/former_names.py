@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, cast
 
-from viewsphere.model.fields.validation_errors import Path, dotted
+from viewsphere.validation.errors import Path, dotted
 
 _PRESENT = {"azimuth_deg": "azimuth", "elevation_deg": "elevation", "tilt_deg": "tilt"}
 """Former names, with those that replaced them."""

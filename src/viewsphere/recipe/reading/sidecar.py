@@ -13,8 +13,8 @@ from viewsphere.model.annotations.appearance import Word
 from viewsphere.model.annotations.keypoints import Keypoints, PointName
 from viewsphere.model.annotations.symmetries import Symmetries
 from viewsphere.model.fields.frozen import Frozen
-from viewsphere.model.fields.validation_errors import report, shown
 from viewsphere.recipe.reading.file import read
+from viewsphere.validation.errors import report, shown
 
 ENDING = ".viewsphere.yaml"
 """Follows the whole name of the model's file."""

@@ -7,7 +7,7 @@ import re
 import yaml
 from yaml.tokens import FlowMappingEndToken, FlowMappingStartToken, FlowSequenceEndToken, FlowSequenceStartToken
 
-from viewsphere.model.fields.validation_errors import shown
+from viewsphere.validation.errors import shown
 
 UNCLOSED = ("while scanning a quoted scalar", "while parsing a flow sequence", "while parsing a flow mapping")
 """The YAML reader's contexts of a quote or a bracket that is not closed, and whose place it knows."""

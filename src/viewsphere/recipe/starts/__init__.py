@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 from typing import NamedTuple
 
-from viewsphere.model.fields.quantity import quantity
+from viewsphere.validation.quantity import quantity
 
 FIRST = "poses"
 """The kind that is written where none is named."""

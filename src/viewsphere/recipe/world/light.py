@@ -11,7 +11,6 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag,
 
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Number, Strength
-from viewsphere.model.fields.validation_errors import error_at, nearest, one_of, shown
 from viewsphere.model.scene import (
     Daylight,
     Environment,
@@ -21,6 +20,7 @@ from viewsphere.model.scene import (
 from viewsphere.recipe.draws import Drawn
 from viewsphere.recipe.entries import entry_of
 from viewsphere.recipe.values import OrShort, shape_of, switch
+from viewsphere.validation.errors import error_at, nearest, one_of, shown
 
 SWITCH: list[Any] = [True, False, "on", "off"]
 SKY_SUFFIXES = (".exr", ".hdr")

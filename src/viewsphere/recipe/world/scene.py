@@ -22,7 +22,6 @@ from viewsphere.geometry.camera import focal_from_sensor
 from viewsphere.geometry.lenses import focal_from_fov
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Count, Number, Positive
-from viewsphere.model.fields.validation_errors import error_at, shown, told_of
 from viewsphere.model.scene import WEATHER
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.recipe.cameras.lens import DistortionField
@@ -46,6 +45,7 @@ from viewsphere.recipe.world.light import SKY_SUFFIXES, GradientEntry, HdriSky, 
 from viewsphere.recipe.world.scenery import CompanyEntry, CompanyField, Draw, PlaceEntry, PlaceField, PlaneEntry, PlanesField
 from viewsphere.recipe.world.surface import GroundEntry, GroundField, MaterialEntry
 from viewsphere.recipe.world.weather import FogField, LampsField, RainField, SnowField, WetField, check_weather
+from viewsphere.validation.errors import error_at, shown, told_of
 
 LARGEST_IMAGE = 16384
 OF_FILE = ("place", "sun", "sky", "ground")

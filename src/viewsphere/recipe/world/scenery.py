@@ -9,7 +9,6 @@ from pydantic import BeforeValidator, Field, model_validator
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import FARTHEST, Length, Number, Portion
 from viewsphere.model.fields.omit_none import OmitNone
-from viewsphere.model.fields.validation_errors import shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.plugins import prefix_of
 from viewsphere.plugins.place import PlaceSpec
@@ -19,6 +18,7 @@ from viewsphere.recipe.models import Unit
 from viewsphere.recipe.values import Interval, OrShort, Point
 from viewsphere.recipe.world.layout import LAYOUT, ORIENTATION, Layout, Orientation, Spot, placer_of, spots_of
 from viewsphere.recipe.world.motion import MOTION, MotionField, MotionsField
+from viewsphere.validation.errors import shown
 
 Draw = Literal["fixed", "per_model", "per_sequence", "per_frame"]
 Labels = Literal["background", "own"]

@@ -16,12 +16,12 @@ from pydantic import (
 
 from viewsphere import plugins
 from viewsphere.model.fields.omit_none import OmitNone
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.scene import Ground, Picture
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.draws import Drawn
 from viewsphere.recipe.entries import entry_of, is_drawn_color, pictures_of
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color, shape_of, switch
+from viewsphere.validation.errors import one_of
 
 ANY = "any"
 """Stands for all materials."""

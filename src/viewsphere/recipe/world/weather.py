@@ -8,11 +8,11 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Portion
-from viewsphere.model.fields.validation_errors import error_at, nearest
 from viewsphere.model.weather import Fog, Lamps, Light, Rain, Snow, Wet
 from viewsphere.recipe.draws import Drawn, span
 from viewsphere.recipe.entries import entry_of
 from viewsphere.recipe.values import OrShort, shape_of, switch
+from viewsphere.validation.errors import error_at, nearest
 
 HEAVY = {"rain": 7.6, "snow": 2.5}
 """Millimetres of water an hour from which on meteorologists call rain, and snow, heavy."""

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.store import Block, Dataset, Part, PlanRecord, Store, located
@@ -18,6 +17,7 @@ from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.shots.linking import link_model, link_shot
 from viewsphere.store.shots.records import IMPORT, NAME_BYTES
+from viewsphere.validation.errors import one_of
 
 SHOT_FRAMES = 1000
 """Frames that are kept in one folder and written at once."""

@@ -26,7 +26,6 @@ from viewsphere.labels import (
     sample_labels,
 )
 from viewsphere.model.credit import Credit
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.sample import MERGED, ObjectAnnotation, Sample
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.run.progress import Listener, Progress
@@ -36,6 +35,7 @@ from viewsphere.store.foreign import ForeignFrame, Loaded
 from viewsphere.store.index import length
 from viewsphere.store.paths import files_inside
 from viewsphere.store.shots.linking import link_model, link_shot
+from viewsphere.validation.quantity import quantity
 
 
 @dataclass(frozen=True, eq=False)

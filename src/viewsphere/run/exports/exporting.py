@@ -10,7 +10,6 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.plugins.format import FormatSpec
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.run.exports.preparing import Entries, prepared, targets
@@ -20,6 +19,7 @@ from viewsphere.run.progress import Listener, Progress, null_listener
 from viewsphere.store import Choice, Dataset, located, new_folder
 from viewsphere.store.credits import credits_digest
 from viewsphere.store.shots.checksums import write_checksums, written_credits, written_frames, written_least, written_options
+from viewsphere.validation.quantity import quantity
 
 
 def export(

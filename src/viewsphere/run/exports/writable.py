@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.plugins.format import FormatSpec
+from viewsphere.validation.errors import one_of
 
 
 def writable_formats() -> tuple[str, ...]:

@@ -10,10 +10,10 @@ from typing import cast, get_args
 from viewsphere.assets.animation.clip import Timeline
 from viewsphere.assets.inspect import ModelReport, describe
 from viewsphere.errors import UserError
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import Axis, ModelSpec
 from viewsphere.plugins.source import source_of
 from viewsphere.recipe.models import UNITS, unit_metres
+from viewsphere.validation.errors import one_of
 
 
 def model_spec(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from viewsphere.errors import UserError
 from viewsphere.labels import LabelSpec
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.format import FormatSpec
@@ -23,6 +22,7 @@ from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.source import SourceSpec
 from viewsphere.plugins.spec import Spec
 from viewsphere.plugins.trajectory import TrajectorySpec
+from viewsphere.validation.errors import one_of
 
 SPECS: tuple[type[Spec | LensSpec], ...] = (
     EngineSpec,

@@ -14,12 +14,12 @@ from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.composing.viewpoints.sequence_poses import poses_of
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.fields.quantity import quantity
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.model.sensors.rig import Rig, Sensor
 from viewsphere.planning.rigs import rig_of
 from viewsphere.planning.samplers import lens
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.validation.quantity import quantity
 
 Float = NDArray[np.float64]
 

@@ -20,8 +20,6 @@ from viewsphere.labels import channels
 from viewsphere.model.annotations.classes import SemanticClass
 from viewsphere.model.fields.files import Files
 from viewsphere.model.fields.notebook import Shown
-from viewsphere.model.fields.quantity import quantity
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import step_key
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.sensors.rig import CAMERA
@@ -39,6 +37,8 @@ from viewsphere.store.shots.records import Category, ModelInfo, typed
 from viewsphere.store.shots.sample_records import ShotRecords, from_whole_sample
 from viewsphere.store.texts import parsed
 from viewsphere.urls import here, link_file, located
+from viewsphere.validation.errors import one_of
+from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.assets.mesh import Mesh

@@ -13,10 +13,10 @@ import numpy as np
 from viewsphere.errors import StoreError
 from viewsphere.labels import TAIL
 from viewsphere.model.channel import picture_of
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.store.samples.dataset import Dataset
+from viewsphere.validation.errors import one_of
 
 ALONE = 1.0
 """Seconds for which the only instant of a film is shown."""

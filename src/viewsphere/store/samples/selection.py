@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.labels import Field, object_labels, on_request, sample_labels
-from viewsphere.model.fields.quantity import quantity
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.sample import ObjectView, Rle, Sample
+from viewsphere.validation.errors import one_of
+from viewsphere.validation.quantity import quantity
 
 if TYPE_CHECKING:
     from viewsphere.store.samples.dataset import Dataset

@@ -18,8 +18,6 @@ from viewsphere.errors import StoreError
 from viewsphere.files import read_bytes, read_text
 from viewsphere.labels import channels
 from viewsphere.model.fields.files import Files
-from viewsphere.model.fields.quantity import first_few
-from viewsphere.model.fields.validation_errors import different, first_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
@@ -36,6 +34,8 @@ from viewsphere.store.shots.records import ModelInfo, OtherStoreError, PlanRecor
 from viewsphere.store.shots.sample_records import short_sample, whole_sample
 from viewsphere.store.shots.shot_files import ShotFiles
 from viewsphere.store.texts import parsed
+from viewsphere.validation.errors import different, first_of
+from viewsphere.validation.quantity import first_few
 
 RUN = "run.json"
 """The heartbeat of a run, in the folder that it has aside, which goes with it."""

@@ -22,13 +22,13 @@ from viewsphere.model.annotations.classes import SemanticClass, classes_of
 from viewsphere.model.annotations.keypoints import Keypoints
 from viewsphere.model.annotations.symmetries import Symmetries
 from viewsphere.model.credit import Credit
-from viewsphere.model.fields.validation_errors import first_of
 from viewsphere.model.model_spec import Size, step_key
 from viewsphere.model.thing import TimeStep
 from viewsphere.store.index import Block, Index, Row, without
 from viewsphere.store.paths import names
 from viewsphere.store.shots.manifest import sealed, unsealed
 from viewsphere.store.texts import parsed
+from viewsphere.validation.errors import first_of
 
 STORE_VERSION = 3
 

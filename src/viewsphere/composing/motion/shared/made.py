@@ -13,13 +13,13 @@ import numpy as np
 from viewsphere import plugins
 from viewsphere.composing.motion.shared.start import Pose, Start
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import one_of, read_options
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion, TimeStep
 from viewsphere.plugins.motion import MotionSpec
 from viewsphere.recipe.draws import RngOf, drawn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.motion import MotionEntry, Motions, has_clip, listed
+from viewsphere.validation.errors import one_of, read_options
 
 if TYPE_CHECKING:
     from viewsphere.composing.motion import Move

@@ -7,7 +7,7 @@ from pathlib import Path
 from viewsphere.composing.viewpoints.pose_files.entries import Arranged, Extrinsics, Orbit, PoseFile
 from viewsphere.composing.viewpoints.pose_files.lines import read_lines
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import one_of
+from viewsphere.validation.errors import one_of
 
 FORMATS = ("csv", "view", "tum", "kitti", "nerfstudio", "colmap", "shots")
 COLUMNS = {4: "view", 8: "tum", 12: "kitti"}

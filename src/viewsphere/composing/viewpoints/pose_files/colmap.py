@@ -14,8 +14,8 @@ from viewsphere.composing.viewpoints.pose_files.motions import from_quaternion, 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, opencv_parameters
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.fields.validation_errors import told_of
 from viewsphere.model.sensors.camera import Intrinsics
+from viewsphere.validation.errors import told_of
 
 PARAMETERS = {
     "SIMPLE_PINHOLE": "f cx cy",

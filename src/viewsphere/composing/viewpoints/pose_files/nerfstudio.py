@@ -15,9 +15,9 @@ from viewsphere.composing.viewpoints.pose_files.lines import number, read_text
 from viewsphere.composing.viewpoints.pose_files.motions import motion
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.lenses import LensParameters, focal_from_fov, opencv_parameters
-from viewsphere.model.fields.validation_errors import told_of
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.texts import parsed
+from viewsphere.validation.errors import told_of
 
 NUMBERS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2", "camera_angle_x")
 LENS_KEYS = (*NUMBERS, "camera_model", "is_fisheye")

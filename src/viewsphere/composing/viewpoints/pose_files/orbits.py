@@ -9,7 +9,7 @@ from viewsphere.composing.tables import known_columns
 from viewsphere.composing.viewpoints.pose_files.entries import Orbit, PoseFile
 from viewsphere.composing.viewpoints.pose_files.lines import counted, number, read_lines, read_text
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import nearest
+from viewsphere.validation.errors import nearest
 
 NEEDED = ("azimuth", "elevation", "distance")
 TILTS = ("tilt", "theta", "in_plane")

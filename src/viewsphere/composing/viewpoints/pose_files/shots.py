@@ -14,10 +14,10 @@ from viewsphere.composing.viewpoints.pose_files.entries import Arranged, Extrins
 from viewsphere.composing.viewpoints.pose_files.lines import read_text
 from viewsphere.composing.viewpoints.pose_files.motions import motions
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import report
 from viewsphere.model.listed import ListedShot, Pose
 from viewsphere.model.sensors.camera import Intrinsics
 from viewsphere.store.texts import parsed
+from viewsphere.validation.errors import report
 
 
 def read_shots(path: Path) -> PoseFile:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal, TypeVar, get_args
 from pydantic import JsonValue
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import one_of
+from viewsphere.validation.errors import one_of
 
 Renderer = Literal["cycles", "eevee", "workbench"]
 Denoise = Literal["off", "fast", "best"]

@@ -14,11 +14,11 @@ from pydantic import ValidationError
 from viewsphere.errors import StoreError, UserError
 from viewsphere.files import read_bytes, read_text
 from viewsphere.formats.shared.reading.exif import upright
-from viewsphere.model.fields.validation_errors import dotted, first_of
 from viewsphere.model.sample import Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, refuse_broken
 from viewsphere.store.paths import file_inside, is_name
+from viewsphere.validation.errors import dotted, first_of
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".bmp")
 MISTAKES = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, OSError, SyntaxError, UserError)

@@ -12,8 +12,8 @@ from pydantic import AfterValidator, Field
 
 from viewsphere.labels.shared.captions.english import capital, listed, noun_of, number, plural, with_article
 from viewsphere.labels.shared.captions.statements import RELATIONS, Company, Words, of_one, phrases
-from viewsphere.model.fields.validation_errors import one_of, shown
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.validation.errors import one_of, shown
 
 LONGEST = 1000
 """Characters of a template."""

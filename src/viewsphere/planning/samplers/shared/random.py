@@ -19,8 +19,6 @@ from viewsphere.composing.seeds import generator, share, shares
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box3d import Box3d
 from viewsphere.limits import limits
-from viewsphere.model.fields.quantity import quantity
-from viewsphere.model.fields.validation_errors import one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Surface
 from viewsphere.model.scene import IDENTITY
@@ -32,6 +30,8 @@ from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.world.layout import SurfaceEntry
 from viewsphere.recipe.world.scenes import ScenesEntry
+from viewsphere.validation.errors import one_of
+from viewsphere.validation.quantity import quantity
 
 LOOKS = 8
 """Looks of one piece of scenery."""

@@ -18,7 +18,6 @@ from viewsphere.composing.trajectories import RigPose, World, shaken
 from viewsphere.composing.trajectories import standing as steady
 from viewsphere.composing.viewpoints.sequence_poses import TrajectoryPoses
 from viewsphere.errors import RecipeError
-from viewsphere.model.fields.validation_errors import nearest
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing
@@ -27,6 +26,7 @@ from viewsphere.planning.samplers.shared.random import scene_around, scene_distr
 from viewsphere.planning.samplers.shared.sampling_context import SamplingContext
 from viewsphere.recipe.cameras.sequence import TimeEntry
 from viewsphere.recipe.world.motion import Motions
+from viewsphere.validation.errors import nearest
 
 Way = Callable[[float], Matrix4]
 """The pose of a thing at a time, seconds, on the way to its place."""

@@ -10,10 +10,10 @@ from pydantic import Field, model_validator
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.fields.frozen import Frozen
 from viewsphere.model.fields.numbers import Length, Natural
-from viewsphere.model.fields.validation_errors import error_at, shown
 from viewsphere.model.scene import AimedLight, Light, PlacedLight, Vector
 from viewsphere.recipe.draws import Coordinate, Drawn, alternatives, is_random
 from viewsphere.recipe.entries import concrete, entry_of
+from viewsphere.validation.errors import error_at, shown
 
 
 class At(Frozen):

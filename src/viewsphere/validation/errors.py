@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from viewsphere.errors import MOST_TOLD, RecipeError
-from viewsphere.model.fields.suggestions import suggestion
+from viewsphere.validation.suggestions import suggestion
 
 Options = TypeVar("Options", bound=BaseModel)
 
