@@ -77,7 +77,7 @@ def build(name: str, rng: np.random.Generator) -> Mesh:
 
     Raises UserError for an unknown family, with the nearest known one.
     """
-    made = family(name).random(rng)
+    made = _random(name, rng)
     if not family(name).clips:
         return made
     from viewsphere.assets.exporting.glb import rigged_glb_bytes
@@ -91,6 +91,19 @@ def build(name: str, rng: np.random.Generator) -> Mesh:
         raw, facts = load_model(file)
     spec = ModelSpec(key=name, source=ZOO + name, category=name, category_id=0, centring="as_is")
     return normalise(raw, facts, spec)
+
+
+def _random(name: str, rng: np.random.Generator) -> Any:
+    """What the family's `random` makes: a Mesh, or a RiggedModel for a family that moves; raises PluginError for another."""
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.plugins.family import ZooFamily
+
+    wanted: type[Any] = Mesh
+    if family(name).clips:
+        from viewsphere.assets.exporting.rigged import RiggedModel
+
+        wanted = RiggedModel
+    return plugins.checked(ZooFamily, name, "random", family(name).random(rng), wanted)
 
 
 def build_zoo_model(spec: ModelSpec) -> Mesh | Path:
@@ -120,47 +133,61 @@ def build_zoo_model(spec: ModelSpec) -> Mesh | Path:
 def _built_to_size(name: str, spec: ModelSpec) -> Mesh:
     import numpy as np
 
+    from viewsphere.assets.mesh import Mesh
     from viewsphere.errors import ModelError
+    from viewsphere.plugins.family import ZooFamily
 
     rng, sized = np.random.default_rng(spec.seed), family(name).sized
     if spec.size is None:
         return build(name, rng)
     if sized is None:
         raise ModelError(f"{spec.source}: expected a family with `sized`, which builds it to a size; {name} has none")
-    return sized(rng, spec.size)
+    return plugins.checked(ZooFamily, name, "sized", sized(rng, spec.size), Mesh)
 
 
 def file_of(spec: ModelSpec) -> Path | None:
-    """The GLB file of a model of a family that moves, made unless the cache has it; None for all others.
+    """The GLB file of a model of a family that moves, made unless the cache has it; None for all others. One of another
+    package is made in each process, as all that it is made by is not known: one in the cache might be out of date.
 
     Raises UserError for an unknown family, and OSError where neither the cache nor a temporary folder can be written.
     """
-    import numpy as np
-
     name = spec.source.removeprefix(ZOO)
     if not spec.source.startswith(ZOO) or not family(name).clips:
         return None
+    is_own, spare = plugins.is_third_party("families", name), _spare_files(os.getpid())
     file = cache_of("zoo") / f"{name}-{_digest(name)}-{spec.seed}.glb"
-    spare = _spare_files(os.getpid())
-    if os.access(file, os.R_OK):  # `is_file` fails in a folder that cannot be read
+    if not is_own and os.access(file, os.R_OK):  # `is_file` fails in a folder that cannot be read
         note_use(file)
     elif file not in spare:
-        from viewsphere.assets.exporting.glb import rigged_glb_bytes
-
-        data = rigged_glb_bytes(family(name).random(np.random.default_rng(spec.seed)))
-        try:
-            with making(file) as half:
-                half.write_bytes(data)
-        except OSError:  # the cache is full, or cannot be written
+        data = _glb(name, spec.seed)
+        if is_own or not _into_cache(file, data):
             own = _own_folder(os.getpid()) / file.name
             own.write_bytes(data)
             spare[file] = own
     return spare.get(file, file)
 
 
+def _glb(name: str, seed: int | None) -> bytes:
+    import numpy as np
+
+    from viewsphere.assets.exporting.glb import rigged_glb_bytes
+
+    return rigged_glb_bytes(_random(name, np.random.default_rng(seed)))
+
+
+def _into_cache(file: Path, data: bytes) -> bool:
+    """Return whether the cache took the file; it may be full, or cannot be written."""
+    try:
+        with making(file) as half:
+            half.write_bytes(data)
+    except OSError:
+        return False
+    return True
+
+
 @cache
 def _spare_files(_process: int) -> dict[Path, Path]:
-    """Files of this process in place of those that the cache did not take."""
+    """Files of this process in place of those in the cache."""
     return {}
 
 

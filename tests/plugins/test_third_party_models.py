@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import ExitStack
 
 import pytest
 
 import viewsphere_zoo as zoo
 from installed import example, installed
+from scratch import scratch_cache
 from small import small_recipe
 from viewsphere import Recipe, plan
+from viewsphere.assets.cache import load
 from viewsphere.assets.metadata.stuff import stuff_of
 from viewsphere.cli.doctor import _downloads
 from viewsphere.errors import PluginError, RecipeError, UserError
+from viewsphere.model.annotations.keypoints import At
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.planning.models import model_specs
-from viewsphere.plugins.source import model_for, model_names, place_names, sources, with_roads
+from viewsphere.plugins.family import ZooFamily
+from viewsphere.plugins.source import family_of, model_for, model_names, place_names, sources, with_roads
 
 SOURCE = """
 from viewsphere.plugins.source import SourceSpec
@@ -84,3 +90,77 @@ def test_any_family_is_one_that_is_shipped(install, code):
     install("families", "aardvark", code)
     assert "aardvark" in zoo.family_names() and "aardvark" not in zoo.things() and "car" in zoo.things()
     assert model_specs(small_recipe(models=[{"source": "zoo:any", "count": 4}])) == alone
+
+
+WALKER = """
+import numpy as np
+from viewsphere.plugins.family import ZooFamily
+from viewsphere_zoo.families.person import FAMILY as PERSON
+
+FAMILY = ZooFamily(random=lambda rng: PERSON.random(np.random.default_rng(2)), home="street", clips=PERSON.clips)
+"""
+
+
+def spec_of(source):
+    return ModelSpec(key="a", source=source, seed=1, category="a", category_id=1)
+
+
+def test_files_of_a_moving_family_of_another_package_are_not_kept_in_the_cache(install, monkeypatch, tmp_path):
+    scratch_cache(monkeypatch, tmp_path / "cache")
+    install("families", "walker", WALKER)
+    file = zoo.file_of(spec_of("zoo:walker"))
+    assert file is not None and file.stat().st_size > 0 and zoo.file_of(spec_of("zoo:walker")) == file
+    assert not file.is_relative_to(tmp_path / "cache") and not list(tmp_path.glob("cache/**/walker*"))
+
+
+PEG = example("Pegs that stand on a foot.")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("random=peg_random", "random=lambda rng: 3", r"ZooFamily\.random: expected a function that returns a Mesh; found int"),
+        (
+            "random=peg_random",
+            "clips=('nod',), random=peg_random",
+            r"ZooFamily\.random: expected a function that returns a RiggedModel; found Mesh",
+        ),
+    ],
+    ids=["random", "clips"],
+)
+def test_a_family_that_makes_no_model_is_an_error_of_its_file(install, old, new, message):
+    file = install("families", "peg", PEG.replace(old, new))
+    with pytest.raises(PluginError, match=f"^{re.escape(str(file))}: {message}"):
+        load(spec_of("zoo:peg"))
+
+
+def test_the_lines_of_a_skeleton_join_named_points():
+    def made(**more):
+        return ZooFamily(random=len, home="table", keypoints={"top": At("a", (0, 0, 1)), "low": At("a", (0, 0, 0))}, **more)
+
+    assert made(skeleton=(("top", "low"),)).skeleton == (("top", "low"),)
+    with pytest.raises(PluginError, match=r"^ZooFamily\.skeleton: 'lo' is unknown; did you mean 'low'\? Valid: top, low$"):
+        made(skeleton=(("top", "lo"),))
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        (source(), r"SourceSpec\.load: expected a function that returns a Mesh or a Path; found int, for acme"),
+        (
+            source(more="family=lambda name: 3"),
+            r"SourceSpec\.family: expected .* returns a ZooFamily or None; found int, for acme",
+        ),
+        (
+            source().replace("(name,)", "name"),
+            r"SourceSpec\.expand: expected a function that returns a tuple; found str, for acme",
+        ),
+    ],
+    ids=["load", "family", "expand"],
+)
+def test_a_source_that_returns_another_type_is_an_error_of_its_file(install, code, message):
+    file = install("sources", "acme", code)
+    with pytest.raises(PluginError, match=f"^{re.escape(str(file))}: {message}"):
+        for spec in model_specs(small_recipe(models=[{"source": "acme:a"}])):
+            family_of(spec.source)
+            load(spec)

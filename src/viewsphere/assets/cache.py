@@ -36,7 +36,8 @@ from viewsphere.files import open_file, read_bytes
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
-from viewsphere.plugins.source import Named, source_of
+from viewsphere.plugins import checked
+from viewsphere.plugins.source import Named, SourceSpec, family_of, source_of
 from viewsphere.scratch import scratch_folder, temporary
 
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "clip", "fps", "shown")
@@ -176,15 +177,15 @@ def in_file(spec: ModelSpec, file: Path) -> ModelSpec:
 
 
 def _built(spec: ModelSpec, named: Named) -> Mesh | Path:
-    """The mesh or file that a source supplies."""
+    """The mesh or file that a source supplies; raises PluginError where it supplies something else."""
     try:
-        return named.spec.load(spec)
+        return checked(SourceSpec, named.prefix, "load", named.spec.load(spec), Mesh, Path)
     except OSError as error:
         raise ModelError(f"{spec.source}: expected to write its file into the cache ({error}); set VIEWSPHERE_CACHE") from None
 
 
 def _facts(spec: ModelSpec, named: Named, mesh: Mesh) -> FileFacts:
-    family = named.spec.family(named.name)
+    family = family_of(spec.source)
     points = None if family is None else part_points(mesh, family.keypoints, family.skeleton)
     return FileFacts(Path(spec.source), named.prefix, "+z", "-y", 1.0, size=extents(mesh), keypoints=points)
 

@@ -21,11 +21,12 @@ from viewsphere.assets.readers import reader_of, suffixes
 from viewsphere.composing.scene.entries_walked import below, matching, named
 from viewsphere.composing.seeds import generator, share
 from viewsphere.composing.tables import Cells, table_rows
-from viewsphere.errors import ModelError, RecipeError, UserError, each
+from viewsphere.errors import ModelError, PluginError, RecipeError, UserError, each
 from viewsphere.limits import limits
 from viewsphere.model.fields.file_names import is_reserved
 from viewsphere.model.model_spec import ModelSpec, Size
-from viewsphere.plugins.source import Named, model_for, source_of, suggested
+from viewsphere.plugins import checked
+from viewsphere.plugins.source import Named, SourceSpec, model_for, source_of, suggested
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
@@ -186,7 +187,10 @@ def _expanded(recipe: Recipe, index: int) -> tuple[tuple[Named, tuple[str, ...]]
         named = source_of(source)
         assert named is not None
         try:
-            expanded.append((named, named.spec.expand(named.name)))
+            names = checked(SourceSpec, named.prefix, "expand", named.spec.expand(named.name), tuple)
+            expanded.append((named, names))
+        except PluginError:
+            raise
         except UserError as error:
             raise RecipeError(f"models[{index}].source: {named.prefix}: {error}") from None
     return tuple(expanded)

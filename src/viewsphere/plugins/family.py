@@ -64,6 +64,13 @@ class ZooFamily(Spec):
         return classes
 
     @model_validator(mode="after")
+    def _check_skeleton(self) -> ZooFamily:
+        for name in (name for line in self.skeleton for name in line):
+            if name not in self.keypoints:
+                raise PluginError(f"ZooFamily.skeleton: {one_of(name, tuple(self.keypoints))}")
+        return self
+
+    @model_validator(mode="after")
     def _check_draw(self) -> ZooFamily:
         needing = next((name for name in ("surfaces", "rooms") if getattr(self, name) is not None), None)
         if needing and self.draw is None:

@@ -52,6 +52,7 @@ class Specified(Protocol):
 
 
 S = TypeVar("S", bound=Specified)
+V = TypeVar("V")
 
 
 class Seam(NamedTuple):
@@ -120,6 +121,15 @@ def loadable(spec: type[S]) -> dict[str, S]:
             if not is_third_party(spec.KIND, name):
                 raise
     return found
+
+
+def checked(spec: type[Specified], name: str, field: str, value: Any, *types: type[V]) -> V:
+    """The value that a function of a plug-in returned; raises PluginError for one of other types than these."""
+    if isinstance(value, types):
+        return value
+    expected = " or ".join("None" if type_ is type(None) else f"a {type_.__name__}" for type_ in types)
+    where = f"{module_file(spec.KIND, name) or name}: {spec.__name__}.{field}"
+    raise PluginError(f"{where}: expected a function that returns {expected}; found {type(value).__name__}, for {name}")
 
 
 def is_third_party(kind: Kind, name: str) -> bool:

@@ -17,7 +17,7 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
-from viewsphere.plugins.registry import Kind, is_third_party, load, loadable, names, prefix_of
+from viewsphere.plugins.registry import Kind, checked, is_third_party, load, loadable, names, prefix_of
 from viewsphere.plugins.spec import Spec
 from viewsphere.validation.errors import nearest
 
@@ -103,7 +103,7 @@ def place_of(text: str) -> PlaceSpec | None:
     named = source_of(text)
     if named is None or named.spec.place is None or named.name not in named.spec.places():
         return None
-    return named.spec.place(named.name)
+    return checked(SourceSpec, named.prefix, "place", named.spec.place(named.name), PlaceSpec)
 
 
 def place_names() -> tuple[str, ...]:
@@ -126,7 +126,7 @@ def model_names() -> tuple[str, ...]:
 
 def families_named(name: str) -> Iterator[ZooFamily]:
     """The families of this name in all sources, shipped sources first, without those that cannot be loaded."""
-    found = (_asked(prefix, None, spec.family, name) for prefix, spec in sources().items())
+    found = (_asked(prefix, None, family_of, f"{prefix}:{name}") for prefix in sources())
     return (family for family in found if family is not None)
 
 
@@ -147,7 +147,9 @@ def _asked(prefix: str, otherwise: Any, ask: Callable[..., Any], *about: str) ->
 def family_of(text: str) -> ZooFamily | None:
     """The family of a model's source; None for a file, and for a source that has no families."""
     named = source_of(text)
-    return None if named is None else named.spec.family(named.name)
+    if named is None:
+        return None
+    return checked(SourceSpec, named.prefix, "family", named.spec.family(named.name), ZooFamily, type(None))
 
 
 def sources() -> Mapping[str, SourceSpec]:
