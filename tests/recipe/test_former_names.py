@@ -61,7 +61,14 @@ def test_a_file_may_override_a_former_name_by_the_present_one(tmp_path):
 
 
 def test_both_names_at_once_are_a_mistake_and_other_entries_have_no_former_names():
-    with pytest.raises(RecipeError, match="azimuth_deg"):
-        recipe({"sun": {"azimuth_deg": 1, "azimuth": 2}})
+    now = "this field is now called '{}', which is set as well: remove one of the two"
+    both = {"azimuth_deg": 1, "azimuth": 2, "elevation": 3, "elevation_deg": 4}
+    with pytest.raises(RecipeError) as told:
+        recipe({"sun": both, "jitter": {"tilt_deg": [0, 1]}}, variations={"low": {"sun": {"azimuth": 1, "azimuth_deg": 1}}})
+    assert str(told.value).splitlines() == [
+        f"scene.sun.azimuth_deg: {now.format('azimuth')}",
+        f"scene.sun.elevation_deg: {now.format('elevation')}",
+        f"variations.low.sun.azimuth_deg: {now.format('azimuth')}",
+    ]
     with pytest.raises(RecipeError, match="azimuth_deg"):
         vs.Recipe.model_validate({"models": [{"source": "zoo:car"}], "viewpoints": {"azimuth_deg": 0, "distance": 5}})

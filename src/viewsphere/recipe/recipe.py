@@ -43,7 +43,7 @@ from viewsphere.recipe.cameras.tracks import TracksEntry
 from viewsphere.recipe.cameras.viewpoints import Viewpoints
 from viewsphere.recipe.formats import FormatEntry, FormatField
 from viewsphere.recipe.models import ModelEntry
-from viewsphere.recipe.reading.former_names import former_paths, is_former, renamed, with_present_names
+from viewsphere.recipe.reading.former_names import former_paths, is_former, refuse_both_names, renamed, with_present_names
 from viewsphere.recipe.values import Interval, OrShort, shape_of
 from viewsphere.recipe.variations import Variations, check_alike, varied
 from viewsphere.recipe.world.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
@@ -246,7 +246,9 @@ class Recipe(Shown, Frozen):
     @model_validator(mode="before")
     @classmethod
     def _plain(cls, data: Any) -> Any:
-        return with_present_names(_plain(data))
+        plain = _plain(data)
+        refuse_both_names(plain)
+        return with_present_names(plain)
 
     @model_validator(mode="wrap")
     @classmethod

@@ -142,8 +142,14 @@ def error_at(*steps: str | int) -> Generator[None]:
     except ValidationError as error:
         raise explained(error, (), steps) from None
     except ValueError as error:
-        final = PydanticCustomError(EXPLAINED, "{text}", {"text": str(error), "below": ()})
-        raise ValidationError.from_exception_data("", [InitErrorDetails(type=final, loc=steps, input=None)]) from None
+        raise mistakes_at({steps: str(error)}) from None
+
+
+def mistakes_at(told: Mapping[Path, str]) -> ValidationError:
+    """These mistakes, in their final words by their places, together."""
+    final = {steps: PydanticCustomError(EXPLAINED, "{text}", {"text": text, "below": ()}) for steps, text in told.items()}
+    details = [InitErrorDetails(type=error, loc=steps, input=None) for steps, error in final.items()]
+    return ValidationError.from_exception_data("", details)
 
 
 def first_of(error: ValidationError) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import reduce
+from operator import getitem
 from typing import Any, cast
 
-from viewsphere.validation.errors import Path, dotted
+from viewsphere.validation.errors import Path, dotted, mistakes_at
 
 _PRESENT = {"azimuth_deg": "azimuth", "elevation_deg": "elevation", "tilt_deg": "tilt"}
 """Former names, with those that replaced them."""
@@ -52,6 +54,17 @@ def former_paths(data: Any, path: Path = ()) -> Iterator[Path]:
             yield from former_paths(value, (*path, i))
 
 
+def refuse_both_names(data: Any) -> None:
+    """Raise ValidationError for the fields that have a former name beside the present one."""
+    both = [path for path in former_paths(data) if present(path)[-1] in reduce(getitem, path[:-1], data)]
+    if both:
+        raise mistakes_at({path: f"{_is_now(path)}, which is set as well: remove one of the two" for path in both})
+
+
 def renamed(paths: Iterable[Path]) -> tuple[str, ...]:
     """The warnings about former names at these paths, one line each."""
-    return tuple(f"{dotted(path)}: this field is now called {_PRESENT[cast(str, path[-1])]!r}: rename it" for path in paths)
+    return tuple(f"{dotted(path)}: {_is_now(path)}: rename it" for path in paths)
+
+
+def _is_now(path: Path) -> str:
+    return f"this field is now called {_PRESENT[cast(str, path[-1])]!r}"
