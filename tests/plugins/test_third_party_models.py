@@ -6,6 +6,7 @@ import re
 from contextlib import ExitStack
 
 import pytest
+from typer.testing import CliRunner
 
 import viewsphere_zoo as zoo
 from installed import example, installed
@@ -14,13 +15,18 @@ from small import small_recipe
 from viewsphere import Recipe, plan
 from viewsphere.assets.cache import load
 from viewsphere.assets.metadata.stuff import stuff_of
+from viewsphere.cli import doctor
+from viewsphere.cli.commands import app
 from viewsphere.cli.doctor import _downloads
+from viewsphere.cli.next_step import for_command
 from viewsphere.errors import PluginError, RecipeError, UserError
 from viewsphere.model.annotations.keypoints import At
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.planning.models import model_specs
+from viewsphere.plugins import gap
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.source import family_of, model_for, model_names, place_names, sources, with_roads
+from viewsphere.run.reports.plugin_list import overview
 
 SOURCE = """
 from viewsphere.plugins.source import SourceSpec
@@ -164,3 +170,62 @@ def test_a_source_that_returns_another_type_is_an_error_of_its_file(install, cod
         for spec in model_specs(small_recipe(models=[{"source": "acme:a"}])):
             family_of(spec.source)
             load(spec)
+
+
+GAP = "found no families, places, sources of viewsphere's own: install viewsphere again (scripts/setup in a clone)"
+
+
+@pytest.fixture
+def stale(monkeypatch, tmp_path):
+    """An installation as before viewsphere had entry points: a clone was updated, and not installed again."""
+    about = tmp_path / "stale" / "viewsphere-0.0.dist-info"
+    about.mkdir(parents=True)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: viewsphere\nVersion: 0.0\n")
+    (about / "entry_points.txt").touch()
+    monkeypatch.syspath_prepend(str(tmp_path / "stale"))
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("stale")
+def test_messages_of_an_installation_that_lacks_sources_name_the_mistake_and_the_remedy(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv .1 0 0\nv 0 .1 0\nf 1 2 3\n")
+    for models, scene, message in (
+        ([{"source": "no.obj", "category": "a"}], {}, "expected a file, folder, pattern or a source's model; found no"),
+        (
+            [{"source": "a.obj", "category": "a"}],
+            {"place": "zoo:town"},
+            "scene.place: expected a place, or a model file; found none at",
+        ),
+        ([{"source": "zoo:car"}], {}, "expected a category, such as car; found none"),
+    ):
+        with pytest.raises(RecipeError, match=f"{message}.*{re.escape(GAP)}"):
+            plan(Recipe(models=models, viewpoints={"distance": 4}, scene=scene))
+    with pytest.raises(UserError, match=re.escape(f"expected a source with a model as table; {GAP}")):
+        model_for("table")
+    assert for_command("inspect").endswith("viewsphere inspect a.obj")
+
+
+@pytest.mark.usefixtures("stale")
+def test_viewsphere_plugins_names_what_an_installation_lacks():
+    assert {(found.kind, found.name) for found in overview() if found.error == GAP} == {
+        (kind, "(all)") for kind in ("families", "places", "sources")
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("stale")
+def test_commands_work_where_an_installation_lacks_sources(monkeypatch, tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv .1 0 0\nv 0 .1 0\nf 1 2 3\n")
+    run = CliRunner().invoke(app, ["inspect", "a.obj"])
+    assert run.exit_code == 0 and "symmetries" in run.stdout, run.output
+    blender = {"python": None, "problem": "none", "devices": [], "graphics": None, "install": None}
+    monkeypatch.setattr(doctor, "_blender", lambda: blender)
+    run = CliRunner().invoke(app, ["doctor"])
+    assert run.exit_code == 0 and f"plug-ins     {GAP}\n" in run.stdout and "not measured: it needs a model" in run.stdout
+    run = CliRunner().invoke(app, ["doctor", "--setup", "people"])
+    assert run.exit_code and GAP in str(run.exception)
+
+
+def test_an_installation_that_is_whole_lacks_nothing(install):
+    install("families", "acme", "1 / 0")
+    assert gap() == "" and not any(found.name == "(all)" for found in overview())

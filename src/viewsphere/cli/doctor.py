@@ -17,6 +17,7 @@ import typer
 from viewsphere.cli.arguments import AsJson
 from viewsphere.cli.terminal import print_json, say
 from viewsphere.errors import UserError
+from viewsphere.plugins import gap, lacking
 from viewsphere.run.workers.worker_count import cores
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def doctor(
 
         downloads = _downloads()
         if name not in downloads:
-            raise UserError(f"--setup: {one_of(name, tuple(downloads))}")
+            raise UserError(f"--setup: {one_of(name, tuple(downloads))}{'; ' if gap() else ''}{gap()}")
         downloads[name].fetch(lambda line: say(line, err=True))
     facts = examine()
     if json_:
@@ -70,6 +71,7 @@ def examine() -> dict[str, Any]:
         "kernels": _kernels(),
         "speed": _speed(),
         "extras": [_extra(name, packages) for name, packages in sorted(_extras().items())],
+        "plug-ins": {"lacking": lacking(), "problem": gap() or None},
         "blender": _blender(),
         "downloads": {name: download.file() for name, download in _downloads().items()},
     }
@@ -120,10 +122,12 @@ def _kernels() -> dict[str, Any]:
 
 
 def _speed() -> dict[str, Any] | None:
-    """CPU milliseconds of a frame, beside the machine of docs/performance.md; None where kernels are not compiled yet."""
+    """CPU milliseconds of a frame, beside the machine of docs/performance.md; None where kernels are not compiled yet, or
+    where the model is lacking.
+    """
     from viewsphere.run.estimate import REFERENCE_MS, measure_speed
 
-    speed = measure_speed()
+    speed = None if gap() else measure_speed()
     return speed and {"frame_ms": speed.frame_ms, "relative": speed.relative, "reference_ms": REFERENCE_MS}
 
 
@@ -179,6 +183,8 @@ def _lines(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "Python", f"{python['version']}, {python['executable']}"
     yield "system", found["system"]
     yield "processor", f"{processor['name']}, {processor['cores']} {'core' if processor['cores'] == 1 else 'cores'}"
+    if found["plug-ins"]["problem"]:
+        yield "plug-ins", found["plug-ins"]["problem"]
     yield from _kernel_lines(kernels, found["speed"])
     for extra in found["extras"]:
         packages = ", ".join(f"{name} {is_ or 'missing'}" for name, is_ in extra["packages"].items())
@@ -204,7 +210,8 @@ def _kernel_lines(kernels: dict[str, Any], speed: dict[str, Any] | None) -> Iter
     if kernels["note"]:
         yield "", kernels["note"]
     if speed is None:
-        yield "speed", "not measured: run a preview first, which compiles kernels"
+        reason = "it needs a model that comes with viewsphere" if gap() else "run a preview first, which compiles kernels"
+        yield "speed", f"not measured: {reason}"
         return
     yield "speed", f"{speed['frame_ms']:.0f} ms of one core for a frame of a car with labels, 640 x 480;"
     yield "", f"{speed['relative']:.2f} times as fast as the machine of docs/performance.md ({speed['reference_ms']:.0f} ms)"

@@ -452,10 +452,13 @@ def _estimate(recipe: Recipe, workers: int | None) -> Estimate:
 
 def _compile_kernels(recipe: Recipe | None = None) -> None:
     """Compile the kernels that a recipe's frames call, or a plain one's: the first picture on a machine takes longer."""
+    from viewsphere.plugins import gap
     from viewsphere.plugins.source import model_for
     from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.shots.precompile import precompile_for, told_to
 
+    if recipe is None and gap():  # there is no such model, and the first picture compiles what it needs
+        return
     plain = {"models": [{"source": model_for("example")}], "viewpoints": {"azimuth": [0], "elevation": [20], "distance": 4}}
     with ProgressBar(quiet=False) as bar:
         precompile_for(recipe or Recipe.model_validate(plain), told_to(bar.show))

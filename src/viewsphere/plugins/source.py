@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -17,7 +17,7 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.place import PlaceSpec
-from viewsphere.plugins.registry import Kind, checked, is_third_party, load, loadable, names, prefix_of
+from viewsphere.plugins.registry import Kind, checked, gap, is_third_party, load, loadable, names, prefix_of
 from viewsphere.plugins.spec import Spec
 from viewsphere.validation.errors import nearest
 
@@ -161,20 +161,30 @@ def sources() -> Mapping[str, SourceSpec]:
 
 def model_for(role: Role) -> str:
     """The source of the model that viewsphere itself uses, such as `zoo:car`; raises UserError where no source has one."""
-    for prefix, spec in sources().items():
-        if role in spec.roles:
-            return f"{prefix}:{spec.roles[role]}"
-    raise UserError(f"expected a source with a model as {role}; found none: install viewsphere again")
+    found = next(models_for(role), None)
+    if found is None:
+        raise UserError(f"expected a source with a model as {role}; {gap() or 'found none: install viewsphere again'}")
+    return found
 
 
-def suggested(name: str) -> str:
-    """A hint for a name whose prefix is misspelt or was forgotten; empty for other texts."""
+def models_for(role: Role) -> Iterator[str]:
+    """The models that sources have for a use, shipped sources first."""
+    return (f"{prefix}:{spec.roles[role]}" for prefix, spec in sources().items() if role in spec.roles)
+
+
+def such_as(names: Iterable[str]) -> str:
+    """An example in words for messages, as `, such as zoo:car`; empty where there are no names."""
+    return next((f", such as {name}" for name in names), "")
+
+
+def suggested(name: str, among: Callable[[], tuple[str, ...]] = model_names) -> str:
+    """A hint for a name of a model, or among others, whose prefix is misspelt or was forgotten; empty for other texts."""
     known, (prefix, colon, _) = names("sources"), name.partition(":")
-    if not known:
-        return "; no source of models is installed: install viewsphere again (scripts/setup in a clone)"
+    if lacks := gap():
+        return f"; {lacks}"
     if colon and re.fullmatch(r"[a-z]\w+", prefix):
         return f"; there is no source {prefix!r}{nearest(prefix, known)}"
-    return next((f"; did you mean {text!r}?" for text in model_names() if text.partition(":")[2] == name), "")
+    return next((f"; did you mean {text!r}?" for text in among() if text.partition(":")[2] == name), "")
 
 
 def file_in(spec: ModelSpec) -> Path | None:

@@ -25,7 +25,7 @@ from viewsphere.geometry.rotation import compose, transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Bay, Lane, Place, Surface, Traffic
 from viewsphere.model.scene import Matrix4
-from viewsphere.plugins.source import place_names, place_of
+from viewsphere.plugins.source import place_names, place_of, such_as, suggested
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import unit_metres
 from viewsphere.recipe.recipe import Recipe
@@ -259,7 +259,8 @@ def _file_spec(recipe: Recipe, entry: PlaceEntry) -> ModelSpec:
     except ModelError as error:
         raise RecipeError(f"scene.place: {error}") from None
     if not file.is_file():
-        raise RecipeError(f"scene.place: expected a place, such as {place_names()[0]}, or a model file; found none at {file}")
+        expected = f"expected a place{such_as(place_names())}, or a model file"
+        raise RecipeError(f"scene.place: {expected}; found none at {file}{suggested(entry.source, place_names)}")
     return ModelSpec(
         key=scenery_key(path.stem, "/".join((file.name, *inside))),
         source=path.as_posix(),

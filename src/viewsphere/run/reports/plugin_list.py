@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.metadata import version
 
 from viewsphere.errors import UserError
 from viewsphere.labels import LabelSpec
@@ -17,7 +18,7 @@ from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.plugins.reader import ReaderSpec
-from viewsphere.plugins.registry import PACKAGES, SEAMS, Kind, entry_points, load, names, origin
+from viewsphere.plugins.registry import OWN, PACKAGES, SEAMS, Kind, entry_points, gap, lacking, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.source import SourceSpec
 from viewsphere.plugins.spec import Spec
@@ -56,9 +57,12 @@ class Installed:
 
 
 def overview() -> tuple[Installed, ...]:
-    """Return all plug-ins, by kind and name; each is loaded. Packages of a kind that there is not follow."""
+    """Return all plug-ins, by kind and name; each is loaded. Packages of a kind that there is not follow, and kinds whose
+    plug-ins viewsphere's installation lacks.
+    """
     found = [Installed(kind, name, origin(kind, name), _error(kind, name)) for kind in SEAMS for name in names(kind)]
-    return (*found, *_packages_of_no_kind())
+    gaps = (Installed(kind, "(all)", f"{OWN} {version(OWN)}", gap()) for kind in lacking())
+    return (*found, *_packages_of_no_kind(), *gaps)
 
 
 def _packages_of_no_kind() -> Iterator[Installed]:
