@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from installed import example, installed
+from installed import example, installed, write_package
 from small import small_recipe
-from viewsphere import Dataset, generate, plan, plugins
+from viewsphere import Dataset, Recipe, generate, plan, plugins
 from viewsphere.check import check
 from viewsphere.errors import PluginError, RecipeError, UserError
 from viewsphere.geometry.lenses import lens_parameters
@@ -57,6 +57,17 @@ def test_its_parameters_are_checked_with_the_recipe():
     ):
         with pytest.raises(RecipeError, match=told):
             plan(small_recipe(camera={"size": [8, 8], "fov_deg": 60, "distortion": given}))
+
+
+def test_it_is_found_in_a_package_of_plug_ins_beside_a_broken_one(tmp_path, monkeypatch):
+    for package, begins in (("broken_lenses", "1 / 0"), ("good_lenses", "")):
+        folder = write_package(tmp_path, package, {("packages", "division"): example("division")})
+        (folder / "__init__.py").write_text(begins)
+        points = tmp_path / f"{package}-1.0.dist-info" / "entry_points.txt"
+        points.write_text(f"[viewsphere.packages]\nlenses = {package}\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert Recipe.model_validate(small_recipe(camera=CAMERA)).camera.distortion.k == -0.4
+    assert lens_parameters("fisheye", coefficients=(0, 0, 0, 0)).model == "fisheye"
 
 
 def test_a_data_set_of_a_lens_that_is_not_installed_is_an_error_that_names_it():

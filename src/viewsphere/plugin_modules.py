@@ -14,6 +14,9 @@ from functools import lru_cache
 from importlib import metadata
 from typing import Any
 
+PACKAGES = "viewsphere.packages"
+"""The group of entry points that name packages of plug-ins, each by its kind."""
+
 MOST_GROUPS = 32
 """Groups of entry points, and packages, whose contents are remembered: more than there are kinds of plug-ins."""
 

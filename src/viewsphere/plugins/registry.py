@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 from viewsphere.errors import PluginError, UserError
-from viewsphere.plugin_modules import Changes, changes, entry_points, of_group
+from viewsphere.plugin_modules import PACKAGES, Changes, changes, entry_points, of_group
 
 Kind = Literal[
     "engines",
@@ -81,10 +81,6 @@ SEAMS: dict[Kind, Seam] = {
     "sources": Seam("", "SOURCE"),
     "trajectories": Seam("viewsphere.composing.trajectories", "TRAJECTORY"),
 }
-
-
-PACKAGES = "viewsphere.packages"
-"""The group of entry points that name packages of plug-ins, each by its kind."""
 
 
 OWN = "viewsphere"

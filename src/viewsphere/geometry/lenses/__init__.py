@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, Self
@@ -29,7 +30,7 @@ from pydantic import (
 )
 
 from viewsphere.errors import PluginError
-from viewsphere.plugin_modules import entry_points, listed
+from viewsphere.plugin_modules import PACKAGES, entry_points, listed
 from viewsphere.validation.specs import Takes, check_calls, mistakes
 
 Float = NDArray[np.float64]
@@ -342,13 +343,18 @@ def opencv_parameters(coefficients: tuple[float, ...], is_fisheye: bool = False)
 def _spec(name: str) -> LensSpec:
     """The spec of a lens model, without the suggestions that `viewsphere.plugins.load` adds to its errors."""
     entry = next((entry for entry in entry_points(group="viewsphere.lenses") if entry.name == name), None)
-    if entry is not None:
-        found = entry.load()
-    elif (name, False) in listed(__name__):
-        found = importlib.import_module(f"{__name__}.{name}")
-    else:
-        raise PluginError(f"lens {name}: expected a lens model of viewsphere or of an installed package; found none")
+    found = importlib.import_module(f"{_package_with(name)}.{name}") if entry is None else entry.load()
     spec = found if isinstance(found, LensSpec) else getattr(found, "LENS", None)
     if not isinstance(spec, LensSpec):
         raise PluginError(f"lens {name}: expected LENS = LensSpec(...) in its module; found none")
     return spec
+
+
+def _package_with(name: str) -> str:
+    """The package with a lens model: a third party's comes first, and one that cannot be imported has none."""
+    named = (entry.module for entry in entry_points(PACKAGES) if entry.name == LensSpec.KIND)
+    for package in (*named, __name__):
+        with suppress(Exception):
+            if name in dict(listed(package)):
+                return package
+    raise PluginError(f"lens {name}: expected a lens model of viewsphere or of an installed package; found none")

@@ -8,6 +8,7 @@ from importlib.metadata import version
 
 from viewsphere.errors import UserError
 from viewsphere.labels import LabelSpec
+from viewsphere.plugin_modules import PACKAGES
 from viewsphere.plugins.engine import EngineSpec
 from viewsphere.plugins.family import ZooFamily
 from viewsphere.plugins.format import FormatSpec
@@ -18,7 +19,7 @@ from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.plugins.reader import ReaderSpec
-from viewsphere.plugins.registry import OWN, PACKAGES, SEAMS, Kind, entry_points, gap, lacking, load, names, origin
+from viewsphere.plugins.registry import OWN, SEAMS, Kind, entry_points, gap, lacking, load, names, origin
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.source import SourceSpec
 from viewsphere.plugins.spec import Spec
