@@ -8,7 +8,7 @@ from viewsphere.composing.noise import WAVES, noise
 
 def over_time(seed, highest, seconds=200.0, rate=50):
     made = noise(np.random.default_rng(seed), 3, highest)
-    return np.array([made.at(i / rate) for i in range(int(seconds * rate))])
+    return np.array([made.values_at(i / rate) for i in range(int(seconds * rate))])
 
 
 @pytest.mark.parametrize("highest", [0.5, 2.0])
@@ -37,4 +37,4 @@ def test_components_and_seeds_differ_and_equal_seeds_agree():
 
 def test_a_frequency_of_zero_stands_still():
     made = noise(np.random.default_rng(1), 2, 0.0)
-    assert (made.at(0.0) == made.at(123.4)).all()
+    assert (made.values_at(0.0) == made.values_at(123.4)).all()
