@@ -44,11 +44,11 @@ def part(motion, instants):
 @pytest.mark.parametrize("options", SEVERAL.values(), ids=SEVERAL)
 def test_instants_are_those_of_the_whole_sequence(options):
     moving = made(options)
-    whole = moving.mover.at([TIME.at(i) for i in range(TIME.count)])
+    whole = moving.mover.at([TIME.seconds_at(i) for i in range(TIME.count)])
     assert moving.is_still == whole.is_still
     for instants in ([0], [59], [12, 13, 14], [0, 30, 59], list(range(60))):
         assert moving.during(instants) == part(whole, instants)
-        assert moving.at(instants[0]) == whole.held(instants[0])
+        assert moving.motion_at(instants[0]) == whole.held(instants[0])
 
 
 @pytest.mark.parametrize("name", ["path", "waits", "leaves", "lane", "spline", "random", "walks, comes and goes"])
