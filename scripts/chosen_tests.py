@@ -47,7 +47,6 @@ LISTS = {
     "formats": "viewsphere.formats.",
     "family_names": "viewsphere_zoo.",
     "place_names": "viewsphere_zoo.",
-    "model_names": "viewsphere_zoo.",
     "things": "viewsphere_zoo.",
     "zoo": "viewsphere_zoo.",
     "loadable": "viewsphere.",

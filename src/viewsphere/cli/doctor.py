@@ -17,7 +17,7 @@ import typer
 from viewsphere.cli.arguments import AsJson
 from viewsphere.cli.terminal import print_json, say
 from viewsphere.errors import UserError
-from viewsphere.plugins import gap, lacking
+from viewsphere.plugins import gap
 from viewsphere.run.workers.worker_count import cores
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def examine() -> dict[str, Any]:
         "kernels": _kernels(),
         "speed": _speed(),
         "extras": [_extra(name, packages) for name, packages in sorted(_extras().items())],
-        "plug-ins": {"lacking": lacking(), "problem": gap() or None},
+        "plug-ins": {"problem": gap() or None},
         "blender": _blender(),
         "downloads": {name: download.file() for name, download in _downloads().items()},
     }

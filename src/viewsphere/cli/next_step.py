@@ -33,11 +33,11 @@ def for_command(name: str) -> str:
         case "new":
             return "new: expected a folder for the recipe; found none\nit need not exist; next: viewsphere new cars"
         case "inspect":
-            from viewsphere.plugins.source import models_for
+            from viewsphere.plugins.source import model_for
 
             near = next(iter(_near(*_models())), None)
             here = "no model at hand? some come with viewsphere" if near is None else f"found {near} here"
-            model = near or next(models_for("example"), "car.obj")
+            model = near or model_for("example", otherwise="car.obj")
             return f"inspect: expected a model; found none\n{here}; next: viewsphere inspect {model}"
         case "plan" | "preview":
             return f"{name}: expected a recipe; found none\n{_recipe_here()}; next: viewsphere {name} {_recipe()}"

@@ -26,7 +26,7 @@ from viewsphere.limits import limits
 from viewsphere.model.fields.file_names import is_reserved
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.plugins import checked
-from viewsphere.plugins.source import Named, SourceSpec, models_for, source_of, such_as, suggested
+from viewsphere.plugins.source import Named, SourceSpec, model_for, source_of, suggested
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
@@ -349,7 +349,8 @@ def _candidates(folder: Path, source: str, where: str) -> list[Path]:
         return _shown(path, where)
     if has_magic(source):
         return matching(folder, source, where)
-    kinds = "a file, folder, pattern or a source's model" + such_as(models_for("example"))
+    example = model_for("example", otherwise="")
+    kinds = "a file, folder, pattern or a source's model" + (f", such as {example}" if example else "")
     raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}{suggested(source)}")
 
 

@@ -163,17 +163,14 @@ def shipped(kind: Kind) -> Mapping[str, str]:
     return {name: found.module for name, found in _found(kind).items() if not found.is_third_party}
 
 
-def lacking() -> tuple[Kind, ...]:
-    """Kinds whose plug-ins come with viewsphere, and are not found: a clone was updated, and not installed again, which is when
-    entry points are written.
-    """
-    return tuple(kind for kind, seam in SEAMS.items() if not seam.package and not shipped(kind))
-
-
 def gap() -> str:
-    """What the installation lacks, and the remedy, in words for messages; empty where it is whole."""
-    kinds = ", ".join(lacking())
-    return kinds and f"found no {kinds} of viewsphere's own: install viewsphere again (scripts/setup in a clone)"
+    """What the installation lacks, and the remedy, in words for messages; empty where it is whole.
+
+    Plug-ins of some kinds are found by entry points, which are written when viewsphere is installed. A clone that was updated
+    since may lack them.
+    """
+    lacking = ", ".join(kind for kind, seam in SEAMS.items() if not seam.package and not shipped(kind))
+    return lacking and f"found no {lacking} of viewsphere's own: install viewsphere again (scripts/setup in a clone)"
 
 
 def _found(kind: Kind) -> Mapping[str, _Found]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -119,7 +119,7 @@ def with_roads() -> str:
     return " or ".join(name for name, place in places if place is not None and place.roads) or "a file"
 
 
-def model_names() -> tuple[str, ...]:
+def _model_names() -> tuple[str, ...]:
     """All models of all sources, such as `zoo:car`: shipped sources first."""
     return tuple(f"{prefix}:{name}" for prefix, spec in sources().items() for name in _asked(prefix, (), spec.names))
 
@@ -159,25 +159,19 @@ def sources() -> Mapping[str, SourceSpec]:
     return dict(sorted(loadable(SourceSpec).items(), key=lambda found: is_third_party("sources", found[0])))
 
 
-def model_for(role: Role) -> str:
-    """The source of the model that viewsphere itself uses, such as `zoo:car`; raises UserError where no source has one."""
-    found = next(models_for(role), None)
-    if found is None:
+def model_for(role: Role, otherwise: str | None = None) -> str:
+    """The source of the model that viewsphere itself uses, such as `zoo:car`, shipped sources first; raises UserError where no
+    source has one, unless another text is given.
+    """
+    for prefix, spec in sources().items():
+        if role in spec.roles:
+            return f"{prefix}:{spec.roles[role]}"
+    if otherwise is None:
         raise UserError(f"expected a source with a model as {role}; {gap() or 'found none: install viewsphere again'}")
-    return found
+    return otherwise
 
 
-def models_for(role: Role) -> Iterator[str]:
-    """The models that sources have for a use, shipped sources first."""
-    return (f"{prefix}:{spec.roles[role]}" for prefix, spec in sources().items() if role in spec.roles)
-
-
-def such_as(names: Iterable[str]) -> str:
-    """An example in words for messages, as `, such as zoo:car`; empty where there are no names."""
-    return next((f", such as {name}" for name in names), "")
-
-
-def suggested(name: str, among: Callable[[], tuple[str, ...]] = model_names) -> str:
+def suggested(name: str, among: Callable[[], tuple[str, ...]] = _model_names) -> str:
     """A hint for a name of a model, or among others, whose prefix is misspelt or was forgotten; empty for other texts."""
     known, (prefix, colon, _) = names("sources"), name.partition(":")
     if lacks := gap():

@@ -25,7 +25,7 @@ from viewsphere.geometry.rotation import compose, transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.place import Bay, Lane, Place, Surface, Traffic
 from viewsphere.model.scene import Matrix4
-from viewsphere.plugins.source import place_names, place_of, such_as, suggested
+from viewsphere.plugins.source import place_names, place_of, suggested
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import unit_metres
 from viewsphere.recipe.recipe import Recipe
@@ -259,8 +259,9 @@ def _file_spec(recipe: Recipe, entry: PlaceEntry) -> ModelSpec:
     except ModelError as error:
         raise RecipeError(f"scene.place: {error}") from None
     if not file.is_file():
-        expected = f"expected a place{such_as(place_names())}, or a model file"
-        raise RecipeError(f"scene.place: {expected}; found none at {file}{suggested(entry.source, place_names)}")
+        example, hint = place_names()[:1], suggested(entry.source, place_names)
+        expected = "".join(("expected a place", *(f", such as {name}," for name in example), " or a model file"))
+        raise RecipeError(f"scene.place: {expected}; found none at {file}{hint}")
     return ModelSpec(
         key=scenery_key(path.stem, "/".join((file.name, *inside))),
         source=path.as_posix(),

@@ -19,7 +19,7 @@ from viewsphere.plugins.motion import MotionSpec
 from viewsphere.plugins.place import PlaceSpec
 from viewsphere.plugins.placer import PlacerSpec
 from viewsphere.plugins.reader import ReaderSpec
-from viewsphere.plugins.registry import OWN, SEAMS, Kind, entry_points, gap, lacking, load, names, origin
+from viewsphere.plugins.registry import OWN, SEAMS, Kind, entry_points, gap, load, names, origin, shipped
 from viewsphere.plugins.sampler import SamplerSpec
 from viewsphere.plugins.source import SourceSpec
 from viewsphere.plugins.spec import Spec
@@ -62,7 +62,7 @@ def overview() -> tuple[Installed, ...]:
     plug-ins viewsphere's installation lacks.
     """
     found = [Installed(kind, name, origin(kind, name), _error(kind, name)) for kind in SEAMS for name in names(kind)]
-    gaps = (Installed(kind, "(all)", f"{OWN} {version(OWN)}", gap()) for kind in lacking())
+    gaps = (Installed(kind, "(all)", f"{OWN} {version(OWN)}", gap()) for kind in SEAMS if not shipped(kind))
     return (*found, *_packages_of_no_kind(), *gaps)
 
 
