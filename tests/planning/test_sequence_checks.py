@@ -45,7 +45,8 @@ THINGS = "viewpoints.look: expected a thing's number or key: 1 (car_000); found"
         ({"viewpoints": "{kind: spline, points: [[9, 0, 0], [9, 9, 0]], look: car_00}"}, f":4: {THINGS} 'car_00'"),
         (
             {"motion": "{kind: path, lane: any, speed: 3}", "viewpoints": "{distance: 9}"},
-            ":1: models[0].motion.lane: expected a place with lanes, such as scene.place: zoo:neighbourhood; found none: set "
+            ":1: models[0].motion.lane: expected a place with lanes, such as scene.place: zoo:neighbourhood or zoo:town; "
+            "found none: set "
             "one, or list points",
         ),
         (
